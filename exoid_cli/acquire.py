@@ -33,20 +33,29 @@ def acquire(
     run: Annotated[
         str | None,
         typer.Option(
-            help="Name of the [[run]].", show_default="all that are missing or stale", autocompletion=completion.runs
+            help="Name of the [[run]].",
+            show_default="all that are missing or stale",
+            autocompletion=completion.runs,
         ),
     ] = None,
     trajectory: Annotated[
         Path | None,
-        typer.Option(help="The excitation, Parquet or TOML.", show_default="the run's own, or trajectory.parquet"),
+        typer.Option(
+            help="The excitation, Parquet or TOML.",
+            show_default="the run's own, or trajectory.parquet",
+        ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The recording to write.", show_default="recordings/RUN.parquet"),
+        typer.Option(
+            "--output", "-o", help="The recording to write.", show_default="recordings/RUN.parquet"
+        ),
     ] = None,
     again: AgainOption = False,
     yes: YesOption = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a real rig's recording.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a real rig's recording.")
+    ] = False,
     reset_faults: Annotated[
         bool, typer.Option("--reset-faults", help="First clear the faults that drives report.")
     ] = False,
@@ -66,7 +75,10 @@ def acquire(
     if run is None:
         if trajectory or output:
             raise InputError("--run: missing; --trajectory and -o are of one run, name it")
-        told = (*(("--overwrite",) if overwrite else ()), *(("--reset-faults",) if reset_faults else ()))
+        told = (
+            *(("--overwrite",) if overwrite else ()),
+            *(("--reset-faults",) if reset_faults else ()),
+        )
         only(
             context, place, "acquire", again=again,
             before=lambda step: (*ask_before(place.experiment, step, yes=yes), *told),
@@ -76,7 +88,15 @@ def acquire(
     if trajectory is None or output is None:
         step = place.step("acquire", run)
         trajectory, output = trajectory or step.inputs[0], output or step.target
-    _record(place.experiment, run, trajectory, output, yes=yes, overwrite=overwrite, reset_faults=reset_faults)
+    _record(
+        place.experiment,
+        run,
+        trajectory,
+        output,
+        yes=yes,
+        overwrite=overwrite,
+        reset_faults=reset_faults,
+    )
 
 
 def _record(
@@ -99,7 +119,8 @@ def _record(
             refuse_recorded(output)
 
     refuse_imported(output)
-    claim()  # before anybody is asked anything; and once more when no other run can record there any more
+    # Before anybody is asked anything; and once more when no other run can record there any more.
+    claim()
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     watched: list[RigSettings] = []
@@ -115,7 +136,9 @@ def _record(
             watched.append(rig)
             if rig.embedded:
                 starting.enter_context(
-                    console.starting("starting the virtual rig; the first start compiles, up to a minute")
+                    console.starting(
+                        "starting the virtual rig; the first start compiles, up to a minute"
+                    )
                 )
 
         def report(progress: "Progress") -> None:
@@ -129,21 +152,29 @@ def _record(
             report, reset_faults=reset_faults, begin=begin, claim=claim,
         )  # fmt: skip
     if outcome.missed:
-        console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")
+        console.warn(
+            f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps"
+        )
     if outcome.left_out > outcome.missed:  # else they are those of the samples
         console.warn(
             f"{outcome.path}: {outcome.left_out} set-points were left out, since cycles took longer than "
             f"{1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower acquire.sample_rate_hz"
         )
     console.emit(
-        {"path": outcome.path, "samples": outcome.samples, "missed": outcome.missed, "left_out": outcome.left_out}
+        {
+            "path": outcome.path,
+            "samples": outcome.samples,
+            "missed": outcome.missed,
+            "left_out": outcome.left_out,
+        }
     )
     console.say(f"{outcome.path}: {outcome.samples} samples of run {run}, {outcome.missed} missed")
 
 
 @contextmanager
 def _watching(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], None]]:
-    """Show a run as it goes on: a picture on a terminal, else a line now and then and at each change of state."""
+    """Show a run as it goes on: a picture on a terminal, else a line now and then and at each
+    change of state."""
     view, last_line, last_state = OperatorView(rig, run), float("-inf"), None
 
     def report(progress: "Progress") -> None:

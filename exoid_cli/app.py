@@ -1,7 +1,7 @@
 """The commands of exoid, and the one place where an error becomes a line and an exit code.
 
-0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 129, 131 and 143 one
-by SIGHUP, SIGQUIT and SIGTERM.
+0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C,
+129, 131 and 143 one by SIGHUP, SIGQUIT and SIGTERM.
 """
 
 import errno
@@ -62,7 +62,8 @@ def _add(name: str, function: Callable[..., None], short_help: str) -> None:
     app.command(name, cls=Command, short_help=short_help)(heeding(function))
 
 
-# In the order of an experiment. The short help fits on the one line that the list of commands has for it.
+# In the order of an experiment. The short help fits on the one line that the list of commands has
+# for it.
 _add("init", init, "Start a new experiment.")
 _add("status", status, "Say which stages are done, stale or missing.")
 _add("run", run_, "Do what is missing or stale, as make does.")
@@ -95,7 +96,10 @@ def options(
     quiet: QuietOption = False,
     json: JsonOption = False,
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
     ] = False,
 ) -> None:
     """Set what every command heeds; --quiet and --json may also follow the command."""
@@ -111,8 +115,10 @@ UNHEARD = 128 + 13
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
     if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
-        warnings.simplefilter("ignore")  # of Python's libraries, about exoid's own lines: the tests heed them
-        # A signal that falls into one of several requests at once is told as what ended exoid, and by asyncio as well.
+        # Of Python's libraries, about exoid's own lines: the tests heed them.
+        warnings.simplefilter("ignore")
+        # A signal that falls into one of several requests at once is told as what ended exoid, and
+        # by asyncio as well.
         logging.getLogger("asyncio").setLevel(logging.CRITICAL)
     signals.heed()
     for stream in (sys.stdout, sys.stderr):
@@ -124,7 +130,8 @@ def main() -> NoReturn:
 
 
 def matching_files(arguments: Sequence[str]) -> list[str]:
-    """Return the words, patterns replaced by the files that match: Windows' shells leave that to us."""
+    """Return the words, patterns replaced by the files that match: Windows' shells leave that to
+    us."""
     found = ((word, sorted(glob.glob(word)) if set("*?") & set(word) else []) for word in arguments)
     return [name for word, files in found for name in files or [word]]
 
@@ -146,7 +153,8 @@ def run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _failed(signals.told(), signals.exit_code)
     except SystemExit as stop:
-        if isinstance(stop.__context__, BrokenPipeError):  # which click and rich make a failure of ours
+        # Which click and rich make a failure of ours.
+        if isinstance(stop.__context__, BrokenPipeError):
             return _unheard()
         raise
     except OSError as error:
@@ -155,19 +163,22 @@ def run(arguments: Sequence[str]) -> int:
         if signals.came:  # whatever made that of it
             return _failed(signals.told(), signals.exit_code)
         return _failed(
-            f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}", 1
+            f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}",
+            1,
         )
 
 
 def _failed(text: str, code: int) -> int:
-    """Tell how exoid ends; called while the error is being handled, which keeps signals from coming between."""
+    """Tell how exoid ends; called while the error is being handled, which keeps signals from coming
+    between."""
     console.fail(text)
     signals.ignore()
     return code
 
 
 def _unheard() -> int:
-    """Let nothing more be written to an output that nobody reads any longer, as of ``exoid effects | head -1``."""
+    """Let nothing more be written to an output that nobody reads any longer, as of ``exoid effects
+    | head -1``."""
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
     return UNHEARD
@@ -176,7 +187,9 @@ def _unheard() -> int:
 def _command_line(arguments: Sequence[str]) -> int:
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
-    code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
+    code = command.main(
+        args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False
+    )
     if code == INTERRUPTED:
         raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
     return code or 0
@@ -198,7 +211,8 @@ _REMEDIES = {
 def _about_the_system(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
     remedy = _REMEDIES.get(error.errno or 0)
-    what = os.strerror(error.errno or 0) if remedy else error.strerror or error  # Arrow's own words are no user's
+    # Arrow's own words are no user's.
+    what = os.strerror(error.errno or 0) if remedy else error.strerror or error
     return f"{place}{what}" + (f"; {remedy}" if remedy else "")
 
 

@@ -1,4 +1,5 @@
-"""Lines said by a thread of their own: who reads them slowly, or not at all, does not hold up what they tell of."""
+"""Lines said by a thread of their own: who reads them slowly, or not at all, does not hold up what
+they tell of."""
 
 import queue
 import threading
@@ -12,7 +13,8 @@ CLOSING_S = 1.0
 
 
 class Aside:
-    """Says lines in the order in which they come, for as long as a block lasts and anybody reads them."""
+    """Says lines in the order in which they come, for as long as a block lasts and anybody reads
+    them."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say

@@ -12,4 +12,7 @@ LETTERS = {
 
 def big(word: str) -> list[str]:
     """Return a word's five lines, four characters a letter but the last."""
-    return [" ".join(LETTERS[c][4 * row : 4 * row + 3] for c in word).replace("#", "█") for row in range(HEIGHT)]
+    return [
+        " ".join(LETTERS[c][4 * row : 4 * row + 3] for c in word).replace("#", "█")
+        for row in range(HEIGHT)
+    ]

@@ -20,7 +20,8 @@ class Canvas:
         return self.dots.shape[1], self.dots.shape[0]
 
     def line(self, start: NDArray, stop: NDArray, thickness: int = 1, every: int = 1) -> None:
-        """Draw from one place (x to the right, y down, in dots) to another; every n-th dot of it, where asked for."""
+        """Draw from one place (x to the right, y down, in dots) to another; every n-th dot of it,
+        where asked for."""
         steps = int(np.ceil(2 * np.max(np.abs(stop - start)))) + 1
         path = (start + np.linspace(0.0, 1.0, steps)[:, np.newaxis] * (stop - start))[:: 2 * every]
         pen = np.arange(thickness) - (thickness - 1) / 2

@@ -1,4 +1,5 @@
-"""How wide the columns of a table are where it must be broken: between words, and in a path after a slash."""
+"""How wide the columns of a table are where it must be broken: between words, and in a path after a
+slash."""
 
 import re
 from collections.abc import Sequence
@@ -10,10 +11,15 @@ BETWEEN = 2
 
 
 def columns(headings: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[int | None]:
-    """Return how wide each column is to be; None where all fit, and where not even the longest words do."""
+    """Return how wide each column is to be; None where all fit, and where not even the longest
+    words do."""
     table = [[heading, *cells] for heading, *cells in zip(headings, *rows, strict=True)]
-    wanted = [max(cell_len(line) for text in column for line in text.split("\n")) for column in table]
-    widths = [max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table]
+    wanted = [
+        max(cell_len(line) for text in column for line in text.split("\n")) for column in table
+    ]
+    widths = [
+        max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table
+    ]
     room = width - BETWEEN * (len(table) - 1)
     if sum(wanted) <= room or sum(widths) > room:
         return [None] * len(table)
@@ -25,7 +31,8 @@ def columns(headings: Sequence[str], rows: Sequence[Sequence[str]], width: int) 
 
 
 def at_slashes(text: str, width: int) -> str:
-    """Return a text with every path that is longer than a line broken after the last slash that fits."""
+    """Return a text with every path that is longer than a line broken after the last slash that
+    fits."""
     return re.sub(r"\S+", lambda word: _broken(word[0], width), text)
 
 

@@ -1,4 +1,5 @@
-"""What a shell may complete where typer cannot know it: names of effects, methods, formats, runs, stages, figures."""
+"""What a shell may complete where typer cannot know it: names of effects, methods, formats, runs,
+stages, figures."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -44,7 +45,9 @@ def stages(begun: str) -> Iterator[str]:
     from exoid_cli.place import place_of
 
     with suppress(ExoidError):
-        yield from _beginning(begun, dict.fromkeys(step.stage for step in place_of(None, look_only=True).steps))
+        yield from _beginning(
+            begun, dict.fromkeys(step.stage for step in place_of(None, look_only=True).steps)
+        )
 
 
 def figures(context: typer.Context, begun: str) -> Iterator[str]:

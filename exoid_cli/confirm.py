@@ -19,18 +19,27 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real
 
 
 def confirm(
-    rig: "RigSettings", run: "RunSettings", trajectory: Path, motion: "Trajectory", sample_rate_hz: float
+    rig: "RigSettings",
+    run: "RunSettings",
+    trajectory: Path,
+    motion: "Trajectory",
+    sample_rate_hz: float,
 ) -> None:
-    """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
+    """Show what will be moved and the limits in force, and ask; raise InputError unless the answer
+    is yes."""
     import numpy as np
 
     from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 
-    _refuse_nobody_to_ask(f"run {run.name} moves somebody, which wants to be confirmed on a terminal")
+    _refuse_nobody_to_ask(
+        f"run {run.name} moves somebody, which wants to be confirmed on a terminal"
+    )
     seconds = min(run.duration_s, motion.period_s or run.duration_s)
     angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     # On the terminal in every mode: who answers must have seen it.
-    lines = [f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for {run.duration_s:g} s:"]
+    lines = [
+        f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for {run.duration_s:g} s:"
+    ]
     for j, drive in enumerate(rig.drive):
         angle, speed = angles[:, j], abs(speeds[:, j]).max()
         low, high = drive.angle_rad
@@ -38,8 +47,14 @@ def confirm(
             f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f} rad/s; limits "
             f"{low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s, {drive.torque_nm:g} N·m"
         )
-    cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors" if rig.sensor else "none on the cuffs"
-    lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
+    cuffs = (
+        f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
+        if rig.sensor
+        else "none on the cuffs"
+    )
+    lines.append(
+        f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it"
+    )
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
     lines.append(
         f"  a stop takes up to {stop_s:.2g} s, then the drives hold for {HOLD_SAMPLES / sample_rate_hz:.2g} s before "
@@ -54,7 +69,8 @@ def confirm(
 
 
 def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
-    """Ask before a step that would move a real rig though nobody named its run; return what its command is told."""
+    """Ask before a step that would move a real rig though nobody named its run; return what its
+    command is told."""
     from pipelines.settings.rig import load_rig
 
     if step.stage != "acquire" or step.run is None:
@@ -64,8 +80,14 @@ def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[st
     run = experiment.run_named(step.run)
     # Before somebody is moved, the command itself asks, and tells the limits.
     if run.run == "exo_alone" and not load_rig(experiment.file(experiment.acquire.rig)).embedded:
-        _refuse_nobody_to_ask(f"run {run.name} moves the empty machine, which wants to be confirmed on a terminal")
-        console.err.print(f"Run {run.name} moves the machine for {run.duration_s:g} s.", markup=False, soft_wrap=True)
+        _refuse_nobody_to_ask(
+            f"run {run.name} moves the empty machine, which wants to be confirmed on a terminal"
+        )
+        console.err.print(
+            f"Run {run.name} moves the machine for {run.duration_s:g} s.",
+            markup=False,
+            soft_wrap=True,
+        )
         _ask("Is nobody in the machine, and the emergency stop at hand?", f"run {run.name}")
     return ()
 
@@ -95,7 +117,8 @@ def _somebody_sees_and_answers() -> bool:
 
 
 def _forget_what_was_typed() -> None:
-    """Leave nothing on the terminal that was typed before the question, and so is no answer to it."""
+    """Leave nothing on the terminal that was typed before the question, and so is no answer to
+    it."""
     if sys.platform == "win32":
         import msvcrt
 

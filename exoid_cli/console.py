@@ -1,7 +1,7 @@
 """What the user sees: text and tables, progress, or, with ``--json``, one JSON document on stdout.
 
-A command calls ``say`` and ``table`` for people and ``emit`` for programs, without asking which of them listens:
-people's output is silent under ``--json``, and ``emit`` is silent without it.
+A command calls ``say`` and ``table`` for people and ``emit`` for programs, without asking which of
+them listens: people's output is silent under ``--json``, and ``emit`` is silent without it.
 """
 
 import json
@@ -18,7 +18,14 @@ from typing import Any
 from rich.console import Console as RichConsole
 from rich.console import RenderableType
 from rich.live import Live
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -46,7 +53,8 @@ class Console:
         self.err = RichConsole(stderr=True, highlight=False)
 
     def heed(self, *, quiet: bool, json: bool) -> None:
-        """Take notice of the global options where a command was given them; what was asked for before stays."""
+        """Take notice of the global options where a command was given them; what was asked for
+        before stays."""
         self.quiet |= quiet
         self.json |= json
 
@@ -58,8 +66,11 @@ class Console:
     def say(self, text: str | Text) -> None:
         """Print a sentence of result for a person."""
         if self.speaks:
-            # A terminal would break words; a pipe, and whoever searches in it, wants lines as they are.
-            self.out.print(text if isinstance(text, Text) else Text(text), soft_wrap=not self.out.is_terminal)
+            # A terminal would break words; a pipe, and whoever searches in it, wants lines as they
+            # are.
+            self.out.print(
+                text if isinstance(text, Text) else Text(text), soft_wrap=not self.out.is_terminal
+            )
 
     def note(self, text: str) -> None:
         """Print what is to be said of the line above, set in and broken between words."""
@@ -77,9 +88,15 @@ class Console:
         self.note(", ".join(names))
 
     def table(
-        self, headings: Sequence[str], rows: Iterable[Sequence[Any]], *, title: str | None = None, numbers: str = ""
+        self,
+        headings: Sequence[str],
+        rows: Iterable[Sequence[Any]],
+        *,
+        title: str | None = None,
+        numbers: str = "",
     ) -> None:
-        """Print a table for a person; headings named in ``numbers`` (comma-separated) are set to the right."""
+        """Print a table for a person; headings named in ``numbers`` (comma-separated) are set to
+        the right."""
         if not self.speaks:
             return
         right = {name.strip() for name in numbers.split(",") if name.strip()}
@@ -89,7 +106,12 @@ class Console:
         widths = columns(headings, cells, self.out.width)
         table = Table(box=None, pad_edge=False)
         for heading, width in zip(headings, widths, strict=True):
-            table.add_column(heading, justify="right" if heading in right else "left", overflow="fold", width=width)
+            table.add_column(
+                heading,
+                justify="right" if heading in right else "left",
+                overflow="fold",
+                width=width,
+            )
         for row in cells:
             table.add_row(*(Text(text if width is None else at_slashes(text, width))
                             for text, width in zip(row, widths, strict=True)))  # fmt: skip
@@ -103,7 +125,10 @@ class Console:
         if self._gathered is not None:
             self._gathered.append(data)
         elif self.json:
-            print(json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False), file=sys.stdout)
+            print(
+                json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False),
+                file=sys.stdout,
+            )
 
     @contextmanager
     def gathering(self) -> Iterator[list[Any]]:
@@ -117,7 +142,8 @@ class Console:
     def say_command(self, words: Sequence[str], why: str) -> None:
         """Print a command that is about to be called, as a shell would take it, and why."""
         if self.speaks:
-            self.out.print(Text(shlex.join(words), style="bold"), soft_wrap=True)  # to be copied in one piece
+            # To be copied in one piece.
+            self.out.print(Text(shlex.join(words), style="bold"), soft_wrap=True)
             if why:
                 self.note(why)
 
@@ -134,26 +160,33 @@ class Console:
 
     @contextmanager
     def progress(self, what: str, total: float) -> Iterator[Callable[..., None]]:
-        """Show a bar while the block runs; yields ``report(done, note="")`` with ``done`` out of ``total``."""
+        """Show a bar while the block runs; yields ``report(done, note="")`` with ``done`` out of
+        ``total``."""
         columns = (
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"),
             TimeElapsedColumn(), TimeRemainingColumn(),
         )  # fmt: skip
-        with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as bar:
+        with Progress(
+            *columns, console=self.err, transient=True, disable=not self._may_move
+        ) as bar:
             task = bar.add_task(what, total=total, note="")
             yield lambda done, note="": bar.update(task, completed=done, note=note)
 
     @contextmanager
     def working(self, what: str) -> Iterator[None]:
-        """Show that something goes on that may take a while, and for how long, where its end cannot be told."""
+        """Show that something goes on that may take a while, and for how long, where its end cannot
+        be told."""
         columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as line:
+        with Progress(
+            *columns, console=self.err, transient=True, disable=not self._may_move
+        ) as line:
             line.add_task(what, total=None)
             yield
 
     @contextmanager
     def starting(self, what: str) -> Iterator[None]:
-        """Show what is being started; where nothing moves, a line says so as soon as it takes long."""
+        """Show what is being started; where nothing moves, a line says so as soon as it takes
+        long."""
         late = threading.Timer(LATE_S, lambda: self.err.print(Text(what), soft_wrap=True))
         late.daemon = True
         if self.speaks and not self._may_move:
@@ -166,10 +199,11 @@ class Console:
 
     @contextmanager
     def live(self, picture: RenderableType) -> Iterator[None]:
-        """Keep a picture on the terminal while the block runs, drawn ten times a second by a thread of its own.
+        """Keep a picture on the terminal while the block runs, drawn ten times a second by a thread
+        of its own.
 
-        It has the screen for itself, so that it is right after the window's size has changed; how it looked last stays
-        below what was there before.
+        It has the screen for itself, so that it is right after the window's size has changed; how
+        it looked last stays below what was there before.
         """
         if not self._may_move:
             yield
@@ -189,7 +223,8 @@ class Console:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON has words for; it has none for NaN and infinity, so that a number that is none is null."""
+    """Return what JSON has words for; it has none for NaN and infinity, so that a number that is
+    none is null."""
     if isinstance(value, Mapping):
         return {str(key): _plain(below) for key, below in value.items()}
     if isinstance(value, list | tuple):

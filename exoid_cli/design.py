@@ -17,16 +17,25 @@ def design(
     context: typer.Context,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="The trajectory/1 file to write.", show_default="trajectory.parquet"),
+        typer.Option(
+            "-o",
+            "--output",
+            help="The trajectory/1 file to write.",
+            show_default="trajectory.parquet",
+        ),
     ] = None,
     config: ConfigOption = None,
     evaluate: Annotated[
-        Path | None, typer.Option("--evaluate", metavar="FILE", help="Judge this excitation, Parquet or TOML.")
+        Path | None,
+        typer.Option("--evaluate", metavar="FILE", help="Judge this excitation, Parquet or TOML."),
     ] = None,
     criterion: Annotated[
-        Literal["log_det", "condition", "scaled_condition"] | None, typer.Option(help="Wins over exoid.toml's.")
+        Literal["log_det", "condition", "scaled_condition"] | None,
+        typer.Option(help="Wins over exoid.toml's."),
     ] = None,
-    harmonics: Annotated[int | None, typer.Option(min=1, max=20, help="Wins over exoid.toml's.")] = None,
+    harmonics: Annotated[
+        int | None, typer.Option(min=1, max=20, help="Wins over exoid.toml's.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Wins over exoid.toml's.")] = None,
     again: AgainOption = False,
 ) -> None:
@@ -43,7 +52,9 @@ def design(
     from pipelines.mechanics.read import geometry_from
 
     if evaluate and output:
-        raise InputError("--evaluate and -o exclude each other: a judged excitation is not written; drop one")
+        raise InputError(
+            "--evaluate and -o exclude each other: a judged excitation is not written; drop one"
+        )
     if not evaluate and not output:
         place = place_of(config, lacking="neither -o FILE nor --evaluate FILE is given")
         if criterion is harmonics is seed is None:
@@ -103,10 +114,24 @@ def _show(file: str, found: "Quality") -> None:
         numbers="value",
     )
     console.say("")
-    errors = [(name, f"{value:.2g}", found.units[name]) for name, value in found.standard_errors.items()]
-    console.table(("parameter", "expected standard error", "unit"), errors, numbers="expected standard error")
+    errors = [
+        (name, f"{value:.2g}", found.units[name]) for name, value in found.standard_errors.items()
+    ]
+    console.table(
+        ("parameter", "expected standard error", "unit"), errors, numbers="expected standard error"
+    )
     console.say("")
-    headings = ("joint", "quantity", "unit", "lowest", "highest", "at least", "at most", "margin", "")
+    headings = (
+        "joint",
+        "quantity",
+        "unit",
+        "lowest",
+        "highest",
+        "at least",
+        "at most",
+        "margin",
+        "",
+    )
     rows = [
         (m.joint, m.quantity, m.unit, *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)), f"{m.margin:.4f}",
          "" if m.kept else "OUT")

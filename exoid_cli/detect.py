@@ -1,4 +1,5 @@
-"""``exoid detect``: which causes a motion would reveal, from which size on, and which it cannot tell apart."""
+"""``exoid detect``: which causes a motion would reveal, from which size on, and which it cannot
+tell apart."""
 
 import json
 from collections.abc import Sequence
@@ -24,18 +25,24 @@ def detect(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for detectability.json and the figure.")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for detectability.json and the figure."),
     ] = None,
     config: ConfigOption = None,
     rig: Annotated[
-        Path | None, typer.Option("--rig", help="A virtual rig's file: the leg that an excitation would move.")
+        Path | None,
+        typer.Option("--rig", help="A virtual rig's file: the leg that an excitation would move."),
     ] = None,
     runs: Annotated[
-        Literal["exo_alone", "with_human", "both"], typer.Option(help="Runs that an excitation is planned for.")
+        Literal["exo_alone", "with_human", "both"],
+        typer.Option(help="Runs that an excitation is planned for."),
     ] = "both",
-    power: Annotated[float, typer.Option(min=0.5, max=0.999, help="Chance to find an effect of that size.")] = 0.9,
+    power: Annotated[
+        float, typer.Option(min=0.5, max=0.999, help="Chance to find an effect of that size.")
+    ] = 0.9,
 ) -> None:
-    """Say how large each cause must be to be seen with this motion and noise, and which causes look alike.
+    """Say how large each cause must be to be seen with this motion and noise, and which causes look
+    alike.
 
     \b
     Examples:
@@ -59,8 +66,14 @@ def detect(
     if output:
         from pipelines.diagnosis.detectability.figure import draw
 
-        write_text(output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1) + "\n")
-        draw(found, output / "detectability", f"What {', '.join(file.name for file in files)} would reveal")
+        write_text(
+            output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1) + "\n"
+        )
+        draw(
+            found,
+            output / "detectability",
+            f"What {', '.join(file.name for file in files)} would reveal",
+        )
     console.emit(told)
     _show(found)
     if output:
@@ -80,7 +93,9 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
     return kinds[0]
 
 
-def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any) -> list:
+def _planned(
+    files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any
+) -> list:
     from pipelines.diagnosis.detectability.detectability import detectability
     from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
     from pipelines.diagnosis.evidence.baseline import baseline_of
@@ -98,7 +113,9 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
         )
     design = experiment.design
     kinds = ("exo_alone", "with_human") if runs == "both" else (runs,)
-    motions = planned_motions(read_trajectory(files[0]), plant, design.noise, kinds, design.sample_rate_hz)
+    motions = planned_motions(
+        read_trajectory(files[0]), plant, design.noise, kinds, design.sample_rate_hz
+    )
     with about(files[0]):
         refuse_unfit(motions)
     observed = [observe(motion) for motion in motions]
@@ -131,7 +148,9 @@ def _show(found: Sequence["Detectable"]) -> None:
     console.say("")
     tied = [(one.effect.label, ", ".join(one.tied_with)) for one in found if one.tied_with]
     console.table(("at that size", "could also be"), tied)
-    never = sorted({tuple(sorted((one.effect.label, *one.never_apart))) for one in found if one.never_apart})
+    never = sorted(
+        {tuple(sorted((one.effect.label, *one.never_apart))) for one in found if one.never_apart}
+    )
     for labels in never:
         console.say(f"Of no size to be told apart with this motion: {', '.join(labels)}.")
 
@@ -140,8 +159,16 @@ def _row(one: "Detectable") -> tuple[str, ...]:
     from pipelines.wording.label import number
 
     machine = one.effect.on
-    name = (one.effect.name, one.effect.joint or ("whole leg" if machine.is_exoskeleton else "whole machine"))
+    name = (
+        one.effect.name,
+        one.effect.joint or ("whole leg" if machine.is_exoskeleton else "whole machine"),
+    )
     share = one.smallest_rms_nm / one.torque_rms_nm
     if share >= 1.0:
         return (*name, "not to be seen", "", "")
-    return (*name, one.size_in_words(), number(machine, one.smallest_rms_nm), f"{100 * share:.1f} %")
+    return (
+        *name,
+        one.size_in_words(),
+        number(machine, one.smallest_rms_nm),
+        f"{100 * share:.1f} %",
+    )

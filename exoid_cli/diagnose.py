@@ -25,7 +25,11 @@ def diagnose(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", "--out", help="Folder for verdict, tables and figures.", show_default="diagnosed/"
+            "-o",
+            "--output",
+            "--out",
+            help="Folder for verdict, tables and figures.",
+            show_default="diagnosed/",
         ),
     ] = None,
     config: ConfigOption = None,
@@ -37,7 +41,9 @@ def diagnose(
             show_default="[diagnose] known, nothing",
         ),
     ] = None,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")] = True,
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")
+    ] = True,
 ) -> None:
     """Name what rigid body and friction get wrong, extend the model with it, and measure the gain.
 
@@ -76,7 +82,8 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter", "diagnose")
     shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
-    hashed = zip(motions, files, strict=True) if found.each_run else ()  # whole files are read for that
+    # Whole files are read for that.
+    hashed = zip(motions, files, strict=True) if found.each_run else ()
     recordings = {motion.file: recording_behind(path) for motion, path in hashed}
     model = {
         "covariance": found.covariance.tolist(),
@@ -87,16 +94,25 @@ def diagnose(
         "unrealizable": found.unrealizable,
         "each_run": {
             label: [
-                {"name": one["file"], "sha256": recordings[one["file"]], "values": one["values"]} for one in of_runs
+                {"name": one["file"], "sha256": recordings[one["file"]], "values": one["values"]}
+                for one in of_runs
             ]
             for label, of_runs in found.each_run.items()
         },
     }
-    frames = {"parameters": found.parameters, "residuals": found.residuals, "candidates": candidates(found)}
+    frames = {
+        "parameters": found.parameters,
+        "residuals": found.residuals,
+        "candidates": candidates(found),
+    }
     visible = as_json(detectability(found.train, found.baseline, found.floor))
     with all_or_none(output, vouching="verdict.json") as made:
         for name, contract in tables.items():
-            contract.write(made / f"{name}.parquet", frames[name], shared | (model if name == "parameters" else {}))
+            contract.write(
+                made / f"{name}.parquet",
+                frames[name],
+                shared | (model if name == "parameters" else {}),
+            )
         for name, told in (("detectability", visible), ("verdict", said)):
             text = json.dumps(told | {"provenance": shared}, indent=1, ensure_ascii=False)
             write_text(made / f"{name}.json", f"{text}\n")

@@ -19,7 +19,8 @@ def effects(
         ),
     ] = None,
 ) -> None:
-    """List the effects a model can have, or say all about one: equation, parameters, how to confirm it.
+    """List the effects a model can have, or say all about one: equation, parameters, how to confirm
+    it.
 
     \b
     Examples:
@@ -56,7 +57,10 @@ def _page(effect: type) -> None:
     console.note(told["equation"])
     console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
-    console.table(headings, [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters])
+    console.table(
+        headings,
+        [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters],
+    )
     parts = (
         ("Runs", "runs"),
         ("Looks like", "looks_like"),

@@ -16,19 +16,35 @@ if TYPE_CHECKING:
 def export(
     model: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE", help="A parameters/1 file.", show_default="identified/parameters.parquet"),
+        typer.Argument(
+            metavar="FILE",
+            help="A parameters/1 file.",
+            show_default="identified/parameters.parquet",
+        ),
     ] = None,
     *,
-    to: Annotated[str, typer.Option("--to", help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats)],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to", help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats
+        ),
+    ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The file, or a folder for it; beside the model unless given.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="The file, or a folder for it; beside the model unless given."
+        ),
     ] = None,
     run: Annotated[
-        str | None, typer.Option("--run", help="exo_alone, with_human or human; with_human if there are several.")
+        str | None,
+        typer.Option(
+            "--run", help="exo_alone, with_human or human; with_human if there are several."
+        ),
     ] = None,
     config: ConfigOption = None,
 ) -> None:
-    """Hand an identified model to MuJoCo, pinocchio, MATLAB, a controller in C, or anything that reads JSON.
+    """Hand an identified model to MuJoCo, pinocchio, MATLAB, a controller in C, or anything that
+    reads JSON.
 
     \b
     Examples:
@@ -60,14 +76,19 @@ def export(
 
 
 def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
-    """Return the file to write: the one that was asked for, or one in that folder, or one beside the model."""
+    """Return the file to write: the one that was asked for, or one in that folder, or one beside
+    the model."""
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS
 
     if output is None:
         return model.with_suffix(chosen.suffix)
-    path = output if output.suffix and not output.is_dir() else output / f"{model.stem}{chosen.suffix}"
-    meant = next((format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None)
+    path = (
+        output if output.suffix and not output.is_dir() else output / f"{model.stem}{chosen.suffix}"
+    )
+    meant = next(
+        (format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None
+    )
     if meant:
         raise SettingsError(
             f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to {chosen.name}"
@@ -77,7 +98,9 @@ def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
 
 def _texts(made: "Exported", chosen: "Format", path: Path) -> dict[Path, str]:
     """Return what goes into each file; the main one is ``path``, whatever its suffix."""
-    files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
+    files = {
+        path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()
+    }
     if path.suffix not in {file.suffix for file in files}:
         files[path] = files.pop(path.with_suffix(chosen.suffix))
     return files
@@ -95,19 +118,32 @@ def _report(made: "Exported", chosen: "Format", files: list[Path]) -> None:
             "how": holding.how,
             "parameters": {
                 p.name: {"value": float(value), "unit": p.unit}
-                for p, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
+                for p, value in zip(
+                    term.effect.parameters, term.effect.physical(term.values), strict=True
+                )
             },
         }
         for term, holding in holdings
     ]
     written = [str(file) for file in files]
-    console.emit({"to": chosen.name, "run": made.run, "files": written, "warnings": made.driving(), "terms": terms})
+    console.emit(
+        {
+            "to": chosen.name,
+            "run": made.run,
+            "files": written,
+            "warnings": made.driving(),
+            "terms": terms,
+        }
+    )
     console.table(
-        ("term", "held", "how"), [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
+        ("term", "held", "how"),
+        [(term.effect.label, holding.degree, holding.how) for term, holding in holdings],
     )
     for sentence in made.driving():
         console.warn(sentence)
     for term, holding in holdings:
         if holding.degree is Degree.NOT:
-            console.warn(f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}")
+            console.warn(
+                f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}"
+            )
     console.say(f"{', '.join(written)}: the {made.run} model")

@@ -12,11 +12,16 @@ from exoid_cli.report import FoldersArgument, warn_of_unreadable
 
 def figures(
     folders: FoldersArgument = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the figures.")] = Path("figures"),
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the figures.")] = Path(
+        "figures"
+    ),
     only: Annotated[
         list[str] | None,
         typer.Option(
-            "--only", metavar="NAME", help="This figure; may be given again.", autocompletion=completion.figures
+            "--only",
+            metavar="NAME",
+            help="This figure; may be given again.",
+            autocompletion=completion.figures,
         ),
     ] = None,
 ) -> None:
@@ -38,10 +43,14 @@ def figures(
     warn_of_unreadable(session)
     drawn = figures_of(session)
     if not drawn:
-        raise InputError(f"{session.folders[0]}: holds nothing to draw; `exoid diagnose` and `exoid simulate` make it")
+        raise InputError(
+            f"{session.folders[0]}: holds nothing to draw; `exoid diagnose` and `exoid simulate` make it"
+        )
     for name in only or ():
         if name not in drawn:
-            raise InputError(f"--only {name}: there is no such figure here; {suggestion(name, list(drawn))}")
+            raise InputError(
+                f"--only {name}: there is no such figure here; {suggestion(name, list(drawn))}"
+            )
     names = list(dict.fromkeys(only or drawn))
     open_folder(output)
     with console.progress("drawing", len(names)) as report:

@@ -18,17 +18,26 @@ def filter_(
     context: typer.Context,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="FILE", help="recording/1 files.", show_default="recordings/RUN.parquet of every run"),
+        typer.Argument(
+            metavar="FILE",
+            help="recording/1 files.",
+            show_default="recordings/RUN.parquet of every run",
+        ),
     ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="The motion/1 file to write, or a folder for several.", show_default="motions/"
+            "-o",
+            "--output",
+            help="The motion/1 file to write, or a folder for several.",
+            show_default="motions/",
         ),
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
-    cutoff_hz: Annotated[float | None, typer.Option(min=0.0, help="Cut-off; wins over exoid.toml's.")] = None,
+    cutoff_hz: Annotated[
+        float | None, typer.Option(min=0.0, help="Cut-off; wins over exoid.toml's.")
+    ] = None,
 ) -> None:
     """Filter recordings' angles without delay and differentiate them; torque stays as measured.
 
@@ -41,14 +50,21 @@ def filter_(
         only(context, place_of(config, lacking="no recording is given"), "filter", again=again)
         return
     settings = settings_in_force(config).filter.changed(cutoff_hz=cutoff_hz)
-    made = [_filter(file, target, settings) for file, target in _targets(files or [], output, config)]
+    made = [
+        _filter(file, target, settings) for file, target in _targets(files or [], output, config)
+    ]
     console.emit(made[0] if len(made) == 1 else made)
 
 
-def _targets(files: list[Path], output: Path | None, config: Path | None) -> list[tuple[Path, Path]]:
+def _targets(
+    files: list[Path], output: Path | None, config: Path | None
+) -> list[tuple[Path, Path]]:
     """Return what to read and what to write, from the experiment where they are not told."""
     if not files:
-        files = [step.inputs[0] for step in place_of(config, lacking="no recording is given").of_stage("filter")]
+        files = [
+            step.inputs[0]
+            for step in place_of(config, lacking="no recording is given").of_stage("filter")
+        ]
     if output is None:
         output = place_of(config, lacking="-o: missing").out / "motions"
     elif len(files) == 1 and not output.is_dir():
@@ -56,7 +72,9 @@ def _targets(files: list[Path], output: Path | None, config: Path | None) -> lis
     names = [file.name for file in files]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"found two files named {name}, which would be one in {output}; filter them one by one")
+            raise InputError(
+                f"found two files named {name}, which would be one in {output}; filter them one by one"
+            )
     return [(file, output / file.name) for file in files]
 
 
@@ -66,7 +84,9 @@ def _filter(recording: Path, output: Path, settings: "FilterSettings") -> dict[s
 
     with console.working(f"filtering {recording.name}"):
         motion = filtered(RECORDING.scan(recording), settings)
-        provenance = describe(inputs=[recording], config={"filter": settings.model_dump(mode="json")})
+        provenance = describe(
+            inputs=[recording], config={"filter": settings.model_dump(mode="json")}
+        )
         found = Summary(motion)
         MOTION.write_pieces(output, found.passing(motion.pieces()), motion.metadata | provenance)
     gaps = "no gap" if found.segments == 1 else f"{found.segments} segments"

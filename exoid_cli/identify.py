@@ -25,13 +25,18 @@ def identify(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="FILE", help="motion/1 or recording/1 files.", show_default="motions/RUN.parquet of every run"
+            metavar="FILE",
+            help="motion/1 or recording/1 files.",
+            show_default="motions/RUN.parquet of every run",
         ),
     ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Folder for parameters, residuals and figures.", show_default="identified/"
+            "-o",
+            "--output",
+            help="Folder for parameters, residuals and figures.",
+            show_default="identified/",
         ),
     ] = None,
     config: ConfigOption = None,
@@ -46,7 +51,9 @@ def identify(
     ] = None,
     causes: Annotated[
         Path | None,
-        typer.Option(help="The parameters.parquet of a diagnosis: fit what it named, too, its shapes held."),
+        typer.Option(
+            help="The parameters.parquet of a diagnosis: fit what it named, too, its shapes held."
+        ),
     ] = None,
     effect: Annotated[
         list[str] | None,
@@ -84,11 +91,17 @@ def identify(
         return
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"
-        raise InputError(f"{option}: no folder is given; name one with -o, for identified/ is of the model without")
+        raise InputError(
+            f"{option}: no folder is given; name one with -o, for identified/ is of the model without"
+        )
     if output and (output / "verdict.json").exists():
-        raise InputError(f"-o: {output} holds a diagnosis, which would be overwritten; name another folder")
+        raise InputError(
+            f"-o: {output} holds a diagnosis, which would be overwritten; name another folder"
+        )
     if causes and output and (output / "parameters.parquet").resolve() == causes.resolve():
-        raise InputError(f"-o: {output} is the folder of {causes}, which would be overwritten; name another folder")
+        raise InputError(
+            f"-o: {output} is the folder of {causes}, which would be overwritten; name another folder"
+        )
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     for contract, name in ((PARAMETERS, "parameters"), (RESIDUALS, "residuals")):
         contract.refuse_place(output / f"{name}.parquet")
@@ -98,14 +111,21 @@ def identify(
     runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
-        found = fit(runs, estimator, _extension(effect or [], causes, runs, files), reversals=asked.reversals)
+        found = fit(
+            runs,
+            estimator,
+            _extension(effect or [], causes, runs, files),
+            reversals=asked.reversals,
+        )
     heeded = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
     config_used = heeded | {"identify": asked.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
     besides = {"effects": effect} if effect else {}
     besides |= {"causes": shared["inputs"][-1]} if causes else {}
-    figures = _write(found, output, shared | {"method": found.method | besides}, figures=asked.figures)
+    figures = _write(
+        found, output, shared | {"method": found.method | besides}, figures=asked.figures
+    )
     _report(found, runs[0].machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
@@ -124,8 +144,11 @@ def _extension(
     return of_diagnosis.with_terms(beside)
 
 
-def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool) -> list[str]:
-    """Write parameters, residuals and, if asked, figures into a folder; return the figures' names."""
+def _write(
+    found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool
+) -> list[str]:
+    """Write parameters, residuals and, if asked, figures into a folder; return the figures'
+    names."""
     from pipelines.contracts import PARAMETERS, RESIDUALS
     from pipelines.identification.validation import residuals
 
@@ -147,7 +170,9 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
     left = output / "residuals.parquet"
     with console.working("predicting every run"):
         model = "extended" if found.extension.terms else "baseline"
-        RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model, found.training.cutoff_hz), shared)
+        RESIDUALS.write_pieces(
+            left, residuals(found.runs, found.model_of, model, found.training.cutoff_hz), shared
+        )
     if not figures:
         return []
     from pipelines.identification.figures import draw
@@ -160,7 +185,10 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
 def _report(found: "Identified", machine: "Machine") -> None:
     from pipelines.contracts.joints import either
 
-    rows, unit = found.parameters.to_dict("records"), either(joint.unit("torque") for joint in machine.joints)
+    rows, unit = (
+        found.parameters.to_dict("records"),
+        either(joint.unit("torque") for joint in machine.joints),
+    )
     console.emit(
         {
             "parameters": rows,
@@ -195,6 +223,9 @@ def _report(found: "Identified", machine: "Machine") -> None:
     for sentence in [
         *found.angle_noise,
         *found.collinear,
-        *(f"not a real {'leg' if machine.is_exoskeleton else 'machine'}: {s}" for s in found.unrealizable),
+        *(
+            f"not a real {'leg' if machine.is_exoskeleton else 'machine'}: {s}"
+            for s in found.unrealizable
+        ),
     ]:
         console.warn(sentence)

@@ -22,12 +22,22 @@ FEW = 3
 
 def import_(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE", help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags.")
+        list[Path],
+        typer.Argument(
+            metavar="FILE", help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags."
+        ),
     ],
-    map_: Annotated[Path | None, typer.Option("--map", help="The map: what each column is, and in which unit.")] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the recordings.")] = Path("recordings"),
+    map_: Annotated[
+        Path | None, typer.Option("--map", help="The map: what each column is, and in which unit.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the recordings.")
+    ] = Path("recordings"),
     guess: Annotated[
-        bool, typer.Option("--guess", help="Propose a map instead; into the file that --map names, if any.")
+        bool,
+        typer.Option(
+            "--guess", help="Propose a map instead; into the file that --map names, if any."
+        ),
     ] = False,
 ) -> None:
     """Make recordings of logs from elsewhere; a map says what their columns are.
@@ -40,7 +50,9 @@ def import_(
     if guess:
         _propose(files, map_)
     elif map_ is None:
-        raise InputError("--map: missing; `exoid import FILE... --guess --map MAP.toml` proposes one")
+        raise InputError(
+            "--map: missing; `exoid import FILE... --guess --map MAP.toml` proposes one"
+        )
     else:
         _import(files, map_, output)
 
@@ -50,7 +62,9 @@ def _propose(files: list[Path], place: Path | None) -> None:
     from pipelines.importing.guess.guess import propose
 
     if place is not None and place.exists():
-        raise InputError(f"{place}: exists already, not overwritten with a guess; choose another name")
+        raise InputError(
+            f"{place}: exists already, not overwritten with a guess; choose another name"
+        )
     with console.working("looking"):
         proposal = propose(files)
     doubts = [asdict(doubt) for doubt in proposal.doubts]
@@ -59,7 +73,9 @@ def _propose(files: list[Path], place: Path | None) -> None:
         console.say(proposal.text.rstrip())
         return
     write_text(place, proposal.text)
-    console.say(f"{place}: proposed; look at what is doubtful in it, then `exoid import ... --map {place}`")
+    console.say(
+        f"{place}: proposed; look at what is doubtful in it, then `exoid import ... --map {place}`"
+    )
     for doubt in proposal.doubts:
         console.note(f"- {'fill in' if doubt.blocks else 'unsure'}: {doubt.key}: {doubt.why}")
 
@@ -72,7 +88,9 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     _refuse_the_name_of_a_recording(output)
     settings = load_map(map_)
     for left in leftovers(output) if output.is_dir() else []:
-        console.warn(f"{left}: left by an import that was killed, or of one that goes on; remove it once none does")
+        console.warn(
+            f"{left}: left by an import that was killed, or of one that goes on; remove it once none does"
+        )
     with folder_to_fill(output):
         told = _made(files, settings, map_, output)
     for recording in unused(settings, files):
@@ -83,7 +101,9 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
         for one in told:
             _say(one)
     console.emit(told)
-    _say_what_follows(output, [made["path"].stem for one in told for made in one["recordings"]], map_)
+    _say_what_follows(
+        output, [made["path"].stem for one in told for made in one["recordings"]], map_
+    )
 
 
 def _refuse_the_name_of_a_recording(output: Path) -> None:
@@ -94,7 +114,9 @@ def _refuse_the_name_of_a_recording(output: Path) -> None:
         )
 
 
-def _made(files: list[Path], settings: "ImportMap", map_: Path, output: Path) -> list[dict[str, Any]]:
+def _made(
+    files: list[Path], settings: "ImportMap", map_: Path, output: Path
+) -> list[dict[str, Any]]:
     """Write the recordings of all files, or none of them; return what is told of each file."""
     from pipelines.contracts.atomic import all_or_none
     from pipelines.importing.quantities.turn_offset import Beginnings
@@ -139,13 +161,17 @@ def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
 
     found = imported_in(output)
     for name in no_longer_made(found, made):
-        console.warn(f"{output / name}: of these logs too, by an earlier map; this one makes it no more, remove it")
+        console.warn(
+            f"{output / name}: of these logs too, by an earlier map; this one makes it no more, remove it"
+        )
     lacking = list(lacks(found, made, map_))
     for one in lacking:
         console.say(one)
     settings_file = output.parent / NAME
     if not lacking and not settings_file.exists():
-        console.say(f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest")
+        console.say(
+            f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest"
+        )
 
 
 def _say_in_short(told: list[dict[str, Any]]) -> None:
@@ -156,7 +182,10 @@ def _say_in_short(told: list[dict[str, Any]]) -> None:
             _say_what_was_made(made)
         for finding in _findings(one):
             # As in "2 rows left out": of another file the numbers are others.
-            kind = finding.where, re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where))
+            kind = (
+                finding.where,
+                re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where)),
+            )
             seen.setdefault(kind, []).append((finding, one["file"].name))
     if seen:
         console.say("\nSeen, with the numbers of the first file; `exoid show` tells those of each:")
@@ -177,14 +206,18 @@ def _say(told: dict[str, Any]) -> None:
 
 
 def _say_what_was_made(made: dict[str, Any]) -> None:
-    console.say(f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz")
+    console.say(
+        f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz"
+    )
 
 
 def _findings(told: dict[str, Any]) -> "list[Finding]":
     """Return what was seen in a log, once where it is of all its recordings."""
     from pipelines.importing.finding import Finding
 
-    return list(dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"]))
+    return list(
+        dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"])
+    )
 
 
 def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:

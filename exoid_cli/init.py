@@ -11,7 +11,10 @@ from exoid_cli.console import console
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the experiment shall live; made if need be.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="Where the experiment shall live; made if need be."),
+    ],
 ) -> None:
     """Start a new experiment: a commented exoid.toml, rigs, and a Makefile.
 
@@ -24,8 +27,14 @@ def init(
     from pipelines.settings.template import create
 
     command = Path(sys.argv[0])
-    words = [str(command.resolve())] if command.name == "exoid" else [sys.executable, "-m", "exoid_cli.app"]
+    words = (
+        [str(command.resolve())]
+        if command.name == "exoid"
+        else [sys.executable, "-m", "exoid_cli.app"]
+    )
     create(folder, exoid=shlex.join(words))
     written = [folder / name for name in ("exoid.toml", "rigs", "Makefile")]
     console.emit({"folder": folder, "written": written})
-    console.say(f"{folder}: a new experiment; edit {folder / 'exoid.toml'}, then `cd {folder}` and `exoid run`")
+    console.say(
+        f"{folder}: a new experiment; edit {folder / 'exoid.toml'}, then `cd {folder}` and `exoid run`"
+    )

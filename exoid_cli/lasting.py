@@ -1,4 +1,5 @@
-"""Output to a terminal that may be closed: what nobody can read any more is dropped, and nothing fails for that."""
+"""Output to a terminal that may be closed: what nobody can read any more is dropped, and nothing
+fails for that."""
 
 import errno
 import io
@@ -21,11 +22,16 @@ class Terminal(io.FileIO):
 
 
 def outlast_terminals() -> None:
-    """Let standard output and error, where they are terminals, be written to for as long as the process lives."""
+    """Let standard output and error, where they are terminals, be written to for as long as the
+    process lives."""
     if os.name == "nt":
         return  # a console there is no file, and its end ends the process
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and stream.isatty():
             raw = Terminal(stream.fileno(), "w", closefd=False)
-            setattr(sys, name, io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", line_buffering=True))
+            setattr(
+                sys,
+                name,
+                io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", line_buffering=True),
+            )

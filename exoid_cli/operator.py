@@ -12,7 +12,9 @@ class Terminal:
 
     def __init__(self) -> None:
         if not sys.stdin.isatty():
-            raise InputError("--by-hand asks a person what to do, but standard input is no terminal; run it in one")
+            raise InputError(
+                "--by-hand asks a person what to do, but standard input is no terminal; run it in one"
+            )
 
     async def ready(self, prompt: str) -> None:
         """Show a prompt and return once Enter is pressed; Ctrl-C goes through meanwhile."""
@@ -24,4 +26,6 @@ class Terminal:
         finally:
             loop.remove_reader(sys.stdin)
         if not sys.stdin.readline():
-            raise InputError("standard input ended before the check did; begin it anew at a terminal")
+            raise InputError(
+                "standard input ended before the check did; begin it anew at a terminal"
+            )

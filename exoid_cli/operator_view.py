@@ -1,4 +1,5 @@
-"""What the operator of a rig sees while a leg moves: the leg, how near all is to its limits, and what is wrong."""
+"""What the operator of a rig sees while a leg moves: the leg, how near all is to its limits, and
+what is wrong."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -34,7 +35,12 @@ ABOVE, BELOW = 2, 4
 """Rows over and under the leg: the head, and why the run is stopped."""
 
 # Blue and orange are told apart by everyone, and nothing is told by a colour alone.
-PLAIN, CALM, URGENT, FAINT = Style(), Style(color="bright_blue"), Style(color="dark_orange", bold=True), Style(dim=True)
+PLAIN, CALM, URGENT, FAINT = (
+    Style(),
+    Style(color="bright_blue"),
+    Style(color="dark_orange", bold=True),
+    Style(dim=True),
+)
 SHOUT = URGENT + Style(reverse=True)
 
 Line = list[tuple[str, Style]]
@@ -76,10 +82,11 @@ class Gauge(NamedTuple):
 
 
 class OperatorView:
-    """The picture of a run. It is drawn by whoever renders it, from the progress that was taken last.
+    """The picture of a run. It is drawn by whoever renders it, from the progress that was taken
+    last.
 
-    Taking progress draws nothing and waits for nobody: a terminal that is slow, or stopped by Ctrl-S, must not keep
-    the leg waiting.
+    Taking progress draws nothing and waits for nobody: a terminal that is slow, or stopped by
+    Ctrl-S, must not keep the leg waiting.
     """
 
     def __init__(self, rig: "RigSettings", run: str) -> None:
@@ -97,7 +104,9 @@ class OperatorView:
         """Take the progress that is to be shown."""
         if progress.row is not None:
             # A sensor that is read each second cycle keeps what it told last.
-            self._forces = np.where(np.isnan(progress.row.forces), self._forces, progress.row.forces)
+            self._forces = np.where(
+                np.isnan(progress.row.forces), self._forces, progress.row.forces
+            )
         if self._progress is not None and progress.missed > self._progress.missed:
             self._lost_at = time.monotonic()
         self._progress = progress
@@ -124,7 +133,11 @@ class OperatorView:
         gauges = []
         for drive, found in zip(self._rig.drive, self._progress.row.drives, strict=True):
             gauges.append(Gauge(f"{drive.joint} angle", found.angle, *drive.angle_rad, "rad"))
-            gauges.append(Gauge(f"{drive.joint} torque", found.torque, -drive.torque_nm, drive.torque_nm, "N·m"))
+            gauges.append(
+                Gauge(
+                    f"{drive.joint} torque", found.torque, -drive.torque_nm, drive.torque_nm, "N·m"
+                )
+            )
         limit = self._rig.safety.cuff_force_n
         for cuff, force in zip(CUFFS, self._forces, strict=True):
             strongest = force[np.argmax(np.abs(force))]  # NaN where one of the three is
@@ -139,7 +152,8 @@ class OperatorView:
             yield Segment.line()
 
     def lines(self, width: int, height: int) -> Iterator[Line]:
-        """Yield the picture, line by line, none longer than ``width``: what does not fit is cut off."""
+        """Yield the picture, line by line, none longer than ``width``: what does not fit is cut
+        off."""
         for line in self._lines(width, height):
             room, kept = width, []
             for text, style in line:
@@ -160,11 +174,14 @@ class OperatorView:
         for drawn, line in zip(leg, [*self._panel(word), *[[]] * rows], strict=False):
             yield [(f"{drawn}  " if drawn else "", PLAIN), *line]
         yield []
-        for text in wrap(self._progress.abort or "", max(width - 1, 4), max_lines=BELOW - 1, placeholder="..."):
+        for text in wrap(
+            self._progress.abort or "", max(width - 1, 4), max_lines=BELOW - 1, placeholder="..."
+        ):
             yield [(text, URGENT)]
 
     def _head(self, width: int, word: str) -> Line:
-        """Return the first line, beginning with the state, or with a word for which there is no room elsewhere."""
+        """Return the first line, beginning with the state, or with a word for which there is no
+        room elsewhere."""
         progress = self._progress
         assert progress is not None
         state = f" {word or progress.state.upper()} "
@@ -183,7 +200,10 @@ class OperatorView:
         if not gauges:
             return [*lines, [], [("nothing has been measured yet", FAINT)]]
         counted = f"{progress.samples} samples, {progress.missed} missed in {progress.gaps} gaps"
-        rate = [(f"{progress.rate_hz:.0f} Hz  ", PLAIN), (counted, URGENT if progress.missed else PLAIN)]
+        rate = [
+            (f"{progress.rate_hz:.0f} Hz  ", PLAIN),
+            (counted, URGENT if progress.missed else PLAIN),
+        ]
         return [*lines, [], *gauges[:-4], [], *gauges[-4:], [], rate]
 
     def _leg(self, columns: int, rows: int) -> list[str]:
@@ -193,7 +213,8 @@ class OperatorView:
             return canvas.text()
         place = self._scaled(canvas)
         hip, knee, ankle, toe = (place(point) for point in leg(*row.angle[:2]))
-        canvas.line(hip, place(np.array([0.0, -2.0])), every=3)  # straight down, to see the angle against
+        # Straight down, to see the angle against.
+        canvas.line(hip, place(np.array([0.0, -2.0])), every=3)
         canvas.line(hip - BELT, hip + BELT)
         canvas.line(hip, knee, thickness=3)
         canvas.line(knee, ankle, thickness=2)
@@ -203,7 +224,8 @@ class OperatorView:
         return canvas.text()
 
     def _scaled(self, canvas: Canvas) -> Callable[[NDArray], NDArray]:
-        """Return where on a canvas a place in thigh lengths is: all that the limits allow is on it."""
+        """Return where on a canvas a place in thigh lengths is: all that the limits allow is on
+        it."""
         low, high = self._corners
         room = np.array(canvas.size) - 6.0
         scale = np.min(room / (high - low))
@@ -212,14 +234,17 @@ class OperatorView:
 
 
 def leg(hip: float, knee: float) -> NDArray:
-    """Return hip, knee, ankle and toe seen from the right, (4, 2) thigh lengths from the hip: forward, upward.
+    """Return hip, knee, ankle and toe seen from the right, (4, 2) thigh lengths from the hip:
+    forward, upward.
 
-    Hip angle from the downward vertical, forward positive; knee relative to the thigh, flexion negative. The shank is
-    drawn as long as the thigh, whatever it is.
+    Hip angle from the downward vertical, forward positive; knee relative to the thigh, flexion
+    negative. The shank is drawn as long as the thigh, whatever it is.
     """
     thigh, shank, foot = hip, hip + knee, hip + knee + np.pi / 2
     segments = ((0.0, thigh), (1.0, thigh), (1.0, shank), (0.2, foot))
-    return np.cumsum([[length * np.sin(angle), -length * np.cos(angle)] for length, angle in segments], axis=0)
+    return np.cumsum(
+        [[length * np.sin(angle), -length * np.cos(angle)] for length, angle in segments], axis=0
+    )
 
 
 def plain_line(progress: "Progress") -> str:
@@ -228,6 +253,8 @@ def plain_line(progress: "Progress") -> str:
     if progress.row is not None:
         angles = ", ".join(f"{drive.angle:+.3f}" for drive in progress.row.drives)
         torques = ", ".join(f"{drive.torque:+.1f}" for drive in progress.row.drives)
-        head += f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
+        head += (
+            f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
+        )
     urgent = "USE THE EMERGENCY STOP  " if progress.still_enabled else ""
     return f"{urgent}{head}  {progress.abort}" if progress.abort else urgent + head

@@ -19,9 +19,12 @@ def said(value: float, joints: "Sequence[Joint]", decimals: int = 4) -> str:
 
 
 def show_parameters(
-    rows: Sequence[Mapping[Any, Any]], joints: "Sequence[Joint]", one_step: Sequence[float] | None = None
+    rows: Sequence[Mapping[Any, Any]],
+    joints: "Sequence[Joint]",
+    one_step: Sequence[float] | None = None,
 ) -> None:
-    """Print the rows of a parameters/1 table, with the values of a fit in one step where there are any."""
+    """Print the rows of a parameters/1 table, with the values of a fit in one step where there are
+    any."""
     beside = [] if one_step is None else [[said(one, joints)] for one in one_step]
     console.table(
         ("parameter", "value", "95 % interval", "unit", *(["one step"] if beside else []), "step"),

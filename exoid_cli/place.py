@@ -1,4 +1,5 @@
-"""The experiment that a command is about: the exoid.toml that is named, else the one in the current folder."""
+"""The experiment that a command is about: the exoid.toml that is named, else the one in the current
+folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +16,12 @@ if TYPE_CHECKING:
 NAME = "exoid.toml"
 
 ConfigOption = Annotated[
-    Path | None, typer.Option("--config", help="The experiment's settings.", show_default="exoid.toml")
+    Path | None,
+    typer.Option("--config", help="The experiment's settings.", show_default="exoid.toml"),
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", help="Folder of the results.", show_default="that of exoid.toml")
+    Path | None,
+    typer.Option("--out", help="Folder of the results.", show_default="that of exoid.toml"),
 ]
 
 
@@ -54,7 +57,9 @@ class Place:
         for step in self.of_stage(stage):
             if step.run == run:
                 return step
-        raise InputError(f"{self.out / NAME}: {why_absent(stage, run)}; say what to read and, with -o, what to write")
+        raise InputError(
+            f"{self.out / NAME}: {why_absent(stage, run)}; say what to read and, with -o, what to write"
+        )
 
 
 def why_absent(stage: str, run: str | None = None) -> str:
@@ -62,13 +67,17 @@ def why_absent(stage: str, run: str | None = None) -> str:
     if run:
         return f"the recording of run {run} was imported, and no command makes it"
     if stage in ("design", "acquire"):
-        return f"the recordings of all runs were imported, and `exoid {stage}` has nothing to do here"
+        return (
+            f"the recordings of all runs were imported, and `exoid {stage}` has nothing to do here"
+        )
     if stage == "simulate":
         return "`exoid simulate` follows a leg's gait, and the recordings are of another machine"
     return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
 
 
-def place_of(config: Path | None, out: Path | None = None, lacking: str = "", *, look_only: bool = False) -> Place:
+def place_of(
+    config: Path | None, out: Path | None = None, lacking: str = "", *, look_only: bool = False
+) -> Place:
     """Return the experiment to work in; where there is none, ``lacking`` begins what is said of it.
 
     One with a damaged recording is refused, unless it is only to be looked at.
@@ -80,7 +89,9 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "", *,
     file = config or Path(NAME)
     if not config and not is_experiment():
         begin = f"{lacking}, and " if lacking else ""
-        raise InputError(f"{begin}there is no {NAME} in {Path.cwd()}; {_how_to_begin(named=not lacking)}")
+        raise InputError(
+            f"{begin}there is no {NAME} in {Path.cwd()}; {_how_to_begin(named=not lacking)}"
+        )
     folder = out or file.parent
     experiment, imported = with_imported(Experiment.load(file), folder)
     if not look_only:
@@ -92,7 +103,9 @@ def _how_to_begin(named: bool) -> str:
     from pipelines.workflow.imported import imported_in
 
     if imported_in(Path("recordings")):
-        return f"with an empty {NAME} beside recordings/, `exoid run` does all with what was imported"
+        return (
+            f"with an empty {NAME} beside recordings/, `exoid run` does all with what was imported"
+        )
     return (
         f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with --config, or start one "
         f"with `exoid init DIR`; beside recordings that `exoid import` made, an empty {NAME} is enough"
@@ -102,7 +115,8 @@ def _how_to_begin(named: bool) -> str:
 def inputs_and_folder(
     stage: str, files: list[Path] | None, output: Path | None, config: Path | None, lacking: str
 ) -> tuple[list[Path], Path]:
-    """Return what a stage reads and the folder that it writes into; what is not given, as the experiment has it."""
+    """Return what a stage reads and the folder that it writes into; what is not given, as the
+    experiment has it."""
     return (
         files or list(place_of(config, lacking=lacking).step(stage).inputs),
         output or place_of(config, lacking="-o: missing").step(stage).target.parent,

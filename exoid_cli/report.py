@@ -11,21 +11,31 @@ if TYPE_CHECKING:
     from pipelines.report.session import Session
 
 FoldersArgument = Annotated[
-    list[Path] | None, typer.Argument(metavar="DIR", help="Folders that the stages wrote to.", show_default="this one")
+    list[Path] | None,
+    typer.Argument(
+        metavar="DIR", help="Folders that the stages wrote to.", show_default="this one"
+    ),
 ]
 
 
 def report(
     folders: FoldersArgument = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The page to write.")] = Path("report.html"),
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page to write.")] = Path(
+        "report.html"
+    ),
     config: Annotated[
-        Path | None, typer.Option("--config", help="exoid.toml, to be named in the command lines that repeat it.")
+        Path | None,
+        typer.Option(
+            "--config", help="exoid.toml, to be named in the command lines that repeat it."
+        ),
     ] = None,
     compare: Annotated[
-        tuple[Path, Path] | None, typer.Option("--compare", metavar="A B", help="Lay two sessions side by side.")
+        tuple[Path, Path] | None,
+        typer.Option("--compare", metavar="A B", help="Lay two sessions side by side."),
     ] = None,
     title: Annotated[
-        str | None, typer.Option("--title", help="The page's title; the folder's name unless given.")
+        str | None,
+        typer.Option("--title", help="The page's title; the folder's name unless given."),
     ] = None,
 ) -> None:
     """Write one self-contained page: the verdict, the figures, the model, and how to repeat it all.
@@ -42,10 +52,14 @@ def report(
     from pipelines.report.session import find
 
     if output.is_dir():
-        raise SettingsError(f"-o {output}: is a folder, expected the name of a page; write {output / 'report.html'}")
+        raise SettingsError(
+            f"-o {output}: is a folder, expected the name of a page; write {output / 'report.html'}"
+        )
     if compare:
         if folders:
-            raise SettingsError("--compare names both its folders itself; drop the others, or --compare")
+            raise SettingsError(
+                "--compare names both its folders itself; drop the others, or --compare"
+            )
         _compare(compare, output)
         return
     session = find(folders or [Path()], config)

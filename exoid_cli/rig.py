@@ -15,21 +15,36 @@ LOOPBACK = "127.0.0.1"
 
 
 def rig(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The rig's description, with a [plant].")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The rig's description, with a [plant].")
+    ],
     run: Annotated[
         Literal["exo_alone", "with_human"], typer.Option(help="Nobody in the machine, or somebody.")
     ] = "with_human",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's.")
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's."
+        ),
     ] = None,
     sample_rate_hz: Annotated[
         float | None,
-        typer.Option("--rate-hz", "--sample-rate-hz", min=1.0, max=1e5, help="Samples a second; else the plant's."),
+        typer.Option(
+            "--rate-hz",
+            "--sample-rate-hz",
+            min=1.0,
+            max=1e5,
+            help="Samples a second; else the plant's.",
+        ),
     ] = None,
     bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
-    anyone: Annotated[bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")] = False,
-    until_input_ends: Annotated[bool, typer.Option(hidden=True, help="Stop when standard input is closed.")] = False,
+    anyone: Annotated[
+        bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")
+    ] = False,
+    until_input_ends: Annotated[
+        bool, typer.Option(hidden=True, help="Stop when standard input is closed.")
+    ] = False,
 ) -> None:
     """Serve the drives and force sensors of a virtual rig over Modbus, until Ctrl-C.
 
@@ -51,14 +66,26 @@ def rig(
 
     with starting:
         if not until_input_ends:
-            starting.enter_context(console.starting(f"starting {file.name}; the first start compiles, up to a minute"))
+            starting.enter_context(
+                console.starting(f"starting {file.name}; the first start compiles, up to a minute")
+            )
         from pipelines.rig.server import serve_file  # compiles already
 
-        serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends, bind=bind)
+        serve_file(
+            file,
+            run,
+            seed,
+            port,
+            sample_rate_hz,
+            announce,
+            until_input_ends=until_input_ends,
+            bind=bind,
+        )
 
 
 def _address(bind: str, anyone: bool) -> str:
-    """Return the address to listen on; refuse one that other computers can reach, unless that is wanted; then warn."""
+    """Return the address to listen on; refuse one that other computers can reach, unless that is
+    wanted; then warn."""
     found = _addresses(bind)
     if found and all(ip_address(address).is_loopback for address in found):
         return found[0]  # not the name, which may lead elsewhere the next time
@@ -67,14 +94,20 @@ def _address(bind: str, anyone: bool) -> str:
             f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}: Modbus has no "
             "authentication, whoever reaches the rig can move it; add --anyone if that is wanted"
         )
-    console.warn(f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can move it")
+    console.warn(
+        f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can move it"
+    )
     return bind
 
 
 def _addresses(bind: str) -> list[str]:
-    """Return where a name or an address leads, those of IPv4 first as in rig files; empty where nobody knows it."""
+    """Return where a name or an address leads, those of IPv4 first as in rig files; empty where
+    nobody knows it."""
     try:
         found = socket.getaddrinfo(bind, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         return []
-    return [str(place[0]) for family, *_, place in sorted(found, key=lambda one: one[0] != socket.AF_INET)]
+    return [
+        str(place[0])
+        for family, *_, place in sorted(found, key=lambda one: one[0] != socket.AF_INET)
+    ]

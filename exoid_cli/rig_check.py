@@ -22,24 +22,38 @@ DRIVE = {"angle": "angle rad", "velocity": "rad/s", "current": "current A", "tem
 
 def check(
     file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="The rig's description.", show_default="that of exoid.toml")
+        Path | None,
+        typer.Argument(
+            metavar="FILE", help="The rig's description.", show_default="that of exoid.toml"
+        ),
     ] = None,
     config: ConfigOption = None,
     rate_hz: Annotated[
         float | None,
         typer.Option(
-            min=1.0, max=1e5, help="Samples a second that are wanted.", show_default="that of exoid.toml, if any"
+            min=1.0,
+            max=1e5,
+            help="Samples a second that are wanted.",
+            show_default="that of exoid.toml, if any",
         ),
     ] = None,
     run: Annotated[
         Literal["exo_alone", "with_human"],
-        typer.Option(help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."),
+        typer.Option(
+            help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."
+        ),
     ] = "exo_alone",
     by_hand: Annotated[
-        bool, typer.Option("--by-hand", help="Then disable the drives and say what to move and press by hand.")
+        bool,
+        typer.Option(
+            "--by-hand", help="Then disable the drives and say what to move and press by hand."
+        ),
     ] = False,
     move: Annotated[
-        bool, typer.Option("--move", help="Then, if nothing is wrong, let the drives move 0.05 rad to and fro.")
+        bool,
+        typer.Option(
+            "--move", help="Then, if nothing is wrong, let the drives move 0.05 rad to and fro."
+        ),
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Move without asking, for scripts.")] = False,
 ) -> None:
@@ -72,7 +86,9 @@ def check(
         console.say("\nWhat is wrong")
         for finding in report.findings:
             console.say(f"- {finding}")
-        raise DeviceError(f"{file}: {count} {'thing is' if count == 1 else 'things are'} not as the file says")
+        raise DeviceError(
+            f"{file}: {count} {'thing is' if count == 1 else 'things are'} not as the file says"
+        )
     console.say("\nNothing is wrong.")
 
 
@@ -94,15 +110,20 @@ def _show(report: "RigReport") -> None:
     sensors = [device for device in report.devices if FORCES[0] in device.values]
     if sensors:
         console.say("\nSensors, mean ± noise in N")
-        console.table(("", "x", "y", "z", "samples/s"), map(_sensor, sensors), numbers="x, y, z, samples/s")
+        console.table(
+            ("", "x", "y", "z", "samples/s"), map(_sensor, sensors), numbers="x, y, z, samples/s"
+        )
     if report.answers:
         console.say("\nMoved by the drives")
         rows = [
-            (a.joint, f"{a.gain:.3f}", f"{a.delay_s * 1e3:.0f}", f"{a.torque_with_speed:.2f}") for a in report.answers
+            (a.joint, f"{a.gain:.3f}", f"{a.delay_s * 1e3:.0f}", f"{a.torque_with_speed:.2f}")
+            for a in report.answers
         ]
         headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
-        console.note("The scale of the torque shows in no movement: hold a known weight, see docs/rig-check.md.")
+        console.note(
+            "The scale of the torque shows in no movement: hold a known weight, see docs/rig-check.md."
+        )
     for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
         if rate:
             _show_rate(what, rate, report.rate_hz)
@@ -113,7 +134,9 @@ def _identity(device: "DeviceReport") -> str:
         return "no connection"
     wrong = [entry for entry in device.identity if entry["found"] != entry["expected"]]
     if wrong:
-        return ", ".join(f"0x{entry['found']:04X}, expected 0x{entry['expected']:04X}" for entry in wrong)
+        return ", ".join(
+            f"0x{entry['found']:04X}, expected 0x{entry['expected']:04X}" for entry in wrong
+        )
     if device.latency is None:
         return "no answer"
     return "as expected" if device.identity else "none asked for"
@@ -152,15 +175,24 @@ def _clock(device: "DeviceReport") -> tuple[str, str]:
 
 
 def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
-    console.say(f"\nCycles of {what}: {rate.cycles_hz:.0f} a second" + (f", wanted {wanted_hz:g}" if wanted_hz else ""))
+    console.say(
+        f"\nCycles of {what}: {rate.cycles_hz:.0f} a second"
+        + (f", wanted {wanted_hz:g}" if wanted_hz else "")
+    )
     if wanted_hz:
         console.note(f"{rate.late:.1%} of them take longer than a sample")
     cycle = rate.cycle
     steps = len(cycle.histogram)
-    edges = [cycle.least * (cycle.most / cycle.least) ** (k / steps) * 1e3 for k in range(steps + 1)]
+    edges = [
+        cycle.least * (cycle.most / cycle.least) ** (k / steps) * 1e3 for k in range(steps + 1)
+    ]
     bars = [(k, count) for k, count in enumerate(cycle.histogram) if count]
     rows = [
-        (f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms", count, "█" * -(-count * 30 // max(cycle.histogram)))
+        (
+            f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms",
+            count,
+            "█" * -(-count * 30 // max(cycle.histogram)),
+        )
         for k, count in bars
     ]
     console.table(("duration", "cycles", ""), rows, numbers="cycles")

@@ -14,7 +14,8 @@ from pipelines.validation.suggestion import closest
 
 
 class _ServesAFile(TyperGroup):
-    """``exoid rig FILE`` means ``exoid rig serve FILE``: it did before there was anything else to do with one."""
+    """``exoid rig FILE`` means ``exoid rig serve FILE``: it did before there was anything else to
+    do with one."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         words = [word for word in args if word not in ("--json", "--quiet", "-q")]
@@ -42,4 +43,6 @@ def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
 
 
 rig.command("serve", cls=Command, short_help="Serve a virtual rig over Modbus TCP.")(heeding(serve))
-rig.command("check", cls=Command, short_help="Say whether a rig is what its file says.")(heeding(check))
+rig.command("check", cls=Command, short_help="Say whether a rig is what its file says.")(
+    heeding(check)
+)

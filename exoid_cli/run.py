@@ -41,7 +41,9 @@ def run(
     from pipelines.workflow.split import split
 
     place = place_of(config, out)
-    wanted = needed_for(place.of_stage(*_known(stages or [], place)) if stages else place.steps, place.steps)
+    wanted = needed_for(
+        place.of_stage(*_known(stages or [], place)) if stages else place.steps, place.steps
+    )
     if any(step.stage == "acquire" for step in wanted):
         place.experiment.refuse_what_cannot_run()
     judged = [one for one in Judge(place.out).all(place.steps) if one.step in wanted]
@@ -50,21 +52,29 @@ def run(
         console.emit([])
         console.say("Everything is up to date.")
         return
-    split(place.experiment, place.out / ".settings")  # so that make, called next, finds nothing to do
-    done, left_out = bring_up_to_date(context, place, wanted, before=partial(ask_before, place.experiment, yes=yes))
+    # So that make, called next, finds nothing to do.
+    split(place.experiment, place.out / ".settings")
+    done, left_out = bring_up_to_date(
+        context, place, wanted, before=partial(ask_before, place.experiment, yes=yes)
+    )
     console.emit([one.as_json() for one in done])
     kept = len(wanted) - len(done) - len(left_out)
     up_to_date = f"; {kept} {'was' if kept == 1 else 'were'} up to date" if kept else ""
-    console.say(f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s{up_to_date}")
+    console.say(
+        f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s{up_to_date}"
+    )
     _say_what_is_left_out(left_out)
 
 
 def _say_what_is_left_out(left_out: Sequence[LeftOut]) -> None:
-    """Say once more at the end, where it is read, which steps could not be done, those of one reason together."""
+    """Say once more at the end, where it is read, which steps could not be done, those of one
+    reason together."""
     for why in dict.fromkeys(one.why for one in left_out):
         targets = [one.step.target.as_posix() for one in left_out if one.why == why]
         are = "is" if len(targets) == 1 else "are"
-        console.say(f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {why}")
+        console.say(
+            f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {why}"
+        )
 
 
 def _known(stages: list[str], place: Place) -> list[str]:
@@ -78,5 +88,7 @@ def _known(stages: list[str], place: Place) -> list[str]:
             continue
         if stage in STAGES:
             raise InputError(f"{stage}: {why_absent(stage)}; leave it out")
-        raise InputError(f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}")
+        raise InputError(
+            f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}"
+        )
     return stages

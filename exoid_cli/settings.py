@@ -26,7 +26,9 @@ def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
 @settings.command("check", cls=Command, short_help="Say whether an experiment's file can be used.")
 @heeding
 def check(
-    config: Annotated[Path, typer.Argument(metavar="FILE", help="The experiment's settings.")] = Path("exoid.toml"),
+    config: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The experiment's settings.")
+    ] = Path("exoid.toml"),
 ) -> None:
     """Say whether an experiment's file can be used; print it complete with --json.
 
@@ -46,9 +48,12 @@ def check(
 @heeding
 def split(
     config: Annotated[Path, typer.Argument(metavar="FILE", help="The experiment's exoid.toml.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")
+    ],
 ) -> None:
-    """Write one file a section and the graph's rules, so that make re-runs only what a change touches.
+    """Write one file a section and the graph's rules, so that make re-runs only what a change
+    touches.
 
     \b
     Example:

@@ -22,7 +22,10 @@ FEW = 6
 
 def show(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A Parquet or JSON file of exoid's, or a trajectory as TOML.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A Parquet or JSON file of exoid's, or a trajectory as TOML."
+        ),
     ],
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
@@ -64,7 +67,9 @@ def _show_whole(found: "Inspection") -> bool:
         from exoid_cli.parameters_view import show_parameters
 
         console.say("")
-        show_parameters(PARAMETERS.read(Path(found.file)).frame.to_dict("records"), joints_of(found.metadata))
+        show_parameters(
+            PARAMETERS.read(Path(found.file)).frame.to_dict("records"), joints_of(found.metadata)
+        )
         return True
     if found.contract == CANDIDATES.label:
         _show_candidates(CANDIDATES.read(Path(found.file)).frame.to_dict("records"))
@@ -84,21 +89,30 @@ def _show_candidates(rows: list[dict[Any, Any]]) -> None:
 
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:FIRST]:
-        console.say(f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}: {row['verdict']}")
+        console.say(
+            f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}: {row['verdict']}"
+        )
         console.note(labels_in_words(row["reason"], labels))
     if len(rows) > FIRST:
         console.say(f"\n{len(rows) - FIRST} more are in the file")
 
 
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:
-    """Say of the settings only that they are there, for they are a screenful; of a hash its beginning."""
+    """Say of the settings only that they are there, for they are a screenful; of a hash its
+    beginning."""
     folded = dict(origin)
     if "config" in origin:
-        folded["config"] = f"{len(_lines({'config': origin['config']}))} settings; --json shows them"
+        folded["config"] = (
+            f"{len(_lines({'config': origin['config']}))} settings; --json shows them"
+        )
     if "software" in origin:
-        folded["software"] = ", ".join(f"{name} {version}" for name, version in origin["software"].items())
+        folded["software"] = ", ".join(
+            f"{name} {version}" for name, version in origin["software"].items()
+        )
     if "inputs" in origin:
-        folded["inputs"] = {entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]} or "none"
+        folded["inputs"] = {
+            entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]
+        } or "none"
     return folded
 
 
@@ -115,10 +129,13 @@ def _show_facts(title: str, facts: dict[str, Any]) -> None:
 
 def _is_table(value: Any) -> bool:
     """Return whether a value is several objects of the same few keys, none of them nested."""
-    if not (isinstance(value, list) and len(value) > 1 and all(isinstance(row, dict) for row in value)):
+    if not (
+        isinstance(value, list) and len(value) > 1 and all(isinstance(row, dict) for row in value)
+    ):
         return False
     return len(value[0]) <= COLUMNS and all(
-        row.keys() == value[0].keys() and not any(isinstance(cell, dict | list) for cell in row.values())
+        row.keys() == value[0].keys()
+        and not any(isinstance(cell, dict | list) for cell in row.values())
         for row in value
     )
 
@@ -138,7 +155,9 @@ def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
 
 
 def _in_short(value: Any) -> str:
-    if isinstance(value, list) and (len(value) > FEW or any(isinstance(item, list) for item in value)):
+    if isinstance(value, list) and (
+        len(value) > FEW or any(isinstance(item, list) for item in value)
+    ):
         rows = f"{len(value)} x {len(value[0])}" if isinstance(value[0], list) else str(len(value))
         return f"{rows} values; --json shows them"
     if isinstance(value, list):

@@ -1,4 +1,5 @@
-"""Signals that ask exoid to end: the first one ends it, and none keeps from the user what is being told already."""
+"""Signals that ask exoid to end: the first one ends it, and none keeps from the user what is being
+told already."""
 
 import signal
 import sys
@@ -12,8 +13,8 @@ from pipelines.process.termination import ENDING, known, not_ignored
 class Interrupted(KeyboardInterrupt):
     """A signal asked exoid to end.
 
-    Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers and dataclasses use it, and under
-    ``python -m`` dies of SIGINT in the end, whatever the exit code was to be.
+    Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers and dataclasses use
+    it, and under ``python -m`` dies of SIGINT in the end, whatever the exit code was to be.
     """
 
 
@@ -22,11 +23,13 @@ class Signals:
 
     def __init__(self) -> None:
         self.came: signal.Signals | None = None
-        """The last one that asked exoid to end; compilers and imports take KeyboardInterrupt for their own failure."""
+        """The last one that asked exoid to end; compilers and imports take KeyboardInterrupt for
+        their own failure."""
         self._heeded = list[signal.Signals]()
 
     def heed(self) -> None:
-        """Raise KeyboardInterrupt at each from now on, so that what is half written is cleared away."""
+        """Raise KeyboardInterrupt at each from now on, so that what is half written is cleared
+        away."""
         self._heeded = not_ignored(known(ENDING))
         for number in self._heeded:
             signal.signal(number, self._interrupt)
@@ -54,7 +57,8 @@ class Signals:
 
 
 def _unraisable(told: "sys.UnraisableHookArgs") -> None:
-    """Say nothing of an interruption that fell into a callback of compiled code, such as the compiler's."""
+    """Say nothing of an interruption that fell into a callback of compiled code, such as the
+    compiler's."""
     if not issubclass(told.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(told)
 

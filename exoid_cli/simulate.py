@@ -18,7 +18,11 @@ def simulate(
     context: typer.Context,
     parameters: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE", help="A parameters/1 file.", show_default="identified/parameters.parquet"),
+        typer.Argument(
+            metavar="FILE",
+            help="A parameters/1 file.",
+            show_default="identified/parameters.parquet",
+        ),
     ] = None,
     output: Annotated[
         Path | None,
@@ -33,13 +37,23 @@ def simulate(
     again: AgainOption = False,
     run: Annotated[
         Literal["exo_alone", "with_human"] | None,
-        typer.Option("--run", help="Whose parameters.", show_default="with_human, if the model has it; a replay's own"),
+        typer.Option(
+            "--run",
+            help="Whose parameters.",
+            show_default="with_human, if the model has it; a replay's own",
+        ),
     ] = None,
     reference: Annotated[
-        Path | None, typer.Option("--reference", help="What to follow: trajectory/1 or TOML; a gait unless given.")
+        Path | None,
+        typer.Option(
+            "--reference", help="What to follow: trajectory/1 or TOML; a gait unless given."
+        ),
     ] = None,
     replay: Annotated[
-        Path | None, typer.Option("--replay", help="A recording/1 or motion/1 to simulate again; its run counts.")
+        Path | None,
+        typer.Option(
+            "--replay", help="A recording/1 or motion/1 to simulate again; its run counts."
+        ),
     ] = None,
 ) -> None:
     """Simulate the leg under adaptive RBF control, or replay a recording on the model.
@@ -59,9 +73,17 @@ def simulate(
     from pipelines.errors import SettingsError
 
     if replay and reference:
-        raise SettingsError("--reference and --replay exclude each other: a replay follows its recording; drop one")
+        raise SettingsError(
+            "--reference and --replay exclude each other: a replay follows its recording; drop one"
+        )
     if parameters is output is run is reference is replay is None:
-        only(context, place_of(config, lacking="no parameters are given"), "simulate", "replay", again=again)
+        only(
+            context,
+            place_of(config, lacking="no parameters are given"),
+            "simulate",
+            "replay",
+            again=again,
+        )
         return
     if parameters is None:
         parameters = place_of(config, lacking="no parameters are given").step("identify").target
@@ -82,7 +104,9 @@ def _whose(table: "Table") -> str:
     return "exo_alone" if "exo_alone" in kinds and "with_human" not in kinds else "with_human"
 
 
-def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:
+def _track(
+    table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path
+) -> None:
     from pipelines.contracts import SIMULATION, describe
     from pipelines.contracts.atomic import write_text
     from pipelines.contracts.joints import either
@@ -114,12 +138,20 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
-    described = describe(inputs, settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")) | {
+    described = describe(
+        inputs, settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
+    ) | {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
-        "disturbance": {"amplitude_nm": chosen.disturbance_nm, "omega_rad_s": chosen.disturbance_rad_s},
-        "noise": {"counts_per_turn": chosen.encoder_counts_per_turn, "angle_rad": chosen.encoder_noise_rad},
+        "disturbance": {
+            "amplitude_nm": chosen.disturbance_nm,
+            "omega_rad_s": chosen.disturbance_rad_s,
+        },
+        "noise": {
+            "counts_per_turn": chosen.encoder_counts_per_turn,
+            "angle_rad": chosen.encoder_noise_rad,
+        },
         "seed": chosen.seed,
     }
     SIMULATION.write(output / LOOP, frame, described)
@@ -129,7 +161,9 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         from pipelines.simulation.figures import draw_sweep, draw_tracking
 
         with console.working("drawing"):
-            draw_tracking(frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s)
+            draw_tracking(
+                frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s
+            )
             if len(gains):
                 draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
     worst = loop.worst_error(chosen.settled_after_s)
@@ -180,7 +214,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
     lacks = recorded.why_no_closed_loop(motion)
     beside = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
-    told = {"simulation_rmse_rad": rmse, "windows": len(replayed.first), "beside": [] if lacks else [beside.name]}
+    told = {
+        "simulation_rmse_rad": rmse,
+        "windows": len(replayed.first),
+        "beside": [] if lacks else [beside.name],
+    }
     SIMULATION.write(output, open_loop, shared | told)
     if not lacks:
         with console.working("following the references"):
@@ -212,7 +250,9 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:
     from pipelines.contracts.joints import either
 
-    angle, torque = (either(joint.unit(quantity) for joint in joints) for quantity in ("angle", "torque"))
+    angle, torque = (
+        either(joint.unit(quantity) for joint in joints) for quantity in ("angle", "torque")
+    )
     headings = {
         "simulation_rmse_rad": f"1 s windows ({angle})",
         "closed_loop_rmse_rad": f"closed loop ({angle})",

@@ -19,8 +19,8 @@ DO = "import it again, or remove it"
 def status(config: ConfigOption = None, out: OutOption = None) -> None:
     """Say of each stage of an experiment whether it is done, stale and why, or missing.
 
-    A result is stale where an input or a setting is another one than it was made of. An imported recording that cannot
-    be read any more has a line of its own, and makes the exit code 2.
+    A result is stale where an input or a setting is another one than it was made of. An imported
+    recording that cannot be read any more has a line of its own, and makes the exit code 2.
 
     \b
     Examples:
@@ -33,9 +33,13 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
     place = place_of(config, out, look_only=True)
     judged = Judge(place.out).all(place.steps)
-    console.emit([*(_damaged_as_json(file) for file in place.damaged), *(_as_json(one) for one in judged)])
+    console.emit(
+        [*(_damaged_as_json(file) for file in place.damaged), *(_as_json(one) for one in judged)]
+    )
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
-    damaged = [("import", "damaged", file.relative_to(place.out).as_posix(), DO) for file in place.damaged]
+    damaged = [
+        ("import", "damaged", file.relative_to(place.out).as_posix(), DO) for file in place.damaged
+    ]
     console.table(
         ("stage", "state", "result", "why"), [*damaged, *(_line(stage, place.out) for stage in stages)]
     )  # fmt: skip
@@ -50,7 +54,11 @@ def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, ...]:
     count = Counter(one.state.value for one in stage)
     state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
-    why = reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "") if reasons else ""
+    why = (
+        reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "")
+        if reasons
+        else ""
+    )
     targets = [one.step.target.relative_to(out) for one in stage]
     return stage[0].step.stage, state, _result(targets, count[state]), why
 

@@ -57,7 +57,8 @@ def bring_up_to_date(
     again: bool = False,
     before: Before = lambda step: (),
 ) -> tuple[list[Done], list[LeftOut]]:
-    """Do the wanted steps that are not done, or all ``again``, each after those before it; return what became of them.
+    """Do the wanted steps that are not done, or all ``again``, each after those before it; return
+    what became of them.
 
     All steps of the experiment are judged, for a step is stale where one it needs is.
     """
@@ -81,9 +82,14 @@ def bring_up_to_date(
 
 
 def only(
-    context: typer.Context, place: Place, *stages: str, again: bool = False, before: Before = lambda step: ()
+    context: typer.Context,
+    place: Place,
+    *stages: str,
+    again: bool = False,
+    before: Before = lambda step: (),
 ) -> None:
-    """Do what a command does that was told nothing: bring the steps of its own stages up to date, and no others."""
+    """Do what a command does that was told nothing: bring the steps of its own stages up to date,
+    and no others."""
     wanted = place.of_stage(*stages) or [place.step(stages[0])]  # which says why there is none
     _look_before(place, wanted)
     done, left_out = bring_up_to_date(context, place, wanted, again=again, before=before)
@@ -110,7 +116,9 @@ def _look_before(place: Place, wanted: "Sequence[Step]") -> None:
                 )
             if not maker.done and stage not in told:
                 told.add(stage)
-                console.warn(f"{stage} is stale: {maker.why[0]}; `exoid run {step.stage}` brings it up to date too")
+                console.warn(
+                    f"{stage} is stale: {maker.why[0]}; `exoid run {step.stage}` brings it up to date too"
+                )
 
 
 def _perform(context: typer.Context, judged: "Judged", told: Sequence[str]) -> Done:
@@ -121,6 +129,9 @@ def _perform(context: typer.Context, judged: "Judged", told: Sequence[str]) -> D
     root = context.find_root()
     # The root is a group of commands, which click declares as any command.
     command = root.command.get_command(root, name)  # type: ignore[attr-defined]
-    with console.gathering() as results, command.make_context(name, list(arguments), parent=root) as inner:
+    with (
+        console.gathering() as results,
+        command.make_context(name, list(arguments), parent=root) as inner,
+    ):
         inner.command.invoke(inner)
     return Done(judged.step, time.monotonic() - began, results[0] if results else None)

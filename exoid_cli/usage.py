@@ -17,7 +17,9 @@ def told(error: TyperException) -> str:
     if option and message.startswith("No such option"):
         return _unknown(option, "option", context.command.get_params(context), called)
     if match := re.match(r"No such command '(.*?)'", message):
-        return _unknown(match[1], "command", list(context.command.commands) if context else [], called)
+        return _unknown(
+            match[1], "command", list(context.command.commands) if context else [], called
+        )
     parameter = getattr(error, "param", None)
     if parameter is not None:
         about = _about(parameter, error.message)
@@ -26,9 +28,13 @@ def told(error: TyperException) -> str:
 
 
 def _unknown(word: str, kind: str, known: list[Any], called: str) -> str:
-    names = [name for one in known for name in ([one] if isinstance(one, str) else one.opts) if name]
+    names = [
+        name for one in known for name in ([one] if isinstance(one, str) else one.opts) if name
+    ]
     near = closest(word, names)
-    return f"{word}: no such {kind}; " + (f"did you mean {near}?" if near else f"{called} lists those there are")
+    return f"{word}: no such {kind}; " + (
+        f"did you mean {near}?" if near else f"{called} lists those there are"
+    )
 
 
 def _name(parameter: Any) -> str:
@@ -44,5 +50,7 @@ def _about(parameter: Any, message: str) -> str:
     match = re.search(r"'(.*)' is not one of", message)
     if choices and match:
         near = closest(match[1], list(choices))
-        return f"found {match[1]}, expected {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
+        return f"found {match[1]}, expected {', '.join(choices)}" + (
+            f"; did you mean {near}?" if near else ""
+        )
     return f"expected {expectation(message)}"

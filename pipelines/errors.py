@@ -49,7 +49,8 @@ class Unanswered(DeviceError):
 
 @contextmanager
 def about(file: Path | str | None) -> Iterator[None]:
-    """Put before every complaint of the block which file it is about; nothing where there is none."""
+    """Put before every complaint of the block which file it is about; nothing where there is
+    none."""
     try:
         yield
     except ExoidError as error:

@@ -4,14 +4,16 @@ import os
 import signal
 from dataclasses import dataclass
 
-# Each worker has a core; threads of BLAS, for matrices as narrow as these, would only wait for it. Before numpy comes.
+# Each worker has a core; threads of BLAS, for matrices as narrow as these, would only wait for it.
+# Before numpy comes.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 
 from exoid_cli.app import run
 
-# A shell lets what it starts in the background ignore Ctrl-C, and so would the programs that tests start and stop.
+# A shell lets what it starts in the background ignore Ctrl-C, and so would the programs that tests
+# start and stop.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

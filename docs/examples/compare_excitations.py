@@ -9,7 +9,10 @@ from pipelines.settings.design import DesignSettings
 
 # Hip and knee, rad: one slow sine each, and three harmonics that turn at different angles.
 SINE = FourierTrajectory(
-    theta0=np.array([0.65, -0.93]), a=np.array([[0.5], [0.6]]), b=np.array([[0.0], [0.2]]), omega=0.4 * np.pi
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.5], [0.6]]),
+    b=np.array([[0.0], [0.2]]),
+    omega=0.4 * np.pi,
 )
 RICH = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),
@@ -18,10 +21,15 @@ RICH = FourierTrajectory(
     omega=0.4 * np.pi,
 )
 
-judged = {name: quality(motion, DesignSettings(), Geometry()) for name, motion in (("sine", SINE), ("rich", RICH))}
+judged = {
+    name: quality(motion, DesignSettings(), Geometry())
+    for name, motion in (("sine", SINE), ("rich", RICH))
+}
 
 print(f"{'':22s}" + "".join(f"{name:>10s}" for name in judged))
-print(f"{'condition number':22s}" + "".join(f"{found.condition:10.1f}" for found in judged.values()))
+print(
+    f"{'condition number':22s}" + "".join(f"{found.condition:10.1f}" for found in judged.values())
+)
 print(f"{'log det':22s}" + "".join(f"{found.log_det:10.2f}" for found in judged.values()))
 for parameter, unit in judged["rich"].units.items():
     errors = "".join(f"{found.standard_errors[parameter]:10.4f}" for found in judged.values())

@@ -1,4 +1,5 @@
-"""Hide a knee spring in a virtual leg, record it without any device, and let the diagnosis find it."""
+"""Hide a knee spring in a virtual leg, record it without any device, and let the diagnosis find
+it."""
 
 import numpy as np
 
@@ -14,14 +15,17 @@ from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.plant import PlantSettings
 
-# Angles in rad: a mean, and sines and cosines of three harmonics for hip and knee; the period is 5 s.
+# Angles in rad: a mean, and sines and cosines of three harmonics for hip and knee; the period is 5
+# s.
 EXCITATION = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),
     a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
     b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
     omega=2 * np.pi / 5.0,
 )
-SPRING = term_from(effect_named("parallel_spring")(joint="knee"), {"stiffness": 8.0, "rest_angle": -0.9})
+SPRING = term_from(
+    effect_named("parallel_spring")(joint="knee"), {"stiffness": 8.0, "rest_angle": -0.9}
+)
 
 
 def recorded(run: str, purpose: str, seed: int):
@@ -39,6 +43,10 @@ print(said["summary"])
 for cause in said["causes"]:
     for parameter in cause["parameters"]:
         low, high = parameter["ci95"]
-        print(f"{parameter['name']:12s} {parameter['value']:7.3f} {parameter['unit']:8s} 95 %: {low:.3f} to {high:.3f}")
+        print(
+            f"{parameter['name']:12s} {parameter['value']:7.3f} {parameter['unit']:8s} 95 %: {low:.3f} to {high:.3f}"
+        )
 
-assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [("parallel_spring", "knee")]
+assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [
+    ("parallel_spring", "knee")
+]

@@ -1,4 +1,5 @@
-"""Identify a pendulum from arrays of one's own: put them into the recording contract, filter, fit."""
+"""Identify a pendulum from arrays of one's own: put them into the recording contract, filter,
+fit."""
 
 import tempfile
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""How Sphinx makes the site of docs/: `make docs`. It needs no network, neither to be built nor to be read."""
+"""How Sphinx makes the site of docs/: `make docs`. It needs no network, neither to be built nor to
+be read."""
 
 import sys
 from pathlib import Path

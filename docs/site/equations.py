@@ -1,4 +1,5 @@
-"""Equations as drawings in the page: no script, no font and no network, and alike in every browser and on paper."""
+"""Equations as drawings in the page: no script, no font and no network, and alike in every browser
+and on paper."""
 
 from html import escape
 from xml.etree import ElementTree
@@ -13,7 +14,8 @@ from sphinx.writers.html5 import HTML5Translator
 SIZE = 17
 """Of the letters, in pixels; text has 16."""
 
-# Letters that are used twice would be drawn once and named, and a page has many equations: names would clash.
+# Letters that are used twice would be drawn once and named, and a page has many equations: names
+# would clash.
 ziafont.config.svg2 = False
 
 
@@ -24,15 +26,23 @@ def drawn(node: nodes.math | nodes.math_block, inline: bool) -> str:
         equation = ziamath.Latex(latex, size=SIZE, color="currentColor", inline=inline)
         picture = equation.svgxml()
     except Exception as error:  # the library raises whatever it stumbles over
-        raise SphinxError(f"{node.source}:{node.line}: cannot draw the equation {latex!r}: {error}") from error
+        raise SphinxError(
+            f"{node.source}:{node.line}: cannot draw the equation {latex!r}: {error}"
+        ) from error
     _, top, _, height = (float(number) for number in picture.attrib["viewBox"].split())
-    picture.attrib |= {"role": "img", "aria-label": latex, "style": f"vertical-align: {-(top + height):.2f}px"}
+    picture.attrib |= {
+        "role": "img",
+        "aria-label": latex,
+        "style": f"vertical-align: {-(top + height):.2f}px",
+    }
     return ElementTree.tostring(picture, encoding="unicode")
 
 
 def visit_inline(self: HTML5Translator, node: nodes.math) -> None:
     """Write an equation in a line of text."""
-    self.body.append(f'<span class="math" title="{escape(node.astext())}">{drawn(node, inline=True)}</span>')
+    self.body.append(
+        f'<span class="math" title="{escape(node.astext())}">{drawn(node, inline=True)}</span>'
+    )
     raise nodes.SkipNode
 
 

@@ -27,7 +27,9 @@ DOCS = Path(__file__).parents[1]
 PAGES = (DOCS.parent / "README.md", DOCS / "verdict.md")
 FIGURES = ("decision", "verdict")
 HIDDEN = [
-    term_from(effect_named("parallel_spring")(joint="knee"), {"stiffness": 8.0, "rest_angle": -0.9}),
+    term_from(
+        effect_named("parallel_spring")(joint="knee"), {"stiffness": 8.0, "rest_angle": -0.9}
+    ),
     term_from(effect_named("encoder_offset")(joint="hip"), {"offset": 0.05}),
 ]
 EXCITATION = FourierTrajectory(

@@ -1,4 +1,5 @@
-"""The examples on the site: scripts as they are, notebooks with what they print and draw as the site is built."""
+"""The examples on the site: scripts as they are, notebooks with what they print and draw as the
+site is built."""
 
 import re
 from pathlib import Path
@@ -16,9 +17,14 @@ def add_sources(app: Sphinx, docname: str, source: list[str]) -> None:
         page = Path(app.srcdir) / "examples"
         scripts = SCRIPT.findall(source[0])
         listed = SCRIPT.sub(lambda link: f"](#{_anchor(link[1])})", source[0])
-        shown = [f"## {name}\n\n```python\n{(page / name).read_text(encoding='utf-8')}```\n" for name in scripts]
+        shown = [
+            f"## {name}\n\n```python\n{(page / name).read_text(encoding='utf-8')}```\n"
+            for name in scripts
+        ]
         notebooks = sorted(path.stem for path in page.glob("*.ipynb"))
-        source[0] = "\n".join([listed, *shown, "```{toctree}", ":hidden:", "", *notebooks, "```", ""])
+        source[0] = "\n".join(
+            [listed, *shown, "```{toctree}", ":hidden:", "", *notebooks, "```", ""]
+        )
 
 
 def _anchor(name: str) -> str:

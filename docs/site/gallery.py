@@ -1,4 +1,5 @@
-"""The gallery of effects: their signatures, drawn while the site is built so that they are those of the code beside it.
+"""The gallery of effects: their signatures, drawn while the site is built so that they are those of
+the code beside it.
 
 The pages in docs/effects stay plain Markdown; figures are added to them here.
 """
@@ -18,10 +19,18 @@ def draw_signatures(app: Sphinx) -> None:
     """Draw what is missing, or older than the code, in the site's folder."""
     folder = Path(app.outdir) / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    code = [*ROOT.glob("pipelines/**/*.py"), ROOT / "tests" / "effects" / "catalogue.py", Path(signatures.__file__)]
+    code = [
+        *ROOT.glob("pipelines/**/*.py"),
+        ROOT / "tests" / "effects" / "catalogue.py",
+        Path(signatures.__file__),
+    ]
     changed = max(path.stat().st_mtime for path in code)
-    stale = [e for e in ours() if _chosen(app, e.name) and not _newer(folder / f"{e.name}.png", changed)]
-    for effect in status_iterator(stale, "drawing signatures... ", length=len(stale), stringify_func=lambda e: e.name):
+    stale = [
+        e for e in ours() if _chosen(app, e.name) and not _newer(folder / f"{e.name}.png", changed)
+    ]
+    for effect in status_iterator(
+        stale, "drawing signatures... ", length=len(stale), stringify_func=lambda e: e.name
+    ):
         draw(effect, folder / effect.name)
 
 
@@ -57,12 +66,16 @@ def _index(app: Sphinx) -> str:
     names = [effect.name for effect in ours()]
     shown = [f'<a href="{name}.html">{_image(name)}</a>' for name in names if _chosen(app, name)]
     pages = ["```{toctree}", ":hidden:", "", *names, "```"]
-    return "\n".join(["## Their signatures", "", '<div class="gallery">', *shown, "</div>", "", *pages, ""])
+    return "\n".join(
+        ["## Their signatures", "", '<div class="gallery">', *shown, "</div>", "", *pages, ""]
+    )
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Tell Sphinx."""
-    app.add_config_value("gallery_effects", [], "html", description="Effects to draw; all where none is named.")
+    app.add_config_value(
+        "gallery_effects", [], "html", description="Effects to draw; all where none is named."
+    )
     app.connect("builder-inited", draw_signatures)
     app.connect("source-read", add_figures)
     return {"parallel_read_safe": True}

@@ -1,6 +1,8 @@
-"""The site's navigation is docs/README.md: its sections, and the pages that their tables link to, in that order.
+"""The site's navigation is docs/README.md: its sections, and the pages that their tables link to,
+in that order.
 
-So a page is listed once, where readers of the repository find it too, and one that nobody listed is an error.
+So a page is listed once, where readers of the repository find it too, and one that nobody listed is
+an error.
 """
 
 import re
@@ -42,7 +44,9 @@ def leave_out_links_to_code(app: Sphinx, docname: str, source: list[str]) -> Non
 def front_page(app: Sphinx, exception: Exception | None) -> None:
     """Let the site open by its folder, as browsers and servers expect."""
     if exception is None:
-        shutil.copyfile(Path(app.outdir) / f"{app.config.root_doc}.html", Path(app.outdir) / "index.html")
+        shutil.copyfile(
+            Path(app.outdir) / f"{app.config.root_doc}.html", Path(app.outdir) / "index.html"
+        )
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -1,4 +1,5 @@
-"""A notebook's cells, run one after the other in this process, as Markdown with what they print and draw."""
+"""A notebook's cells, run one after the other in this process, as Markdown with what they print and
+draw."""
 
 import io
 import json

@@ -1,4 +1,5 @@
-"""Pictures of a report for README and docs, in docs/images: ``python docs/site/screenshots.py SESSION TITLE``.
+"""Pictures of a report for README and docs, in docs/images: ``python docs/site/screenshots.py
+SESSION TITLE``.
 
 Needs chromium, as the tests of the page do.
 """
@@ -20,9 +21,13 @@ IMAGES = Path(__file__).parents[1] / "images"
 DRAWN = "[...exoid.plots.values()].flat().every(u => u.status === 1)"
 
 
-def picture(browser: Browser, page: Path, to: Path, size: tuple[int, int], scheme: str, at: str = "#verdict") -> None:
+def picture(
+    browser: Browser, page: Path, to: Path, size: tuple[int, int], scheme: str, at: str = "#verdict"
+) -> None:
     """Write one picture of a page, from one of its parts on."""
-    tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)), color_scheme=scheme)
+    tab = browser.new_page(
+        viewport=dict(zip(("width", "height"), size, strict=True)), color_scheme=scheme
+    )
     tab.goto(page.as_uri())
     if at != "#verdict":
         tab.locator(at).evaluate("part => scrollTo({ top: part.offsetTop, behavior: 'instant' })")
@@ -34,9 +39,13 @@ def picture(browser: Browser, page: Path, to: Path, size: tuple[int, int], schem
 
 def pictures(session: Path, title: str) -> None:
     """Write all pictures of a session's report."""
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    chromium = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome")))
+    )
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        page, dark, narrow = (Path(folder) / name for name in ("report.html", "dark.png", "narrow.png"))
+        page, dark, narrow = (
+            Path(folder) / name for name in ("report.html", "dark.png", "narrow.png")
+        )
         page.write_text(report(find([session]), title), encoding="utf-8")
         args = ["--no-sandbox"] if os.geteuid() == 0 else []
         browser = playwright.chromium.launch(executable_path=chromium, args=args)
@@ -46,7 +55,10 @@ def pictures(session: Path, title: str) -> None:
         picture(browser, page, narrow, (390, 800), "light")
         browser.close()
         gap = ones((800, 20, 3))
-        imsave(IMAGES / "report-dark.png", concatenate([imread(dark)[..., :3], gap, imread(narrow)[..., :3]], axis=1))
+        imsave(
+            IMAGES / "report-dark.png",
+            concatenate([imread(dark)[..., :3], gap, imread(narrow)[..., :3]], axis=1),
+        )
 
 
 if __name__ == "__main__":

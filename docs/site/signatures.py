@@ -1,6 +1,8 @@
-"""Figures of what each effect leaves in a residual, drawn from a leg of the virtual rig that has it.
+"""Figures of what each effect leaves in a residual, drawn from a leg of the virtual rig that has
+it.
 
-`python docs/site/signatures.py FOLDER [EFFECT ...]` draws them; `make docs` does so for the effects' pages.
+`python docs/site/signatures.py FOLDER [EFFECT ...]` draws them; `make docs` does so for the
+effects' pages.
 """
 
 import sys
@@ -35,7 +37,9 @@ EXCITATION = FourierTrajectory(
 )
 """Moves both joints both ways through most of their range."""
 SECONDS = 20.0
-QUIET = PlantSettings(ripple_nm=(0.1, 0.1), temperature=TemperatureSettings(heating_c_nm2=0.05, time_constant_s=10.0))
+QUIET = PlantSettings(
+    ripple_nm=(0.1, 0.1), temperature=TemperatureSettings(heating_c_nm2=0.05, time_constant_s=10.0)
+)
 """Less noise than a rig has, and drives that warm at once: the figure is of the effect."""
 LARGE = {
     "backlash": (0.05,),
@@ -66,7 +70,11 @@ class Signature:
     @property
     def joint(self) -> int:
         """The joint at which most is left."""
-        return int(np.argmax([np.std(self.left[usable, j]) for j, usable in enumerate(self.regression.usable.T)]))
+        return int(
+            np.argmax(
+                [np.std(self.left[usable, j]) for j, usable in enumerate(self.regression.usable.T)]
+            )
+        )
 
     @property
     def told(self) -> str:
@@ -75,14 +83,21 @@ class Signature:
             return "what a model without it leaves"
         effect = self.term.effect
         values = zip(effect.parameters, effect.physical(self.term.values), strict=True)
-        sizes = [f"{p.name} {v:.3g}{'' if p.unit == '1' else ' ' + p.unit}" for p, v in values if v != p.default]
+        sizes = [
+            f"{p.name} {v:.3g}{'' if p.unit == '1' else ' ' + p.unit}"
+            for p, v in values
+            if v != p.default
+        ]
         while len(sizes) > 1 and len(", ".join(sizes)) > LONGEST_TITLE:
             sizes.pop()
-        return f"{f'at the {effect.joint}, ' if effect.joint else ''}{', '.join(sizes)}".replace("_", " ")
+        return f"{f'at the {effect.joint}, ' if effect.joint else ''}{', '.join(sizes)}".replace(
+            "_", " "
+        )
 
 
 def signature(effect: type[Effect]) -> Signature:
-    """Record a leg that has the effect, empty and with a wearer, and fit rigid body and friction to both runs.
+    """Record a leg that has the effect, empty and with a wearer, and fit rigid body and friction to
+    both runs.
 
     Of the baseline's own two effects it is what the other one leaves.
     """
@@ -100,7 +115,9 @@ def _sized(effect: type[Effect]) -> Term:
     """Return the effect at the last joint that can have it."""
     joint = places(effect)[-1]
     bound = effect(joint=joint)
-    return Term(bound, np.array(LARGE[effect.name])) if effect.name in LARGE else sized(effect, joint)
+    return (
+        Term(bound, np.array(LARGE[effect.name])) if effect.name in LARGE else sized(effect, joint)
+    )
 
 
 def _recorded(hidden: list[Term]) -> list[Motion]:
@@ -111,13 +128,18 @@ def _recorded(hidden: list[Term]) -> list[Motion]:
 
 
 def draw(effect: type[Effect], stem: Path) -> None:
-    """Write the signature of an effect as ``stem``.png: what is left against time, angle and speed."""
+    """Write the signature of an effect as ``stem``.png: what is left against time, angle and
+    speed."""
     made = signature(effect)
     r, joint = made.regression, made.joint
     name = THE_LEG.names[joint]
     left = made.left[:, joint]
     half = max(LEAST_NM, 1.15 * np.abs(left[r.usable[:, joint]]).max())
-    against = {"time, s": r.time, f"{name} angle, rad": r.state[0], f"{name} speed, rad/s": r.state[1]}
+    against = {
+        "time, s": r.time,
+        f"{name} angle, rad": r.state[0],
+        f"{name} speed, rad/s": r.state[1],
+    }
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 3, figsize=(8.4, 2.4), sharey=True, width_ratios=[4, 3, 3])
         for axis, (label, x) in zip(axes, against.items(), strict=True):
@@ -125,7 +147,13 @@ def draw(effect: type[Effect], stem: Path) -> None:
             axis.set(xlabel=label, ylim=(-half, half))
         axes[0].set_ylabel(f"left at the {name}, N·m")
         figure.suptitle(f"{effect.title}: {made.told}", x=0.01, ha="left", fontsize=9)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4, fontsize=8)
+        figure.legend(
+            *axes[0].get_legend_handles_labels(),
+            loc="upper right",
+            ncols=3,
+            markerscale=4,
+            fontsize=8,
+        )
         figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.96))
         save(figure, stem, kinds=["png"])
 

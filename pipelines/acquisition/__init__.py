@@ -1,1 +1,2 @@
-"""Acquisition: move the leg along an excitation on whatever a rig file describes, and keep every sample."""
+"""Acquisition: move the leg along an excitation on whatever a rig file describes, and keep every
+sample."""

@@ -81,9 +81,9 @@ def acquire(
         The rig's description; the excitation, ``trajectory/1`` or TOML.
     run : RunSettings
     output : Path
-        The recording. While it is being made, its samples are in ``<output>.journal``. A run that is stopped
-        raises DeviceError and leaves what there is in ``<output stem>.aborted.parquet``, so that nobody, make
-        included, takes it for a whole one.
+        The recording. While it is being made, its samples are in ``<output>.journal``. A run that
+        is stopped raises DeviceError and leaves what there is in ``<output stem>.aborted.parquet``,
+        so that nobody, make included, takes it for a whole one.
     sample_rate_hz : float
         Rate at which the rig samples.
     mechanism : MechanismSettings, optional
@@ -91,13 +91,14 @@ def acquire(
     report : callable
         Called about ten times a second with the progress.
     reset_faults : bool
-        Clear the faults that drives report before the run, with the control word that the rig file has for it.
+        Clear the faults that drives report before the run, with the control word that the rig file
+        has for it.
     begin : callable
-        Told the rig with the limits in force and the motion, both found fit, before anything is connected; what it
-        raises refuses the run.
+        Told the rig with the limits in force and the motion, both found fit, before anything is
+        connected; what it raises refuses the run.
     claim : callable
-        Called once no other run can record to ``output`` any more, before anything moves; what it raises refuses the
-        run.
+        Called once no other run can record to ``output`` any more, before anything moves; what it
+        raises refuses the run.
     """
     described = load_rig(rig_path)
     if run.run == "with_human":
@@ -137,7 +138,9 @@ def acquire(
     ):
         sensors = present.sensor if run.run == "with_human" else ()
         supervisor = Supervisor(present, sample_rate_hz, sensors)
-        recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults, claim)
+        recording = _record(
+            supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults, claim
+        )
         run_to_its_end(recording, supervisor.abort)
         return _finish(output, journal, supervisor)
 
@@ -153,7 +156,8 @@ async def _record(
     reset_faults: bool,
     claim: Callable[[], None],
 ) -> None:
-    """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
+    """Move the leg and write the journal, which says at its end why the run was stopped early, if
+    it was."""
     rig = supervisor.rig
     with_human = run.run == "with_human"
     machine = Machine(rig, with_sensors=with_human, samples_per_cycle=supervisor.samples_per_cycle)
@@ -191,11 +195,14 @@ def _opened(path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> Jou
         raise
 
 
-async def _ready(machine: Machine, rate_hz: float, reset_faults: bool, stopped_by: Sequence[str]) -> NDArray:
+async def _ready(
+    machine: Machine, rate_hz: float, reset_faults: bool, stopped_by: Sequence[str]
+) -> NDArray:
     """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
     await _heeding(machine.connect(), stopped_by)
     await _heeding(machine.refuse_driven(), stopped_by)
-    # Whatever comes meanwhile: each drive is to hear that it shall be idle, and no fault reset is left half way.
+    # Whatever comes meanwhile: each drive is to hear that it shall be idle, and no fault reset is
+    # left half way.
     if reset_faults:
         await machine.reset_faults()
     await machine.make_idle()
@@ -207,13 +214,16 @@ async def _ready(machine: Machine, rate_hz: float, reset_faults: bool, stopped_b
 
 
 async def _heeding(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T:
-    """Return what work comes to that only asks, and leave off at a signal however long a device is waited for."""
+    """Return what work comes to that only asks, and leave off at a signal however long a device is
+    waited for."""
     task = asyncio.ensure_future(work)
     try:
         while not task.done():
             await asyncio.wait([task], timeout=HEED_S)
             if stopped_by:
-                raise DeviceError(f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved")
+                raise DeviceError(
+                    f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved"
+                )
     except BaseException:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -223,7 +233,8 @@ async def _heeding(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T
 
 @contextmanager
 def _signals() -> Iterator[list[str]]:
-    """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them.
+    """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on
+    them.
 
     One that came too late to stop this run acts at its end: no other run is to begin after it.
     """
@@ -247,7 +258,9 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
     if supervisor.fault:
         log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
         return ExoidError, _left(supervisor, f"{supervisor.why}; please report it with {log}")
-    return DeviceError, _left(supervisor, supervisor.why) if supervisor.why else "the run is complete"
+    return DeviceError, _left(
+        supervisor, supervisor.why
+    ) if supervisor.why else "the run is complete"
 
 
 def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
@@ -264,8 +277,11 @@ def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
         return _recorded(output, lock, kind, told, supervisor.fault)
 
 
-def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None) -> Outcome:
-    """Write the recording and remove the journal; raise what was ``told`` where the run was stopped early."""
+def _recorded(
+    output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None
+) -> Outcome:
+    """Write the recording and remove the journal; raise what was ``told`` where the run was stopped
+    early."""
     path = lock.path
     try:
         journal = JournalFile(path)
@@ -279,20 +295,35 @@ def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault
             f"mended, `exoid recover {path}` makes one"
         ) from error
     if account.damaged:
-        left = f"{samples} samples are in {place}, but" if samples else "no sample of it can be read, since"
+        left = (
+            f"{samples} samples are in {place}, but"
+            if samples
+            else "no sample of it can be read, since"
+        )
         raise kind(
             f"{told}; {left} the disk did not give back all that was written; check the disk, {path} is kept"
         ) from fault
     lock.remove()
     if account.abort:
-        rest = f", its {samples} samples so far are in {place}" if samples else " before the recording began"
+        rest = (
+            f", its {samples} samples so far are in {place}"
+            if samples
+            else " before the recording began"
+        )
         raise kind(told + rest) from fault
-    return Outcome(place, samples, account.missed, account.found.get("latency", {}).get("left_out", 0))
+    return Outcome(
+        place, samples, account.missed, account.found.get("latency", {}).get("left_out", 0)
+    )
 
 
 def _left(supervisor: Supervisor, why: str) -> str:
-    """Return why a run was stopped, with how that has left the leg; what somebody must do at once comes first."""
-    return f"{why}; the leg was stopped" if supervisor.state is State.DISABLED else f"USE THE EMERGENCY STOP: {why}"
+    """Return why a run was stopped, with how that has left the leg; what somebody must do at once
+    comes first."""
+    return (
+        f"{why}; the leg was stopped"
+        if supervisor.state is State.DISABLED
+        else f"USE THE EMERGENCY STOP: {why}"
+    )
 
 
 def _keep_traceback(fault: BaseException, recording: Path) -> str:
@@ -307,9 +338,14 @@ def _keep_traceback(fault: BaseException, recording: Path) -> str:
 
 
 def _metadata(
-    rig: RigSettings, run: RunSettings, trajectory: Trajectory, sample_rate_hz: float, mechanism: MechanismSettings
+    rig: RigSettings,
+    run: RunSettings,
+    trajectory: Trajectory,
+    sample_rate_hz: float,
+    mechanism: MechanismSettings,
 ) -> dict[str, Any]:
-    """Return what the recording knows of itself; nothing of a virtual rig's plant but what a user would measure."""
+    """Return what the recording knows of itself; nothing of a virtual rig's plant but what a user
+    would measure."""
     metadata: dict[str, Any] = {
         "run": run.run,
         "purpose": run.purpose,

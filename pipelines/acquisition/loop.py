@@ -1,4 +1,5 @@
-"""The cycle that moves the leg: set-points out, samples in, and every drive disabled at its end whatever happens."""
+"""The cycle that moves the leg: set-points out, samples in, and every drive disabled at its end
+whatever happens."""
 
 import asyncio
 import time
@@ -92,17 +93,22 @@ class Loop:
         """Whether all of them are disabled, or could not be."""
 
     async def run(self) -> None:
-        """Follow the plan to its end, then disable the drives; the supervisor knows why that came early."""
+        """Follow the plan to its end, then disable the drives; the supervisor knows why that came
+        early."""
         try:
             self.supervisor.check_rest(await self.machine.look())
             await self._tended(self._follow(await self._enable()))
-        except BaseException as error:  # whatever it is: the drives come first, it is told after them
+        # Whatever it is: the drives come first, it is told after them.
+        except BaseException as error:
             self.supervisor.abort(error)
         await self._stop()
 
     def found(self) -> dict[str, Any]:
         """Return what the run found out for the recording's metadata."""
-        clocks, latency = self.sampling.clocks(self._recording_began or 0.0), self._latencies.metadata()
+        clocks, latency = (
+            self.sampling.clocks(self._recording_began or 0.0),
+            self._latencies.metadata(),
+        )
         late = {"latency": latency | {"left_out": self.supervisor.left_out}} if latency else {}
         return ({"clocks": clocks} if clocks else {}) | late
 
@@ -113,13 +119,20 @@ class Loop:
         return PhaseLock(self._rate, self.machine.count, rig.safety.watchdog_s)
 
     async def _tended(self, following: Coroutine) -> None:
-        """Follow the plan, and tend every drive meanwhile, until one of these ends; the supervisor is told why."""
+        """Follow the plan, and tend every drive meanwhile, until one of these ends; the supervisor
+        is told why."""
         follow = asyncio.ensure_future(following)
-        if self.machine.rig.clock == "real_time":  # in lockstep no time passes while somebody is waited for
-            self._tending = [asyncio.ensure_future(self._tend(joint)) for joint in range(len(self.machine.drives))]
+        # In lockstep no time passes while somebody is waited for.
+        if self.machine.rig.clock == "real_time":
+            self._tending = [
+                asyncio.ensure_future(self._tend(joint))
+                for joint in range(len(self.machine.drives))
+            ]
         ended = set[asyncio.Future]()
         try:
-            ended, _ = await asyncio.wait([follow, *self._tending], return_when=asyncio.FIRST_COMPLETED)
+            ended, _ = await asyncio.wait(
+                [follow, *self._tending], return_when=asyncio.FIRST_COMPLETED
+            )
         finally:
             self._followed.set()
             follow.cancel()
@@ -154,12 +167,16 @@ class Loop:
                 self._tell()
 
     async def _resume(self) -> tuple[int, float]:
-        """Ask the drives what they made of a silence; return the cycle that the first one told, and when that was."""
-        (first, told_at), *_ = await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
+        """Ask the drives what they made of a silence; return the cycle that the first one told, and
+        when that was."""
+        (first, told_at), *_ = await all_answers(
+            self._find(joint) for joint in range(len(self.machine.drives))
+        )
         return first.sequence // self.machine.samples_per_cycle, told_at
 
     async def _find(self, joint: int) -> tuple[Reading, float]:
-        """Ask a drive where it is, to go on from there; return what it told, and when, host's clock, s."""
+        """Ask a drive where it is, to go on from there; return what it told, and when, host's
+        clock, s."""
         told = self.supervisor.sent_at[joint]
         reading, now = await self.machine.drives[joint].look(in_motion=True), time.monotonic()
         if self.supervisor.sent_at[joint] == told:
@@ -189,7 +206,8 @@ class Loop:
                 patience = SLACK_SAMPLES * period
             elif drive.device.awaited_s > period:  # it is the one who is awaited
                 look_at = time.monotonic() + LOOK_PAUSE * period
-            elif held_up and due > look_at:  # by this computer, and so was whoever follows the plan: it goes first
+            # By this computer, and so was whoever follows the plan: it goes first.
+            elif held_up and due > look_at:
                 look_at = time.monotonic() + period
             else:
                 await self._tell_alone(joint)
@@ -214,14 +232,16 @@ class Loop:
                 self.supervisor.judge_tended(joint, reading)
 
     async def _enable(self) -> Row:
-        """Enable the drives where the leg stands; return the first sample at which they say that they are."""
+        """Enable the drives where the leg stands; return the first sample at which they say that
+        they are."""
         began = time.monotonic()
         while True:
             self._heed_signals()
             answers = await self._exchange(self.supervisor.rest)
             if row := self.supervisor.enabled(answers, time.monotonic() - began):
                 break
-            await self.machine.forget_records()  # else what comes meanwhile would be in the way once the leg moves
+            # Else what comes meanwhile would be in the way once the leg moves.
+            await self.machine.forget_records()
             await asyncio.sleep(1.0 / self._rate)
         self._enabled_at = self._reported = time.monotonic()
         self.supervisor.begin(row, self._enabled_at)
@@ -242,7 +262,8 @@ class Loop:
         return answers
 
     async def _tell_in_turn(self, decide: Decide, drive: Drive) -> Reading:
-        """Tell a drive its set-point, decided when its turn has come: by then it may have gone on by itself."""
+        """Tell a drive its set-point, decided when its turn has come: by then it may have gone on
+        by itself."""
         joint = self.machine.drives.index(drive)
         async with drive.device.turn():
             now = time.monotonic()
@@ -252,14 +273,18 @@ class Loop:
             return await drive.exchange(decide(joint, time.monotonic()))
 
     def _heed(self, joint: int) -> None:
-        """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
+        """Heed what a drive has told, though it came beside what is awaited, or ended the run, or
+        was asked again."""
         conditions = self.machine.drives[joint].conditions
         while conditions:
             self.supervisor.heed(joint, conditions.pop(0))
 
     def _keep(self, row: Row) -> None:
         """Write a sample, and note those missed before it."""
-        sample, stop = self.supervisor.sample(row), (self.plan.stop - self.plan.first) * row.samples_per_cycle
+        sample, stop = (
+            self.supervisor.sample(row),
+            (self.plan.stop - self.plan.first) * row.samples_per_cycle,
+        )
         missing = range(self._next, min(sample, stop))
         if missing:
             self.gaps.append((missing.start / self._samples_hz, len(missing)))
@@ -269,14 +294,27 @@ class Loop:
         if self._recording_began is None:
             self._recording_began = row.time - sample / self._samples_hz
         try:
-            self.journal.append([row.time - self._recording_began, *(value(row) for value in self._columns.values())])
+            self.journal.append(
+                [
+                    row.time - self._recording_began,
+                    *(value(row) for value in self._columns.values()),
+                ]
+            )
         except OSError as error:
             raise DeviceError(f"the journal cannot be written ({error})") from error
 
     def _tell(self) -> None:
         """Report how far the run is."""
-        self._reported, row, duration = time.monotonic(), self._row, (self.plan.stop - self.plan.first) / self._rate
-        state, why, enabled = self.supervisor.state, self.supervisor.why, self.supervisor.still_enabled
+        self._reported, row, duration = (
+            time.monotonic(),
+            self._row,
+            (self.plan.stop - self.plan.first) / self._rate,
+        )
+        state, why, enabled = (
+            self.supervisor.state,
+            self.supervisor.why,
+            self.supervisor.still_enabled,
+        )
         if row is None:
             self.report(Progress(state, duration_s=duration, abort=why, still_enabled=enabled))
             return
@@ -314,7 +352,8 @@ class Loop:
             await self._disable(j) if stop.cancelled() else stop.result()
             for j, stop in zip(touched, stops, strict=True)
         ]
-        self.supervisor.finish(list(dict.fromkeys(filter(None, complaints))))  # a lost line is one complaint
+        # A lost line is one complaint.
+        self.supervisor.finish(list(dict.fromkeys(filter(None, complaints))))
         self._tell_stop()
 
     def _tell_stop(self) -> None:
@@ -325,23 +364,28 @@ class Loop:
             self.supervisor.abort(error)
 
     async def _stop_drive(self, joint: int) -> str | None:
-        """Slow one drive down and disable it, whatever happens to the others; return why it could not be disabled."""
+        """Slow one drive down and disable it, whatever happens to the others; return why it could
+        not be disabled."""
         drive, period = self.machine.drives[joint], 1.0 / self._rate
         answered = time.monotonic()
         try:
             for tending in self._tending[joint : joint + 1]:  # may be waiting for an answer still
                 await _outlive([tending], self.supervisor.abort)
-                # Whatever ended it is a reason to stop, and none to stop otherwise than all others do.
+                # Whatever ended it is a reason to stop, and none to stop otherwise than all others
+                # do.
                 if not tending.cancelled() and (error := tending.exception()):
                     self.supervisor.abort(error)
             self._heed(joint)
             due_at = float(self.supervisor.sent_at[joint])
             while True:
-                # On the host's clock: the device's counter may be what has failed. A sample after the last was due, not
-                # after it was answered: a drive that samples before a set-point comes goes on by itself, and is led
-                # back with a jerk. What was late by more than half a sample is not caught up with.
+                # On the host's clock: the device's counter may be what has failed. A sample after
+                # the last was due, not after it was answered: a drive that samples before a
+                # set-point comes goes on by itself, and is led back with a jerk. What was late by
+                # more than half a sample is not caught up with.
                 due_at = max(due_at, float(self.supervisor.sent_at[joint]) - 0.5 * period) + period
-                await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due_at - time.monotonic()))
+                await asyncio.sleep(
+                    0.0 if drive.in_lockstep else max(0.0, due_at - time.monotonic())
+                )
                 try:
                     async with drive.device.turn():
                         if self.supervisor.is_stale(joint, time.monotonic()):
@@ -353,10 +397,12 @@ class Loop:
                         answered = time.monotonic()
                         self.supervisor.hear(joint, answered)
                         self.supervisor.feel(joint, reading)
-                except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
+                # A lost reply alone is no reason to take a moving leg's torque away.
+                except Unanswered:
                     if time.monotonic() - answered > self.machine.rig.safety.watchdog_s:
                         raise
-        except BaseException as error:  # whatever it is, the drive may still hear that it shall disable
+        # Whatever it is, the drive may still hear that it shall disable.
+        except BaseException as error:
             self.supervisor.abort(error)
         self._at_rest(joint)
         return await self._disable(joint)
@@ -373,9 +419,12 @@ class Loop:
                 if left < DISABLE_TRIES:
                     await self._until_others_rest(joint)
                     await drive.device.line.renew()
-                await drive.disable(float(self.supervisor.sent[joint]), in_motion=left == DISABLE_TRIES)
+                await drive.disable(
+                    float(self.supervisor.sent[joint]), in_motion=left == DISABLE_TRIES
+                )
                 return None
-            except asyncio.CancelledError as error:  # it may have waited for its turn: that was no try
+            # It may have waited for its turn: that was no try.
+            except asyncio.CancelledError as error:
                 complaint = f"{drive.device.label}: {error!r}"
                 continue
             except DeviceError as error:
@@ -386,27 +435,30 @@ class Loop:
         return complaint
 
     async def _until_others_rest(self, joint: int) -> None:
-        """Wait until nobody else on a drive's line is being slowed down: a new connection takes long."""
+        """Wait until nobody else on a drive's line is being slowed down: a new connection takes
+        long."""
         drives = self.machine.drives
         while any(drives[j].device.line is drives[joint].device.line for j in self._moving):
             await asyncio.sleep(1.0 / self._rate)
 
     async def _feel(self) -> None:
-        """Watch the cuffs while the drives slow down: whoever is still pressed is not to be held there."""
+        """Watch the cuffs while the drives slow down: whoever is still pressed is not to be held
+        there."""
         try:
             while not self.supervisor.pressing:
                 self.supervisor.feel_cuffs(await self.machine.felt())
                 await asyncio.sleep(1.0 / self._rate)
         except BaseException as error:
-            if not (self._stopped and isinstance(error, asyncio.CancelledError)):  # so it was told to end
+            # So it was told to end.
+            if not (self._stopped and isinstance(error, asyncio.CancelledError)):
                 self.supervisor.abort(error)
 
 
 def run_to_its_end(run: Coroutine, note: Callable[[BaseException], None]) -> None:
     """Run a coroutine to its end in an event loop of its own, and whatever it raises there.
 
-    An exception that ends the loop itself, as KeyboardInterrupt does, is noted, and the loop goes on: the coroutine
-    has drives to disable.
+    An exception that ends the loop itself, as KeyboardInterrupt does, is noted, and the loop goes
+    on: the coroutine has drives to disable.
     """
     with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         loop = runner.get_loop()
@@ -415,13 +467,15 @@ def run_to_its_end(run: Coroutine, note: Callable[[BaseException], None]) -> Non
             try:
                 return loop.run_until_complete(task)
             except BaseException as error:
-                if task.done() or not left:  # a loop that ends each time will not disable a drive any more
+                # A loop that ends each time will not disable a drive any more.
+                if task.done() or not left:
                     raise
                 note(error)
 
 
 async def _outlive(tasks: Iterable[asyncio.Future], note: Callable[[BaseException], None]) -> None:
-    """Wait until all tasks have ended; what asks this one to end meanwhile is noted, and does not end them."""
+    """Wait until all tasks have ended; what asks this one to end meanwhile is noted, and does not
+    end them."""
     pending = set(tasks)
     while pending:
         try:

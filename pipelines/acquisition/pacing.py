@@ -8,21 +8,25 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
 
 LEAN = 0.005
-"""Share of a sample period by which a look at the counter comes earlier than one period after the last."""
+"""Share of a sample period by which a look at the counter comes earlier than one period after the
+last."""
 STEP_BACK = 0.1
 """Share of a sample period to wait after a look that came too early."""
 SLOW = 0.3
-"""Share of a sample period after which an answer is too old to build on, where nobody knows when the next sample is
-latched."""
+"""Share of a sample period after which an answer is too old to build on, where nobody knows when
+the next sample is latched."""
 
 
 @contextmanager
 def urgent() -> Iterator[None]:
-    """Ask the system to let this process go first: a sample that is not fetched within its period is lost.
+    """Ask the system to let this process go first: a sample that is not fetched within its period
+    is lost.
 
-    Linux grants that to privileged users; others take their chance with whatever else the computer does.
+    Linux grants that to privileged users; others take their chance with whatever else the computer
+    does.
     """
-    gc.freeze()  # else looking through all that was imported would cost several samples now and then
+    # Else looking through all that was imported would cost several samples now and then.
+    gc.freeze()
     granted = False
     with suppress(PermissionError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -44,8 +48,8 @@ class Lockstep:
     async def wait(self, last: int) -> int:
         """Return at once; the exchange after that of sample ``last`` finds the next one.
 
-        Where that exchange has brought nothing, it is looked up which one is next: the answer may have been lost, or
-        the request.
+        Where that exchange has brought nothing, it is looked up which one is next: the answer may
+        have been lost, or the request.
         """
         again, self._asked = last == self._asked, last
         return max(last + 1, await self._counter()) if again else last + 1
@@ -54,22 +58,27 @@ class Lockstep:
 class PhaseLock:
     """The host's clock locked to the devices' samples, of which only the counter is seen.
 
-    Each look at the counter leans a little towards the instant at which a sample is latched, and steps back when
-    it came too early. So the exchange that follows has nearly the whole sample to be made in, whichever of the two
-    clocks runs faster; and it is known which sample it finds, so that each set-point comes at its time.
+    Each look at the counter leans a little towards the instant at which a sample is latched, and
+    steps back when it came too early. So the exchange that follows has nearly the whole sample to
+    be made in, whichever of the two clocks runs faster; and it is known which sample it finds, so
+    that each set-point comes at its time.
     """
 
-    def __init__(self, sample_rate_hz: float, counter: Callable[[], Awaitable[int]], patience_s: float) -> None:
+    def __init__(
+        self, sample_rate_hz: float, counter: Callable[[], Awaitable[int]], patience_s: float
+    ) -> None:
         self._period = 1.0 / sample_rate_hz
         self._counter = counter
         self._patience_s = patience_s
         self._due = time.perf_counter()
         self._found: int | None = None
         self._early: tuple[float, int] | None = None
-        """When a look came too early, and which sample it found: the one after it was latched later than that."""
+        """When a look came too early, and which sample it found: the one after it was latched later
+        than that."""
 
     async def wait(self, last: int) -> int:
-        """Wait until a sample after ``last`` is latched that was not waited for yet; return it, or ``last`` if none is.
+        """Wait until a sample after ``last`` is latched that was not waited for yet; return it, or
+        ``last`` if none is.
 
         What was waited for and not brought by an exchange has had its time all the same.
         """
@@ -92,13 +101,15 @@ class PhaseLock:
             self._due = now + STEP_BACK * self._period
 
     def _fresh_until(self, found: int, asked: float) -> float:
-        """Return until when a sample that a look found is surely the newest, host's clock, s; ``asked`` is the look's.
+        """Return until when a sample that a look found is surely the newest, host's clock, s;
+        ``asked`` is the look's.
 
         Samples follow one another in equal periods since the last look that came too early.
         """
         soon = asked + SLOW * self._period
         since, then = self._early or (asked, found)
-        # Looks come too early every so often; where none has for long, the clocks are further apart than they lean.
+        # Looks come too early every so often; where none has for long, the clocks are further apart
+        # than they lean.
         if not 0 <= found - then <= 0.5 / LEAN:
             return soon
         return max(soon, since + (found - then) * (1.0 - LEAN) * self._period)

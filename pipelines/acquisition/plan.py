@@ -1,4 +1,5 @@
-"""All set-points of a run, made and checked before anything moves: from rest into the motion, the run, back to rest."""
+"""All set-points of a run, made and checked before anything moves: from rest into the motion, the
+run, back to rest."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -30,13 +31,17 @@ class Plan:
 
 
 def make_plan(
-    rig: RigSettings, trajectory: Trajectory, start: NDArray, duration_s: float, sample_rate_hz: float
+    rig: RigSettings,
+    trajectory: Trajectory,
+    start: NDArray,
+    duration_s: float,
+    sample_rate_hz: float,
 ) -> Plan:
     """Plan a run, or refuse it.
 
-    The ramp is a smooth share, 0 to 1, of the motion itself, so the leg leaves rest without a jump in speed
-    and arrives in the motion at its speed. ``settle_s`` later the recording begins, in phase with the
-    trajectory's start. The same share, 1 to 0, leads back to where the leg stood.
+    The ramp is a smooth share, 0 to 1, of the motion itself, so the leg leaves rest without a jump
+    in speed and arrives in the motion at its speed. ``settle_s`` later the recording begins, in
+    phase with the trajectory's start. The same share, 1 to 0, leads back to where the leg stood.
 
     Parameters
     ----------
@@ -53,8 +58,11 @@ def make_plan(
     return Plan(reference, reference.first, reference.stop)
 
 
-def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float) -> int:
-    """Return how many set-points a run has, or refuse a trajectory that is too short or leaves the rig's limits."""
+def check_trajectory(
+    rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float
+) -> int:
+    """Return how many set-points a run has, or refuse a trajectory that is too short or leaves the
+    rig's limits."""
     if duration_s > trajectory.duration_s + 1e-9:
         raise InputError(
             f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's duration_s is "
@@ -65,14 +73,17 @@ def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float
     run = SetPoints(nowhere, partial(_run, trajectory, sample_rate_hz), samples, nowhere)
     for first, piece in run.pieces():
         _refuse_outside(rig, piece, first, sample_rate_hz)
-        _refuse_what_set_points_do_not_show(rig, trajectory, first, first + len(piece), sample_rate_hz)
+        _refuse_what_set_points_do_not_show(
+            rig, trajectory, first, first + len(piece), sample_rate_hz
+        )
     return samples
 
 
 def _refuse_what_set_points_do_not_show(
     rig: RigSettings, trajectory: Trajectory, begin: int, end: int, rate: float
 ) -> None:
-    """Refuse a motion too fast for so few set-points: from one to the next it turns round, and they show a slow one."""
+    """Refuse a motion too fast for so few set-points: from one to the next it turns round, and they
+    show a slow one."""
     for share in (0.5, 0.75):  # where the one shows a standstill, the other does not
         speed = trajectory.at((np.arange(begin, end) + share) / rate)[1]
         for j, drive in enumerate(rig.drive):
@@ -87,7 +98,8 @@ def _refuse_what_set_points_do_not_show(
 
 def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) -> NDArray:
     """Return set-points (n, J) of the recorded part, from one sample to before another."""
-    # A set-point is reached half a sample after the instant it belongs to, the middle of the window.
+    # A set-point is reached half a sample after the instant it belongs to, the middle of the
+    # window.
     return trajectory.at((np.arange(begin, end) + 0.5) / sample_rate_hz)[0]
 
 
@@ -104,15 +116,23 @@ def check_start(rig: RigSettings, angle: NDArray) -> str | None:
 
 
 def _ramp(
-    rig: RigSettings, trajectory: Trajectory, rest: NDArray, rate: float, *, before: bool, end_s: float
+    rig: RigSettings,
+    trajectory: Trajectory,
+    rest: NDArray,
+    rate: float,
+    *,
+    before: bool,
+    end_s: float,
 ) -> NDArray:
-    """Return the shortest ramp from or to rest that keeps the limits, with the settling time (n, J)."""
+    """Return the shortest ramp from or to rest that keeps the limits, with the settling time (n,
+    J)."""
     ramp_s = rig.safety.ramp_s
     settle_s = rig.safety.settle_s if before else 0.0
     while ramp_s <= LONGEST_RAMP_S:
         ahead = (np.arange(round((ramp_s + settle_s) * rate)) + 0.5) / rate
         share = smooth_share(ahead / ramp_s)[:, np.newaxis]
-        # Time runs backwards from the motion's beginning, forwards from its end; the share grows towards it.
+        # Time runs backwards from the motion's beginning, forwards from its end; the share grows
+        # towards it.
         motion = _extended(trajectory, -ahead[::-1] if before else end_s + ahead)
         reference = rest + (share if before else share[::-1]) * (motion - rest)
         path = np.vstack([rest, reference] if before else [reference, rest])
@@ -128,22 +148,28 @@ def _ramp(
 
 
 def _extended(trajectory: Trajectory, time: NDArray) -> NDArray:
-    """Return angles (n, J) at times before or after the motion; one that runs once stands still there."""
+    """Return angles (n, J) at times before or after the motion; one that runs once stands still
+    there."""
     if trajectory.period_s is None:
         time = np.clip(time, 0.0, trajectory.duration_s)
     return trajectory.at(np.mod(time, trajectory.period_s) if trajectory.period_s else time)[0]
 
 
 def _first_outside(values: NDArray, low: float, high: float) -> int | None:
-    """Return where values (n,) first leave a range or are no numbers; None where all of them keep it."""
+    """Return where values (n,) first leave a range or are no numbers; None where all of them keep
+    it."""
     outside = ~((values >= low) & (values <= high))
     return int(np.argmax(outside)) if outside.any() else None
 
 
-def _refuse_ramps_outside(rig: RigSettings, reference: SetPoints, rest: NDArray, rate: float) -> None:
-    """Refuse a plan whose ways into and out of the run, or the seams between, leave the drives' limits.
+def _refuse_ramps_outside(
+    rig: RigSettings, reference: SetPoints, rest: NDArray, rate: float
+) -> None:
+    """Refuse a plan whose ways into and out of the run, or the seams between, leave the drives'
+    limits.
 
-    A run shorter than the trajectory's period does not show where the ramps lead: they run its other phases.
+    A run shorter than the trajectory's period does not show where the ramps lead: they run its
+    other phases.
     """
     for first, piece in reference.pieces():
         begins, ends = first == 0, first + len(piece) == len(reference)
@@ -152,8 +178,11 @@ def _refuse_ramps_outside(rig: RigSettings, reference: SetPoints, rest: NDArray,
         _refuse_piece_outside(rig, reference, path, first + (0 if begins else 1), rate)
 
 
-def _refuse_piece_outside(rig: RigSettings, reference: SetPoints, path: NDArray, first: int, rate: float) -> None:
-    """Refuse a piece (n, J) of the path that begins and ends where the leg stands; its number in that is ``first``."""
+def _refuse_piece_outside(
+    rig: RigSettings, reference: SetPoints, path: NDArray, first: int, rate: float
+) -> None:
+    """Refuse a piece (n, J) of the path that begins and ends where the leg stands; its number in
+    that is ``first``."""
     speed = np.diff(path, axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad

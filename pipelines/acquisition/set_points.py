@@ -1,4 +1,5 @@
-"""Set-points that are computed when they come due: an hour of them takes no more memory than a minute."""
+"""Set-points that are computed when they come due: an hour of them takes no more memory than a
+minute."""
 
 from collections.abc import Callable, Iterator
 
@@ -6,16 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 BLOCK = 256
-"""Set-points that are computed at once while the leg moves; so few that no sample waits for them."""
+"""Set-points that are computed at once while the leg moves; so few that no sample waits for
+them."""
 PIECE = 65536
 """Set-points that are looked at at once before."""
 
 
 class SetPoints:
-    """Set-points (n, J) rad, one a sample: the way in, the run, the way out. Indexed like an array's rows."""
+    """Set-points (n, J) rad, one a sample: the way in, the run, the way out. Indexed like an
+    array's rows."""
 
-    def __init__(self, lead_in: NDArray, run: Callable[[int, int], NDArray], samples: int, lead_out: NDArray) -> None:
-        """Join ways in and out, (n, J) rad, with a run of so many samples; ``run`` computes it from one to another."""
+    def __init__(
+        self, lead_in: NDArray, run: Callable[[int, int], NDArray], samples: int, lead_out: NDArray
+    ) -> None:
+        """Join ways in and out, (n, J) rad, with a run of so many samples; ``run`` computes it from
+        one to another."""
         self.first, self.stop = len(lead_in), len(lead_in) + samples
         self._lead_in, self._run, self._lead_out = lead_in, run, lead_out
         self._begin, self._block = 0, lead_in[:0]
@@ -34,11 +40,17 @@ class SetPoints:
     def between(self, begin: int, end: int) -> NDArray:
         """Return set-points ``begin`` to before ``end``, (end - begin, J) rad."""
         first, stop = self.first, self.stop
-        before, after = self._lead_in[begin:end], self._lead_out[max(begin - stop, 0) : max(end - stop, 0)]
+        before, after = (
+            self._lead_in[begin:end],
+            self._lead_out[max(begin - stop, 0) : max(end - stop, 0)],
+        )
         begin, end = max(begin, first), min(end, stop)
-        return np.concatenate([before, *([self._run(begin - first, end - first)] if begin < end else []), after])
+        return np.concatenate(
+            [before, *([self._run(begin - first, end - first)] if begin < end else []), after]
+        )
 
     def pieces(self) -> Iterator[tuple[int, NDArray]]:
-        """Yield all in pieces (k, J), each with its first index; a piece begins with the last one of the one before."""
+        """Yield all in pieces (k, J), each with its first index; a piece begins with the last one
+        of the one before."""
         for begin in range(0, len(self), PIECE):
             yield max(begin - 1, 0), self.between(max(begin - 1, 0), min(begin + PIECE, len(self)))

@@ -51,4 +51,6 @@ def contract_of(path: Path | str) -> Contract:
         if contract.name == name:
             return contract
     known = ", ".join(contract.label for contract in CONTRACTS)
-    raise ContractError(f"{path}: holds {metadata['contract']}, which exoid does not know; it knows {known}")
+    raise ContractError(
+        f"{path}: holds {metadata['contract']}, which exoid does not know; it knows {known}"
+    )

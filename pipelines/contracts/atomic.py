@@ -11,20 +11,24 @@ from pipelines.contracts.sameness import same_but_for_the_time
 from pipelines.errors import ExoidError, InputError
 
 TEMPORARY = ".tmp"
-"""What the names of files and folders end in that are not yet what they are to be; they begin with a dot."""
+"""What the names of files and folders end in that are not yet what they are to be; they begin with
+a dot."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``; what was written there becomes ``path`` once the block ends well.
+    """Yield a temporary path beside ``path``; what was written there becomes ``path`` once the
+    block ends well.
 
-    The folder is made if need be. On any failure, Ctrl-C included, the temporary file goes and ``path``
-    stays as it was; so it does, with a new time, where nothing but ``created_at`` would be another.
+    The folder is made if need be. On any failure, Ctrl-C included, the temporary file goes and
+    ``path`` stays as it was; so it does, with a new time, where nothing but ``created_at`` would be
+    another.
     """
     refuse_what_is_no_file(path)
     path = Path(os.path.realpath(path))  # a link keeps pointing at the file it names
     path.parent.mkdir(parents=True, exist_ok=True)
-    # Not tempfile: its files are readable by their owner alone, and would stay so under the final name.
+    # Not tempfile: its files are readable by their owner alone, and would stay so under the final
+    # name.
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{TEMPORARY}")
     try:
         yield temporary
@@ -40,7 +44,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def refuse_what_is_no_file(path: Path) -> None:
-    """Refuse to replace a folder, a pipe or a device: a file in its place would take it from all who use it."""
+    """Refuse to replace a folder, a pipe or a device: a file in its place would take it from all
+    who use it."""
     _refuse_the_dash(path)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"
@@ -49,15 +54,18 @@ def refuse_what_is_no_file(path: Path) -> None:
 
 def _refuse_the_dash(path: Path) -> None:
     if path.name == "-":
-        raise InputError("-: stands for no standard output here, and would be a file of that name; name another")
+        raise InputError(
+            "-: stands for no standard output here, and would be a file of that name; name another"
+        )
 
 
 @contextmanager
 def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
-    """Yield a temporary folder within ``folder``; the files written there move up once the block ends well.
+    """Yield a temporary folder within ``folder``; the files written there move up once the block
+    ends well.
 
-    On any failure, Ctrl-C included, they go and ``folder`` stays as it was. The one whose name is ``vouching`` moves
-    last, and never stands beside others than those it was made with.
+    On any failure, Ctrl-C included, they go and ``folder`` stays as it was. The one whose name is
+    ``vouching`` moves last, and never stands beside others than those it was made with.
     """
     with tempfile.TemporaryDirectory(prefix=".", suffix=TEMPORARY, dir=folder) as temporary:
         try:
@@ -67,7 +75,10 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
         except OSError as error:
             error.filename = error.filename and str(error.filename).replace(temporary, str(folder))
             raise
-        made = {file: Path(os.path.realpath(folder / file.name)) for file in sorted(Path(temporary).iterdir())}
+        made = {
+            file: Path(os.path.realpath(folder / file.name))
+            for file in sorted(Path(temporary).iterdir())
+        }
         for path in made.values():
             refuse_what_is_no_file(path)
         same = {file: same_but_for_the_time(path, file) for file, path in made.items()}
@@ -79,7 +90,8 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
 
 
 def _put(made: Path, path: Path, *, is_same: bool) -> None:
-    """Put a file in its place, unless it says what the one there says, of which others may know the hash."""
+    """Put a file in its place, unless it says what the one there says, of which others may know the
+    hash."""
     if is_same:
         os.utime(path)  # make goes by times
         made.unlink()
@@ -89,7 +101,8 @@ def _put(made: Path, path: Path, *, is_same: bool) -> None:
 
 @contextmanager
 def folder_to_fill(path: Path) -> Iterator[None]:
-    """Open a folder for what is made in the block; where that fails, the folders that were made for it go again."""
+    """Open a folder for what is made in the block; where that fails, the folders that were made for
+    it go again."""
     made = [folder for folder in (path, *path.parents) if not folder.exists()]
     open_folder(path)
     try:
@@ -102,12 +115,14 @@ def folder_to_fill(path: Path) -> Iterator[None]:
 
 
 def leftovers(folder: Path) -> list[Path]:
-    """Return what killed runs left of their work within a folder, or what others have at work there now."""
+    """Return what killed runs left of their work within a folder, or what others have at work there
+    now."""
     return sorted(folder.glob(f".*{TEMPORARY}"))
 
 
 def open_folder(path: Path) -> None:
-    """Make a folder; where nothing can be written in it, raise the system's refusal before the work, not after it."""
+    """Make a folder; where nothing can be written in it, raise the system's refusal before the
+    work, not after it."""
     _refuse_the_dash(path)
     path.mkdir(parents=True, exist_ok=True)
     try:

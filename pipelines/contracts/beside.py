@@ -12,5 +12,8 @@ def journal_of(output: Path) -> Path:
 
 
 def aborted_of(output: Path, number: int = 1) -> Path:
-    """Return where the recording of a run that was stopped early lies: so nobody, make included, takes it for whole."""
-    return output.with_name(f"{output.stem}.aborted{'' if number == 1 else f'-{number}'}{output.suffix}")
+    """Return where the recording of a run that was stopped early lies: so nobody, make included,
+    takes it for whole."""
+    return output.with_name(
+        f"{output.stem}.aborted{'' if number == 1 else f'-{number}'}{output.suffix}"
+    )

@@ -1,4 +1,5 @@
-"""What the values of a column must keep; each check names column, first bad row (counted from 0) and remedy."""
+"""What the values of a column must keep; each check names column, first bad row (counted from 0)
+and remedy."""
 
 import re
 from collections.abc import Sequence
@@ -13,8 +14,8 @@ from pipelines.errors import ContractError
 
 # No joint of a leg turns one and a half times; a hip that swings through 20 degrees "reaches" 20.
 LARGEST_ANGLE_RAD = 3 * np.pi
-# In SI no joint, drive or sensor has as much of anything, whatever unit it was taken for; the squares of a file's
-# rows still have a sum.
+# In SI no joint, drive or sensor has as much of anything, whatever unit it was taken for; the
+# squares of a file's rows still have a sum.
 LARGEST = 1e12
 
 
@@ -37,14 +38,16 @@ class Place:
 def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.ChunkedArray:
     """Return the column in the contract's type where nothing is lost by it; refuse it otherwise.
 
-    Other tools write float32, integers, decimals or large strings where the contract has float64, int64 or
-    string. Every number of any width is taken for a number as long as its value survives.
+    Other tools write float32, integers, decimals or large strings where the contract has float64,
+    int64 or string. Every number of any width is taken for a number as long as its value survives.
     """
     if column.type == dtype:
         return column
     found, expected = type_name(column.type), type_name(dtype)
     if not _alike(column.type, dtype):
-        raise ContractError(f"{where}: found type {found}, expected {expected}; write the column as {expected}")
+        raise ContractError(
+            f"{where}: found type {found}, expected {expected}; write the column as {expected}"
+        )
     try:
         return column.cast(dtype)
     except pa.ArrowException as error:
@@ -71,7 +74,11 @@ def _alike(found: pa.DataType, expected: pa.DataType) -> bool:
 
 
 def _is_list(dtype: pa.DataType) -> bool:
-    return pa.types.is_list(dtype) or pa.types.is_large_list(dtype) or pa.types.is_fixed_size_list(dtype)
+    return (
+        pa.types.is_list(dtype)
+        or pa.types.is_large_list(dtype)
+        or pa.types.is_fixed_size_list(dtype)
+    )
 
 
 def _is_number(dtype: pa.DataType) -> bool:
@@ -80,7 +87,11 @@ def _is_number(dtype: pa.DataType) -> bool:
 
 def is_text(dtype: pa.DataType) -> bool:
     """Tell whether a type is one of Arrow's for text."""
-    return pa.types.is_string(dtype) or pa.types.is_large_string(dtype) or pa.types.is_string_view(dtype)
+    return (
+        pa.types.is_string(dtype)
+        or pa.types.is_large_string(dtype)
+        or pa.types.is_string_view(dtype)
+    )
 
 
 def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> None:
@@ -90,7 +101,9 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> Non
         row = int(np.argmax(missing))
         number = pa.types.is_floating(column.type)
         found, expected = (
-            ("NaN", "a finite number") if number else ("null", f"a value of type {type_name(column.type)}")
+            ("NaN", "a finite number")
+            if number
+            else ("null", f"a value of type {type_name(column.type)}")
         )
         raise ContractError(f"{where.row(row)}: found {found}, expected {expected}; {_MEND_ROWS}")
     if pa.types.is_floating(column.type):
@@ -107,7 +120,10 @@ _MEND_ROWS = "mend or drop the row and write the file again"
 
 def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where: Place) -> None:
     """Refuse text that is none of the choices."""
-    strange = pc.invert(pc.is_in(column, value_set=pa.array(choices))).to_numpy() & column.is_valid().to_numpy()
+    strange = (
+        pc.invert(pc.is_in(column, value_set=pa.array(choices))).to_numpy()
+        & column.is_valid().to_numpy()
+    )
     if strange.any():
         row = int(np.argmax(strange))
         raise ContractError(
@@ -117,7 +133,9 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
 
 def refuse_absurd(column: pa.ChunkedArray, where: Place) -> None:
     """Refuse numbers that no machine's quantity reaches."""
-    said = f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop the row"
+    said = (
+        f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop the row"
+    )
     _refuse_beyond(LARGEST, column, where, said)
 
 
@@ -128,15 +146,19 @@ def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
 
 
 def _refuse_beyond(most: float, column: pa.ChunkedArray, where: Place, said: str) -> None:
-    """Refuse the first number whose size is more than ``most``; ``said`` comes after what was found."""
+    """Refuse the first number whose size is more than ``most``; ``said`` comes after what was
+    found."""
     size = np.nan_to_num(np.abs(column.to_numpy()))
     row = int(np.argmax(size > most))
     if size[row] > most:
         raise ContractError(f"{where.row(row)}: found {column[row].as_py():.6g}{said}")
 
 
-def refuse_time_that_does_not_increase(frame: pd.DataFrame, time: str, within: Sequence[str], where: Place) -> None:
-    """Refuse time that stands still or goes back; it may start anew where a column of ``within`` changes."""
+def refuse_time_that_does_not_increase(
+    frame: pd.DataFrame, time: str, within: Sequence[str], where: Place
+) -> None:
+    """Refuse time that stands still or goes back; it may start anew where a column of ``within``
+    changes."""
     seconds = frame[time].to_numpy()
     stands = np.diff(seconds) <= 0.0
     for key in within:

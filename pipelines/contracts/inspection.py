@@ -27,18 +27,23 @@ class Inspection:
     metadata: dict[str, Any] = field(default_factory=dict)
     rows: int = 0
     columns: list[dict[str, Any]] = field(default_factory=list)
-    """Each with column, unit, type, min and max (None for text), nulls (NaN among them) and meaning."""
+    """Each with column, unit, type, min and max (None for text), nulls (NaN among them) and
+    meaning."""
     fault: ContractError | None = None
     """Why the file does not keep its contract, if so."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the description for programs."""
         fault = str(self.fault) if self.fault else None
-        return {**{key: value for key, value in vars(self).items() if key != "fault"}, "fault": fault}
+        return {
+            **{key: value for key, value in vars(self).items() if key != "fault"},
+            "fault": fault,
+        }
 
 
 def inspect(path: Path) -> Inspection:
-    """Describe a Parquet file of exoid's, one of its JSON documents, or a trajectory as TOML, by its content."""
+    """Describe a Parquet file of exoid's, one of its JSON documents, or a trajectory as TOML, by
+    its content."""
     for reader in (_document, _trajectory_toml):
         found = reader(path)
         if found:
@@ -59,7 +64,9 @@ def _table(path: Path) -> Inspection:
         contract=metadata["contract"],
         purpose=contract.purpose,
         origin={key: metadata[key] for key in ORIGIN if key in metadata},
-        metadata={key: value for key, value in metadata.items() if key not in (*ORIGIN, "contract")},
+        metadata={
+            key: value for key, value in metadata.items() if key not in (*ORIGIN, "contract")
+        },
         rows=table.num_rows,
         columns=[_column(table, name) for name in dict.fromkeys(table.column_names)],
         fault=fault,
@@ -71,7 +78,8 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
     column, about = table.column(index), table.schema.field(index).metadata or {}
     low, high = None, None
     if pa.types.is_floating(column.type):
-        column = pc.if_else(pc.is_nan(column), None, column)  # no number is no value, however it is written
+        # No number is no value, however it is written.
+        column = pc.if_else(pc.is_nan(column), None, column)
     if not (pa.types.is_nested(column.type) or checks.is_text(column.type)):
         low, high = pc.min_max(column).as_py().values()
     return {
@@ -94,13 +102,19 @@ DOCUMENTS = {
 
 
 def _document(path: Path) -> Inspection | None:
-    content = verdict.parsed(path) if path.suffix == ".json" and path.is_file() else _parsed(path, _read_json)
+    content = (
+        verdict.parsed(path)
+        if path.suffix == ".json" and path.is_file()
+        else _parsed(path, _read_json)
+    )
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
         return None
     fault = _fault_of(content, path)
     contract, provenance = content.pop("contract"), content.pop("provenance", {})
     origin = {key: provenance.pop(key) for key in ORIGIN if key in provenance}
-    return Inspection(str(path), contract, DOCUMENTS[contract], origin, content | provenance, fault=fault)
+    return Inspection(
+        str(path), contract, DOCUMENTS[contract], origin, content | provenance, fault=fault
+    )
 
 
 def _fault_of(content: dict[str, Any], path: Path) -> ContractError | None:
@@ -116,7 +130,9 @@ def _trajectory_toml(path: Path) -> Inspection | None:
     content = _parsed(path, read_toml)
     if not {"a", "b", "omega_rad_s"} <= content.keys():
         return None
-    return Inspection(str(path), "trajectory as TOML", "Fourier coefficients of an excitation", {}, content)
+    return Inspection(
+        str(path), "trajectory as TOML", "Fourier coefficients of an excitation", {}, content
+    )
 
 
 def _read_json(path: Path) -> Any:

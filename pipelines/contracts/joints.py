@@ -9,7 +9,8 @@ Kind = Literal["revolute", "prismatic"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something measured or computed at a joint, as a pattern of column name and unit for each kind of joint."""
+    """Something measured or computed at a joint, as a pattern of column name and unit for each kind
+    of joint."""
 
     revolute: str
     revolute_unit: str
@@ -19,14 +20,22 @@ class Quantity:
 
 QUANTITIES: dict[str, Quantity] = {
     "angle": Quantity("{joint}_angle_rad", "rad", "{joint}_position_m", "m"),
-    "angle_measured": Quantity("{joint}_angle_measured_rad", "rad", "{joint}_position_measured_m", "m"),
+    "angle_measured": Quantity(
+        "{joint}_angle_measured_rad", "rad", "{joint}_position_measured_m", "m"
+    ),
     "reference": Quantity("{joint}_reference_rad", "rad", "{joint}_reference_m", "m"),
     "error": Quantity("{joint}_error_rad", "rad", "{joint}_error_m", "m"),
     "velocity": Quantity("{joint}_velocity_rad_s", "rad/s", "{joint}_velocity_m_s", "m/s"),
-    "velocity_measured": Quantity("{joint}_velocity_measured_rad_s", "rad/s", "{joint}_velocity_measured_m_s", "m/s"),
-    "acceleration": Quantity("{joint}_acceleration_rad_s2", "rad/s²", "{joint}_acceleration_m_s2", "m/s²"),
+    "velocity_measured": Quantity(
+        "{joint}_velocity_measured_rad_s", "rad/s", "{joint}_velocity_measured_m_s", "m/s"
+    ),
+    "acceleration": Quantity(
+        "{joint}_acceleration_rad_s2", "rad/s²", "{joint}_acceleration_m_s2", "m/s²"
+    ),
     "torque": Quantity("{joint}_torque_nm", "N·m", "{joint}_force_n", "N"),
-    "torque_measured": Quantity("{joint}_torque_measured_nm", "N·m", "{joint}_force_measured_n", "N"),
+    "torque_measured": Quantity(
+        "{joint}_torque_measured_nm", "N·m", "{joint}_force_measured_n", "N"
+    ),
     "predicted": Quantity("{joint}_predicted_nm", "N·m", "{joint}_predicted_n", "N"),
     "residual": Quantity("{joint}_residual_nm", "N·m", "{joint}_residual_n", "N"),
     "network": Quantity("{joint}_network_nm", "N·m", "{joint}_network_n", "N"),
@@ -38,7 +47,8 @@ QUANTITIES: dict[str, Quantity] = {
 
 
 def the(joint: str) -> str:
-    """Return a joint's name as a sentence has it: ``the hip``, but ``joint2`` and ``q``, which are names already."""
+    """Return a joint's name as a sentence has it: ``the hip``, but ``joint2`` and ``q``, which are
+    names already."""
     return joint if joint[-1:].isdigit() or len(joint) == 1 else f"the {joint}"
 
 
@@ -50,7 +60,8 @@ class Joint:
     kind: Kind = "revolute"
 
     def column(self, quantity: str) -> str:
-        """Return the column that holds a quantity: ``"angle"`` is ``hip_angle_rad`` or ``axis_position_m``."""
+        """Return the column that holds a quantity: ``"angle"`` is ``hip_angle_rad`` or
+        ``axis_position_m``."""
         pattern = QUANTITIES[quantity]
         chosen = pattern.revolute if self.kind == "revolute" else pattern.prismatic
         return chosen.format(joint=self.name)
@@ -80,7 +91,8 @@ def in_words(joints: Iterable[Joint]) -> str:
 
 
 def either(words: Iterable[str]) -> str:
-    """Return what each joint says, once: ``N`` of slides, ``N or N·m`` of a machine that slides and turns."""
+    """Return what each joint says, once: ``N`` of slides, ``N or N·m`` of a machine that slides and
+    turns."""
     return " or ".join(dict.fromkeys(words))
 
 
@@ -88,4 +100,6 @@ def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
     """Return the joints a file speaks of; left out, they are hip and knee, both revolute."""
     if "joints" not in metadata:
         return HIP_AND_KNEE
-    return tuple(Joint(joint["name"], joint.get("kind", "revolute")) for joint in metadata["joints"])
+    return tuple(
+        Joint(joint["name"], joint.get("kind", "revolute")) for joint in metadata["joints"]
+    )

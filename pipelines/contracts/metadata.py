@@ -1,4 +1,5 @@
-"""The parts of the ``exoid`` metadata that several tables share, as typed models; unknown keys are kept."""
+"""The parts of the ``exoid`` metadata that several tables share, as typed models; unknown keys are
+kept."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -12,7 +13,8 @@ Matrix = list[list[Finite]]
 
 
 class Keys(BaseModel):
-    """A metadata object: what exoid knows is checked strictly, what it does not know is left alone."""
+    """A metadata object: what exoid knows is checked strictly, what it does not know is left
+    alone."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True)
 
@@ -56,7 +58,9 @@ class TableKeys(Keys):
         try:
             datetime.fromisoformat(text or "2000-01-01")
         except ValueError as error:
-            raise ValueError(f"found {text!r}, expected an ISO 8601 time such as 2025-01-31T12:00:00+00:00") from error
+            raise ValueError(
+                f"found {text!r}, expected an ISO 8601 time such as 2025-01-31T12:00:00+00:00"
+            ) from error
         return text
 
 

@@ -10,7 +10,8 @@ from pipelines.contracts.table import BOOLEAN, INTEGER, Column, Contract, per_jo
 
 
 class RegressionFilterKeys(Keys):
-    """What whoever fits applies to torque and to every regressor column alike, never across segments."""
+    """What whoever fits applies to torque and to every regressor column alike, never across
+    segments."""
 
     kind: str
     order: Annotated[int, Field(gt=0)] | None = None
@@ -37,7 +38,9 @@ MOTION = Contract(
         per_joint("velocity", "derivative of the filtered angle"),
         per_joint("acceleration", "second derivative of the filtered angle"),
         per_joint("torque", "what the drive delivers at the joint, as measured"),
-        per_joint("velocity_measured", "the drive's own velocity estimate", required=False, nullable=True),
+        per_joint(
+            "velocity_measured", "the drive's own velocity estimate", required=False, nullable=True
+        ),
         per_joint("reference", "commanded angle", required=False, nullable=True),
         per_joint("current", "motor current", required=False, nullable=True),
         per_joint("temperature", "drive or motor temperature", required=False, nullable=True),

@@ -29,7 +29,9 @@ class ParametersKeys(TableKeys):
     """What each run has for itself, by the cause's label; the rows hold what the first one has."""
 
 
-def _covariance_has_the_rows_shape(frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
+def _covariance_has_the_rows_shape(
+    frame: pd.DataFrame, metadata: Mapping[str, Any], source: str
+) -> None:
     covariance = metadata.get("covariance")
     if covariance is None:
         return

@@ -1,4 +1,5 @@
-"""Parquet files with exoid's metadata: opened with a clear refusal, streamed, written whole or not at all."""
+"""Parquet files with exoid's metadata: opened with a clear refusal, streamed, written whole or not
+at all."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,9 +21,11 @@ STREAM = b"\xff\xff\xff\xff"
 
 
 ROWS = 2**16
-"""Of a piece that is read, and of a row group that is written: some 20 MB of a recording with everything in it."""
+"""Of a piece that is read, and of a row group that is written: some 20 MB of a recording with
+everything in it."""
 READ_AHEAD = 2**20
-"""Bytes of each column held beside a piece; without a limit it is the row group, and other tools' may be the file."""
+"""Bytes of each column held beside a piece; without a limit it is the row group, and other tools'
+may be the file."""
 
 
 def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
@@ -32,7 +35,8 @@ def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
 
 
 def is_whole(path: Path) -> bool:
-    """Tell whether a file is Parquet from its first byte to its last, whoever wrote it; what it holds is not read."""
+    """Tell whether a file is Parquet from its first byte to its last, whoever wrote it; what it
+    holds is not read."""
     try:
         with _opened(path):
             return True
@@ -41,7 +45,8 @@ def is_whole(path: Path) -> bool:
 
 
 def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are named."""
+    """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are
+    named."""
     with _opened(path) as file:
         # Group by group: Arrow's reader of several keeps hold of all that it has read.
         for group in range(file.num_row_groups):
@@ -59,12 +64,14 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
     _refuse_what_is_no_file(path)
     try:
-        # Not read_table(path): it would take a folder named "run=1" above the file for a column of a data set.
+        # Not read_table(path): it would take a folder named "run=1" above the file for a column of
+        # a data set.
         with pq.ParquetFile(path, buffer_size=READ_AHEAD) as file:
             yield file
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
-            raise  # the system's refusal; Arrow tells of a damaged page by an OSError that has no number
+            # The system's refusal; Arrow tells of a damaged page by an OSError that has no number.
+            raise
         raise ContractError(f"{path}: {_what_is_wrong_with_the_bytes(path)}") from error
 
 
@@ -78,34 +85,47 @@ def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) ->
         temporary.touch()  # else Arrow would complain of the temporary name, in its own words
         with pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
             for piece in chain([first], pieces):
-                writer.write_table(piece.replace_schema_metadata(schema.metadata), row_group_size=ROWS)
+                writer.write_table(
+                    piece.replace_schema_metadata(schema.metadata), row_group_size=ROWS
+                )
 
 
 def refuse_place(path: Path, contract: str) -> None:
-    """Refuse to write where a folder is, or what is no older version of the same: a recording cannot be made again.
+    """Refuse to write where a folder is, or what is no older version of the same: a recording
+    cannot be made again.
 
-    Nor under a name that promises another format, or that those who look for ``*.parquet`` would never find.
+    Nor under a name that promises another format, or that those who look for ``*.parquet`` would
+    never find.
     """
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
     refuse_what_is_no_file(path)
     if path.suffix != ".parquet":
-        raise ContractError(f"{path}: expected a name that ends in .parquet, which is what is written; name another")
+        raise ContractError(
+            f"{path}: expected a name that ends in .parquet, which is what is written; name another"
+        )
     if not path.exists() or path.stat().st_size == 0:
         return
     try:
         schema = pq.ParquetFile(path).schema_arrow
-        found = _metadata(schema, path)["contract"] if KEY in (schema.metadata or {}) else "a table of somebody else's"
+        found = (
+            _metadata(schema, path)["contract"]
+            if KEY in (schema.metadata or {})
+            else "a table of somebody else's"
+        )
     except (pa.ArrowException, UnicodeDecodeError):
         if _start(path) == MAGIC:
             return  # what is left of one
         found = "something else"
     if found.partition("/")[0] != contract.partition("/")[0]:
-        raise ContractError(f"{path}: holds {found}, not overwritten with {contract}; choose another name or remove it")
+        raise ContractError(
+            f"{path}: holds {found}, not overwritten with {contract}; choose another name or remove it"
+        )
 
 
 def to_json(metadata: Mapping[str, Any], source: str) -> str:
-    """Return metadata as JSON text; NumPy's numbers and arrays become plain ones, paths become text.
+    """Return metadata as JSON text; NumPy's numbers and arrays become plain ones, paths become
+    text.
 
     Raises
     ------
@@ -130,11 +150,15 @@ def _plain(value: Any) -> Any:
 
 def _refuse_what_is_no_file(path: Path) -> None:
     if not path.exists():
-        raise ContractError(f"{path}: no such file; {similar_file(path) or 'check the name, or make it first'}")
+        raise ContractError(
+            f"{path}: no such file; {similar_file(path) or 'check the name, or make it first'}"
+        )
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected a Parquet file; name a file in it")
     if path.stat().st_size == 0:
-        raise ContractError(f"{path}: is empty (0 bytes), expected a Parquet file; copy or make it again")
+        raise ContractError(
+            f"{path}: is empty (0 bytes), expected a Parquet file; copy or make it again"
+        )
 
 
 def _what_is_wrong_with_the_bytes(path: Path) -> str:
@@ -150,7 +174,8 @@ def _what_is_wrong_with_the_bytes(path: Path) -> str:
 
 def _whole_rows(path: Path) -> int:
     rows = 0
-    with suppress(pa.ArrowException, OSError), open(path, "rb") as file:  # cut off; what stands before is whole
+    # Cut off; what stands before is whole.
+    with suppress(pa.ArrowException, OSError), open(path, "rb") as file:
         for batch in pa.ipc.open_stream(file):
             rows += batch.num_rows
     return rows
@@ -171,7 +196,9 @@ def _metadata(schema: pa.Schema, path: Path) -> dict[str, Any]:
     try:
         metadata = json.loads(text)
     except ValueError as error:
-        raise ContractError(f"{path}: its `exoid` metadata is not JSON ({error}); write it again") from error
+        raise ContractError(
+            f"{path}: its `exoid` metadata is not JSON ({error}); write it again"
+        ) from error
     if not isinstance(metadata, dict) or not isinstance(metadata.get("contract"), str):
         raise ContractError(
             f'{path}: its `exoid` metadata names no contract; it must hold at least {{"contract": "<name>/<version>"}}'

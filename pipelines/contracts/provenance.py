@@ -20,21 +20,24 @@ LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow")
 """What computes and what writes."""
 
 
-def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def describe(
+    inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """Return the metadata that let a result be traced to its data and repeated.
 
     Parameters
     ----------
     inputs : iterable of Path
-        The files this result was computed from. Never pass what a rig keeps sealed: the name and the hash
-        stand in the result for everyone to read.
+        The files this result was computed from. Never pass what a rig keeps sealed: the name and
+        the hash stand in the result for everyone to read.
     config : mapping, optional
         The stage's resolved settings, such as ``settings.model_dump(mode="json")``.
 
     Returns
     -------
     dict
-        ``created_by``, ``created_at``, ``software``, ``inputs`` and ``config``, to be merged into a table's metadata.
+        ``created_by``, ``created_at``, ``software``, ``inputs`` and ``config``, to be merged into a
+        table's metadata.
     """
     return {
         "created_by": f"exoid {__version__}",
@@ -47,7 +50,8 @@ def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = Non
 
 @cache
 def software() -> dict[str, str]:
-    """Return the versions that a number may depend on: of Python and of the libraries that compute."""
+    """Return the versions that a number may depend on: of Python and of the libraries that
+    compute."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
@@ -58,9 +62,12 @@ def sha256(path: Path) -> str:
 
 
 def recording_behind(path: Path) -> str:
-    """Return the SHA-256 of the recording in a file, or behind a ``motion/1``: whatever holds it, a run has one."""
+    """Return the SHA-256 of the recording in a file, or behind a ``motion/1``: whatever holds it, a
+    run has one."""
     about = parquet.header(path)[1]
-    filtered_from = about.get("inputs") if str(about.get("contract")).startswith("motion/") else None
+    filtered_from = (
+        about.get("inputs") if str(about.get("contract")).startswith("motion/") else None
+    )
     return str(filtered_from[0]["sha256"]) if filtered_from else sha256(path)
 
 
@@ -69,7 +76,8 @@ IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</scr
 
 
 def provenance_of(path: Path) -> dict[str, Any]:
-    """Return a table's metadata, or the ``provenance`` of a document or page; ContractError where there is none."""
+    """Return a table's metadata, or the ``provenance`` of a document or page; ContractError where
+    there is none."""
     if path.suffix not in (".json", ".html"):
         return parquet.header(path)[1]
     try:
@@ -82,7 +90,8 @@ def provenance_of(path: Path) -> dict[str, Any]:
 
 
 def told_by(path: Path) -> dict[str, Any]:
-    """Return what a file tells of where it came from; nothing where there is none, or one that does not tell.
+    """Return what a file tells of where it came from; nothing where there is none, or one that does
+    not tell.
 
     For who only asks whose a file is: whoever reads it says what is wrong with it.
     """

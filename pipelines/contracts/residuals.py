@@ -13,7 +13,9 @@ RESIDUALS = Contract(
         Column("purpose", "", "what the run is for", dtype=TEXT, choices=("train", "validate")),
         Column("segment", "", "number of the stretch without gaps", dtype=INTEGER),
         Column("time_s", "s", "device time since the run began"),
-        Column("model", "", "the model that predicts", dtype=TEXT, choices=("baseline", "extended")),
+        Column(
+            "model", "", "the model that predicts", dtype=TEXT, choices=("baseline", "extended")
+        ),
         Column("scored", "", "true where the RMSE counts the sample", dtype=BOOLEAN),
         per_joint("angle", "joint angle"),
         per_joint("velocity", "joint velocity"),

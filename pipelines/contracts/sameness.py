@@ -1,4 +1,5 @@
-"""Whether a file that was made anew says what the one in its place says, but for when it was made."""
+"""Whether a file that was made anew says what the one in its place says, but for when it was
+made."""
 
 import json
 import re
@@ -47,6 +48,10 @@ def _same_table(old: BinaryIO, new: BinaryIO) -> bool:
     return all(old.read(length) == new.read(length) for length in lengths)
 
 
-def _header(schema: pa.Schema) -> tuple[list[tuple[str, str, dict[bytes, bytes]]], dict[str, object]]:
+def _header(
+    schema: pa.Schema,
+) -> tuple[list[tuple[str, str, dict[bytes, bytes]]], dict[str, object]]:
     told = json.loads((schema.metadata or {}).get(KEY, b"{}"))
-    return [(field.name, str(field.type), field.metadata or {}) for field in schema], told | {WHEN: None}
+    return [(field.name, str(field.type), field.metadata or {}) for field in schema], told | {
+        WHEN: None
+    }

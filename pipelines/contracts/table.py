@@ -1,4 +1,5 @@
-"""A data contract as code: columns with unit, meaning and type, checked on reading and on writing."""
+"""A data contract as code: columns with unit, meaning and type, checked on reading and on
+writing."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +25,8 @@ FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string(
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table, or, with ``per_joint``, one for each joint, named by the joint and this quantity."""
+    """One column of a table, or, with ``per_joint``, one for each joint, named by the joint and
+    this quantity."""
 
     name: str
     unit: str
@@ -38,10 +40,14 @@ class Column:
 
     def at(self, joint: Joint) -> "Column":
         """Return this quantity's column at one joint."""
-        return replace(self, name=joint.column(self.name), unit=joint.unit(self.name), per_joint=False)
+        return replace(
+            self, name=joint.column(self.name), unit=joint.unit(self.name), per_joint=False
+        )
 
 
-def per_joint(quantity: str, meaning: str, *, required: bool = True, nullable: bool = False) -> Column:
+def per_joint(
+    quantity: str, meaning: str, *, required: bool = True, nullable: bool = False
+) -> Column:
     """Return a float column that every joint has; name and unit follow from the joint's kind."""
     return Column(quantity, "", meaning, required=required, nullable=nullable, per_joint=True)
 
@@ -77,7 +83,8 @@ class Table:
         return joints_of(self.metadata)
 
     def stacked(self, quantity: str) -> NDArray[np.float64]:
-        """Return a quantity of all joints side by side, shape (rows, joints), in the quantity's SI unit."""
+        """Return a quantity of all joints side by side, shape (rows, joints), in the quantity's SI
+        unit."""
         return self.frame[[joint.column(quantity) for joint in self.joints]].to_numpy(dtype=float)
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
@@ -100,8 +107,11 @@ class Stored:
         return joints_of(self.metadata)
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the rows in their order, at most ``parquet.ROWS`` at a time; all columns, or those that are named."""
-        return self.contract.conformed(parquet.pieces(self.path, columns), self.metadata, str(self.path), columns)
+        """Yield the rows in their order, at most ``parquet.ROWS`` at a time; all columns, or those
+        that are named."""
+        return self.contract.conformed(
+            parquet.pieces(self.path, columns), self.metadata, str(self.path), columns
+        )
 
 
 Rule = Callable[[pd.DataFrame, Mapping[str, Any], str], None]
@@ -123,8 +133,8 @@ class Contract:
     restarts_with: tuple[str, ...] = ()
     """Columns that start time anew when they change from one row to the next."""
     is_bounded: bool = True
-    """Is an angle of more than 1.5 turns taken for degrees, and any quantity refused that no machine reaches? Not where
-    a loop may diverge."""
+    """Is an angle of more than 1.5 turns taken for degrees, and any quantity refused that no
+    machine reaches? Not where a loop may diverge."""
     rules: tuple[Rule, ...] = ()
     """Further checks: rule(frame, metadata, source) raises ContractError."""
 
@@ -135,7 +145,10 @@ class Contract:
 
     def columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
         """Return every column by its name in a file, those of the joints written out."""
-        expanded = ([column.at(joint) for joint in joints] if column.per_joint else [column] for column in self.columns)
+        expanded = (
+            [column.at(joint) for joint in joints] if column.per_joint else [column]
+            for column in self.columns
+        )
         return tuple(column for group in expanded for column in group)
 
     def read(self, path: Path | str) -> Table:
@@ -146,7 +159,8 @@ class Contract:
         return Table(frame, stored.metadata, stored.path)
 
     def scan(self, path: Path | str) -> Stored:
-        """Return the table in a file without its rows: they are read, and checked, as they are gone through."""
+        """Return the table in a file without its rows: they are read, and checked, as they are gone
+        through."""
         path = Path(path)
         _, metadata = parquet.header(path)
         self._refuse_other_contracts(metadata["contract"], path)
@@ -157,21 +171,30 @@ class Contract:
         """Check a table and write it atomically; ``contract`` is added to the metadata."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
-        parquet.save(path, [self._conform(self._to_arrow(frame, str(path)), metadata, str(path))], metadata)
+        parquet.save(
+            path, [self._conform(self._to_arrow(frame, str(path)), metadata, str(path))], metadata
+        )
 
-    def write_pieces(self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
-        """Write a table as ``write`` does, but piece by piece, so that it need never be in memory as a whole."""
+    def write_pieces(
+        self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]
+    ) -> None:
+        """Write a table as ``write`` does, but piece by piece, so that it need never be in memory
+        as a whole."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
         self._check_metadata(metadata, str(path))
         parquet.save(path, self.conformed(pieces, metadata, str(path)), metadata)
 
     def refuse_place(self, path: Path) -> None:
-        """Raise a ContractError where this table could not be written: before the work, not after it."""
+        """Raise a ContractError where this table could not be written: before the work, not after
+        it."""
         parquet.refuse_place(path, self.label)
 
-    def check(self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str = "table") -> None:
-        """Raise a ContractError unless frame and metadata keep this contract; ``source`` starts its message."""
+    def check(
+        self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str = "table"
+    ) -> None:
+        """Raise a ContractError unless frame and metadata keep this contract; ``source`` starts its
+        message."""
         self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)
 
     def _refuse_other_contracts(self, found: str, path: Path) -> None:
@@ -189,9 +212,13 @@ class Contract:
     def _to_arrow(self, frame: pd.DataFrame, source: str) -> pa.Table:
         twice = frame.columns[frame.columns.duplicated()]
         if len(twice):
-            raise ContractError(f"{source}: column {twice[0]} stands twice, expected each name once; rename one")
+            raise ContractError(
+                f"{source}: column {twice[0]} stands twice, expected each name once; rename one"
+            )
         # Lists and structs need their type said: an empty list does not tell what it would hold.
-        nested = {column.name: column.dtype for column in self.columns if pa.types.is_nested(column.dtype)}
+        nested = {
+            column.name: column.dtype for column in self.columns if pa.types.is_nested(column.dtype)
+        }
         arrays = {}
         for name in frame.columns:
             try:
@@ -203,18 +230,25 @@ class Contract:
         return pa.table(arrays)
 
     def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
-        """Return a whole table with every known column in its type, unit and meaning; refuse what cannot be."""
+        """Return a whole table with every known column in its type, unit and meaning; refuse what
+        cannot be."""
         self._check_metadata(metadata, source)
         (conformed,) = self.conformed([table], metadata, source)
         self._apply_rules(conformed.to_pandas(), metadata, source)
         return conformed
 
     def conformed(
-        self, pieces: Iterable[pa.Table], metadata: Mapping[str, Any], source: str, named: Sequence[str] | None = None
+        self,
+        pieces: Iterable[pa.Table],
+        metadata: Mapping[str, Any],
+        source: str,
+        named: Sequence[str] | None = None,
     ) -> Iterator[pa.Table]:
-        """Yield the pieces of a table with every known column in its type, unit and meaning; refuse what cannot be.
+        """Yield the pieces of a table with every known column in its type, unit and meaning; refuse
+        what cannot be.
 
-        Empty pieces are left out. Where only some columns are ``named``, the others are not asked for.
+        Empty pieces are left out. Where only some columns are ``named``, the others are not asked
+        for.
         """
         known = self.columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]
@@ -230,9 +264,13 @@ class Contract:
             # Its last row, so that the seam to the next piece is looked at too.
             rows, seam = rows + piece.num_rows, piece.slice(piece.num_rows - 1)
         if not rows:
-            raise ContractError(f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again")
+            raise ContractError(
+                f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again"
+            )
 
-    def _check_time(self, piece: pa.Table, seam: pa.Table | None, source: str, first_row: int) -> None:
+    def _check_time(
+        self, piece: pa.Table, seam: pa.Table | None, source: str, first_row: int
+    ) -> None:
         if self.time is None or self.time not in piece.column_names:
             return
         rows = pa.concat_tables([seam, piece]) if seam else piece
@@ -244,16 +282,24 @@ class Contract:
         for rule in self.rules:
             rule(frame, metadata, source)
 
-    def _refuse_missing_column(self, table: pa.Table, column: Column, source: str, known: Sequence[Column]) -> None:
+    def _refuse_missing_column(
+        self, table: pa.Table, column: Column, source: str, known: Sequence[Column]
+    ) -> None:
         if not column.required or column.name in table.column_names:
             return
-        near = closest(column.name, [name for name in table.column_names if name not in {c.name for c in known}])
+        near = closest(
+            column.name,
+            [name for name in table.column_names if name not in {c.name for c in known}],
+        )
         raise ContractError(
             f"{source}: column {column.name} is missing, expected {_described(column)}; "
-            f"a {self.label} table must have it" + (f"; if {near} is meant to be it, rename it" if near else "")
+            f"a {self.label} table must have it"
+            + (f"; if {near} is meant to be it, rename it" if near else "")
         )
 
-    def _conform_column(self, table: pa.Table, column: Column, source: str, first_row: int) -> pa.Table:
+    def _conform_column(
+        self, table: pa.Table, column: Column, source: str, first_row: int
+    ) -> pa.Table:
         index = table.schema.get_field_index(column.name)
         if index < 0:
             return table
@@ -266,7 +312,9 @@ class Contract:
             checks.refuse_absurd(values, where)
             if column.unit == "rad":
                 checks.refuse_degrees(values, where)
-        field = pa.field(column.name, column.dtype, metadata={"unit": column.unit, "meaning": column.meaning})
+        field = pa.field(
+            column.name, column.dtype, metadata={"unit": column.unit, "meaning": column.meaning}
+        )
         return table.set_column(index, field, values)
 
     def _check_metadata(self, metadata: Mapping[str, Any], source: str) -> None:
@@ -274,7 +322,9 @@ class Contract:
             self.metadata.model_validate_json(parquet.to_json(metadata, source))
         except ValidationError as error:
             fault = explain(error, dict(metadata))
-            raise ContractError(f"{source}: metadata {fault}; mend it in the file's `exoid` entry") from error
+            raise ContractError(
+                f"{source}: metadata {fault}; mend it in the file's `exoid` entry"
+            ) from error
 
 
 def _described(column: Column) -> str:

@@ -28,7 +28,9 @@ class TrajectoryKeys(TableKeys):
         if (a is None) != (b is None):
             raise ValueError("coefficients a and b belong together, found only one of them")
         if a is not None and b is not None and [len(row) for row in a] != [len(row) for row in b]:
-            raise ValueError("coefficients a and b have different shapes, expected joint x harmonic in both")
+            raise ValueError(
+                "coefficients a and b have different shapes, expected joint x harmonic in both"
+            )
         return self
 
 

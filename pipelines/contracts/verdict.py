@@ -1,4 +1,5 @@
-"""``verdict/1``, the answer of ``exoid diagnose`` as JSON: whole, with numbers where they belong, or refused."""
+"""``verdict/1``, the answer of ``exoid diagnose`` as JSON: whole, with numbers where they belong,
+or refused."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -59,7 +60,8 @@ class OneRun(_Object):
     values: dict[str, Number | None]
     """By the parameters' names; null of what never came in this run."""
     ci95: dict[str, Interval | None] = {}
-    """Null of what was learnt from its run alone, all else held; files of older versions lack it."""
+    """Null of what was learnt from its run alone, all else held; files of older versions lack
+    it."""
 
 
 class Known(_Object):
@@ -94,7 +96,8 @@ class Likely(_Object):
     probability: Probability
     words: str
     dropped: bool
-    """Whether the runs that were searched would name it, and the validation runs speak against it."""
+    """Whether the runs that were searched would name it, and the validation runs speak against
+    it."""
 
 
 class Law(_Object):
@@ -221,10 +224,12 @@ class Verdict(_Object):
     status: str
     summary: str
     finding: str | None = None
-    """The summary without what it says of acquisition and of the floor; None where acquisition is at fault."""
+    """The summary without what it says of acquisition and of the floor; None where acquisition is
+    at fault."""
     acquisition_at_fault: bool = False
     findings: list[Finding] = []
-    """Empty where nothing is missing; files of older versions lack it, as they do the next three."""
+    """Empty where nothing is missing; files of older versions lack it, as they do the next
+    three."""
     sought_on: Literal["train", "all"] = "train"
     """The runs that causes were sought on; files of older versions lack it."""
     router: dict[str, Shares] = {}
@@ -262,13 +267,19 @@ class Verdict(_Object):
         joints = set(self.noise_floor_nm)
         for key, of_joints in self._tables():
             if set(of_joints) != joints:
-                raise ValueError(f"{key} is of {_listed(of_joints)}, noise_floor_nm of {_listed(joints)}")
+                raise ValueError(
+                    f"{key} is of {_listed(of_joints)}, noise_floor_nm of {_listed(joints)}"
+                )
         for number, cause in enumerate(self.causes):
             if cause.gain.joint not in joints:
-                raise ValueError(f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of noise_floor_nm")
+                raise ValueError(
+                    f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of noise_floor_nm"
+                )
         for number, finding in enumerate(self.findings):
             if finding.joint is not None and finding.joint not in joints:
-                raise ValueError(f"findings[{number}].joint is {finding.joint!r}, no joint of noise_floor_nm")
+                raise ValueError(
+                    f"findings[{number}].joint is {finding.joint!r}, no joint of noise_floor_nm"
+                )
         return self
 
     def _tables(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -295,7 +306,9 @@ def parsed(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
-        raise ContractError(f"{path}: is no text ({error.reason} at byte {error.start}); make it again") from error
+        raise ContractError(
+            f"{path}: is no text ({error.reason} at byte {error.start}); make it again"
+        ) from error
     except json.JSONDecodeError as error:
         raise ContractError(
             f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}: {error.msg}); make it again"
@@ -307,7 +320,9 @@ def check(content: Mapping[str, Any], source: str) -> None:
     try:
         Verdict.model_validate(content)
     except ValidationError as error:
-        raise ContractError(f"{source}: {explain(error, content)} (`exoid diagnose` makes it again)") from error
+        raise ContractError(
+            f"{source}: {explain(error, content)} (`exoid diagnose` makes it again)"
+        ) from error
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""Windows over a table that comes piece by piece: rows one after the other, each with its neighbours."""
+"""Windows over a table that comes piece by piece: rows one after the other, each with its
+neighbours."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -7,7 +8,8 @@ import pyarrow as pa
 
 
 class Window(NamedTuple):
-    """Some rows of a table, and which of them it is about; the others, before and after, are its margin."""
+    """Some rows of a table, and which of them it is about; the others, before and after, are its
+    margin."""
 
     rows: pa.Table
     first: int
@@ -30,7 +32,9 @@ def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Wi
     for piece in pieces:
         held = piece if held is None else pa.concat_tables([held, piece])
         while held.num_rows >= start + length + margin:
-            yield Window(held.slice(0, start + length + margin), first, slice(start, start + length))
+            yield Window(
+                held.slice(0, start + length + margin), first, slice(start, start + length)
+            )
             passed = max(0, start + length - margin)
             held, first, start = held.slice(passed), first + passed, start + length - passed
     if held is not None and held.num_rows > start:

@@ -1,1 +1,2 @@
-"""The excitation: a particle swarm over Fourier coefficients, judged by what the regressor can tell apart."""
+"""The excitation: a particle swarm over Fourier coefficients, judged by what the regressor can tell
+apart."""

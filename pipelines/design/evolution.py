@@ -1,7 +1,8 @@
 """Local polish: an evolution strategy that learns the landscape's covariance (CMA-ES).
 
-Hansen (2016), "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772; the names are the tutorial's. It needs
-no gradient: shrinking to the bounds, sgn columns and crossing eigenvalues all leave kinks in the criterion.
+Hansen (2016), "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772; the names are the
+tutorial's. It needs no gradient: shrinking to the bounds, sgn columns and crossing eigenvalues all
+leave kinks in the criterion.
 """
 
 from collections.abc import Callable
@@ -73,7 +74,9 @@ def polish(
         whitened = axes @ ((axes.T @ step) / lengths)
         path_sigma = (1 - c_sigma) * path_sigma + np.sqrt(c_sigma * (2 - c_sigma) * mu) * whitened
         length = np.linalg.norm(path_sigma) / expected_length
-        steady = length < (1.4 + 2 / (size + 1)) * np.sqrt(1 - (1 - c_sigma) ** (2 * (generation + 1)))
+        steady = length < (1.4 + 2 / (size + 1)) * np.sqrt(
+            1 - (1 - c_sigma) ** (2 * (generation + 1))
+        )
         path_c = (1 - c_c) * path_c + steady * np.sqrt(c_c * (2 - c_c) * mu) * step
         covariance = (1 - c_1 - c_mu) * covariance + c_1 * np.outer(path_c, path_c)
         covariance += c_mu * (chosen.T * weights) @ chosen

@@ -23,10 +23,13 @@ class Design:
     stopped_by: str
 
     def frame(self) -> pd.DataFrame:
-        """Return one period as rows of a ``trajectory/1`` table; the next period begins where it ends."""
+        """Return one period as rows of a ``trajectory/1`` table; the next period begins where it
+        ends."""
         rows = round(self.trajectory.period_s * self.settings.sample_rate_hz)
         time = np.arange(rows) / self.settings.sample_rate_hz
-        states = dict(zip(("angle", "velocity", "acceleration"), self.trajectory.at(time), strict=True))
+        states = dict(
+            zip(("angle", "velocity", "acceleration"), self.trajectory.at(time), strict=True)
+        )
         columns = {
             joint.column(quantity): values[:, j]
             for j, joint in enumerate(self.trajectory.joints)
@@ -50,9 +53,14 @@ class Design:
 
 
 def design(
-    settings: DesignSettings, geometry: Geometry | None = None, report: Report = lambda done, note: None
+    settings: DesignSettings,
+    geometry: Geometry | None = None,
+    report: Report = lambda done, note: None,
 ) -> Design:
-    """Design an excitation; equal settings give an equal one, unless ``seconds`` cut the search short."""
+    """Design an excitation; equal settings give an equal one, unless ``seconds`` cut the search
+    short."""
     geometry = geometry or Geometry()
     found = search(settings, geometry, report)
-    return Design(found.trajectory, quality(found.trajectory, settings, geometry), settings, found.stopped_by)
+    return Design(
+        found.trajectory, quality(found.trajectory, settings, geometry), settings, found.stopped_by
+    )

@@ -1,7 +1,9 @@
-"""How good an excitation is, compiled: repair, regressor, Gram matrix, criterion; about 15 us a motion.
+"""How good an excitation is, compiled: repair, regressor, Gram matrix, criterion; about 15 us a
+motion.
 
-A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip and knee, and the
-two mean angles where they are searched too. Coordinates times ``basis`` are the Fourier coefficients.
+A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip and knee, and
+the two mean angles where they are searched too. Coordinates times ``basis`` are the Fourier
+coefficients.
 """
 
 import math
@@ -23,11 +25,13 @@ FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "n
 PARAMETERS = 8
 HIP_PARAMETERS = (0, 1, 2, 3, 4, 5)
 KNEE_PARAMETERS = (1, 2, 6, 7)
-"""The columns that are not zero in each joint's row; X1 .. X4, then Coulomb and viscous friction of hip and knee."""
+"""The columns that are not zero in each joint's row; X1 .. X4, then Coulomb and viscous friction of
+hip and knee."""
 
 
 class Problem(NamedTuple):
-    """What all candidates of one search share. n harmonics, f free coordinates for each joint, N samples."""
+    """What all candidates of one search share. n harmonics, f free coordinates for each joint, N
+    samples."""
 
     sine: NDArray
     cosine: NDArray
@@ -98,12 +102,15 @@ def problem(
 def workspace(problem):
     """Allocate the scratch arrays for one problem."""
     n, samples = problem.sine.shape
-    return Workspace(np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n)))
+    return Workspace(
+        np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n))
+    )
 
 
 @njit(cache=True)
 def cost(candidate, problem, work):
-    """Repair a candidate in place so that it keeps every bound, and return its cost: the less, the better."""
+    """Repair a candidate in place so that it keeps every bound, and return its cost: the less, the
+    better."""
     expand(candidate, problem, work.coefficients)
     move(problem, work)
     repair(candidate, problem, work)
@@ -161,7 +168,8 @@ def move(problem, work):
 
 @njit(cache=True)
 def repair(candidate, problem, work):
-    """Shrink each joint's motion about its mean angle until it fits; every quantity is linear in that scale."""
+    """Shrink each joint's motion about its mean angle until it fits; every quantity is linear in
+    that scale."""
     _, n, free = problem.basis.shape
     samples = problem.sine.shape[1]
     for joint in range(2):
@@ -218,7 +226,9 @@ def fill_columns(problem, work):
     for i in range(q.shape[1]):
         dq = (q[2, i], q[3, i])
         sin_leg = sine[0, i] * sine[3, i] + sine[1, i] * sine[2, i]
-        hip, knee = regressor_rows(sine[0, i], sin_leg, sine[2, i], sine[3, i], dq, (q[4, i], q[5, i]), length, gravity)
+        hip, knee = regressor_rows(
+            sine[0, i], sin_leg, sine[2, i], sine[3, i], dq, (q[4, i], q[5, i]), length, gravity
+        )
         for p in range(4):
             columns[p, i] = hip[p]
         columns[4, i] = sign(dq[0])
@@ -263,7 +273,8 @@ def dot(x, y):
 
 @njit(cache=True)
 def log_determinant(gram):
-    """Log of a Gram matrix's determinant by Cholesky's factors; minus infinity where it is singular."""
+    """Log of a Gram matrix's determinant by Cholesky's factors; minus infinity where it is
+    singular."""
     factor = gram.copy()
     total = 0.0
     for j in range(len(factor)):

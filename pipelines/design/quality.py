@@ -25,7 +25,8 @@ SAMPLES = 1000
 
 @dataclass(frozen=True)
 class Quality:
-    """How good an excitation is; the regressor has eight columns, X1 .. X4, then each joint's friction."""
+    """How good an excitation is; the regressor has eight columns, X1 .. X4, then each joint's
+    friction."""
 
     condition: float
     """Of the regressor as it is, the paper's criterion; computed by singular values."""
@@ -46,11 +47,17 @@ class Quality:
 
     def as_metadata(self) -> dict[str, Any]:
         """Return what a ``trajectory/1`` file says of its excitation."""
-        numbers = {name: getattr(self, name) for name in ("condition", "scaled_condition", "log_det")}
+        numbers = {
+            name: getattr(self, name) for name in ("condition", "scaled_condition", "log_det")
+        }
         return {
             **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
-            "inertial_condition": self.inertial_condition if np.isfinite(self.inertial_condition) else None,
-            "standard_errors": {k: v if np.isfinite(v) else None for k, v in self.standard_errors.items()},
+            "inertial_condition": self.inertial_condition
+            if np.isfinite(self.inertial_condition)
+            else None,
+            "standard_errors": {
+                k: v if np.isfinite(v) else None for k, v in self.standard_errors.items()
+            },
             "margins": [{**vars(margin), "margin": margin.margin} for margin in self.margins],
         }
 
@@ -65,7 +72,9 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
     """
     names = tuple(joint.name for joint in trajectory.joints)
     if names != JOINTS:
-        raise InputError(f"the excitation moves the joints {', '.join(names)}, expected hip and knee")
+        raise InputError(
+            f"the excitation moves the joints {', '.join(names)}, expected hip and knee"
+        )
     span = trajectory.period_s or trajectory.duration_s
     A = regressor(trajectory, geometry, np.arange(SAMPLES) * span / SAMPLES)
     stacked = A.reshape(-1, A.shape[2])
@@ -88,7 +97,9 @@ def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDAr
     return paper_model().regressor(_planned(trajectory, geometry, time))
 
 
-def _planned(trajectory: Trajectory, geometry: Geometry, time: NDArray, sample_rate_hz: float = 200.0) -> Motion:
+def _planned(
+    trajectory: Trajectory, geometry: Geometry, time: NDArray, sample_rate_hz: float = 200.0
+) -> Motion:
     q, dq, ddq = trajectory.at(time)
     nothing = np.zeros_like(q)
     count = len(time)
@@ -98,20 +109,28 @@ def _planned(trajectory: Trajectory, geometry: Geometry, time: NDArray, sample_r
     )  # fmt: skip
 
 
-def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float) -> NDArray:
+def standard_errors(
+    trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float
+) -> NDArray:
     """Foretell the standard errors (8,) of a weighted least-squares fit to one recording.
 
-    Torque noise of a joint is stationary, with standard deviation s and correlation exp(-|t| / T). With weights
-    1 / s², information I = sum of A_j'A_j / s_j² and R the noise's correlation matrix, the fit's covariance is
-    I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever the fit believes of its noise. Rows near
-    a joint's reversals are zero in A_j, because the fit leaves them out.
+    Torque noise of a joint is stationary, with standard deviation s and correlation exp(-|t| / T).
+    With weights 1 / s², information I = sum of A_j'A_j / s_j² and R the noise's correlation matrix,
+    the fit's covariance is I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever
+    the fit believes of its noise. Rows near a joint's reversals are zero in A_j, because the fit
+    leaves them out.
     """
     duration = min(noise.duration_s, trajectory.duration_s)
-    motion = _planned(trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz), sample_rate_hz)
+    motion = _planned(
+        trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz), sample_rate_hz
+    )
     weight = away_from_reversals(motion) / np.array([noise.hip_nm, noise.knee_nm])
     A = paper_model().regressor(motion) * weight[:, :, np.newaxis]
-    rho = np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if noise.correlation_s > 0.0 else 0.0
-    # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier + earlier'A.
+    rho = (
+        np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if noise.correlation_s > 0.0 else 0.0
+    )
+    # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier +
+    # earlier'A.
     earlier = lfilter([0.0, rho], [1.0, -rho], A, axis=0)
     information = np.einsum("njp,njq->pq", A, A)
     cross = np.einsum("njp,njq->pq", A, earlier)
@@ -122,7 +141,8 @@ def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geom
 
 
 def paper_model() -> Model:
-    """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both joints."""
+    """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both
+    joints."""
     effects = baseline(THE_LEG, ("exo_alone",))
     return Model.of(effects)
 

@@ -1,4 +1,5 @@
-"""The search for an excitation: a swarm for the region, an evolution strategy for the last digits."""
+"""The search for an excitation: a swarm for the region, an evolution strategy for the last
+digits."""
 
 import time
 from collections.abc import Callable
@@ -17,7 +18,8 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings
 
-# The swarm only has to find the region: a coarse grid is five times faster, and no less strict about bounds.
+# The swarm only has to find the region: a coarse grid is five times faster, and no less strict
+# about bounds.
 COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC = 200, 40
 FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC = 1000, 100
 
@@ -27,7 +29,8 @@ PATIENCE = 8
 LEAST_GAIN = 1e-4
 
 POLISHED = 3
-"""Particles that are polished: the best of as many arcs of the ring, which may sit in different valleys."""
+"""Particles that are polished: the best of as many arcs of the ring, which may sit in different
+valleys."""
 GENERATIONS = 2000
 POLISH_SPREAD = 0.05
 
@@ -40,11 +43,15 @@ class Found:
 
     trajectory: FourierTrajectory
     stopped_by: str
-    """``stagnation``, ``iterations``, or ``seconds``, when the design also depends on the machine's speed."""
+    """``stagnation``, ``iterations``, or ``seconds``, when the design also depends on the machine's
+    speed."""
 
 
-def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None) -> Found:
-    """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen criterion.
+def search(
+    settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None
+) -> Found:
+    """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen
+    criterion.
 
     ``report`` is called with the share done, 0 to 1, and the best value so far.
 
@@ -64,7 +71,9 @@ def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda
     swarm = _first_swarm(settings, coarse, spread, rng)
     fly(swarm, coarse, True, 0, rng)  # compiles what is not compiled yet, which is no search time
     deadline = time.monotonic() + settings.seconds
-    stopped_by = _let_fly(swarm, coarse, settings, rng, deadline, lambda done, cost: report(0.5 * done, note(cost)))
+    stopped_by = _let_fly(
+        swarm, coarse, settings, rng, deadline, lambda done, cost: report(0.5 * done, note(cost))
+    )
 
     best, best_cost = swarm.best_position[0], np.inf
     for i, arc in enumerate(np.array_split(np.arange(settings.particles), POLISHED)):
@@ -83,7 +92,9 @@ def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda
     return Found(_trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by)
 
 
-def _problem(settings: DesignSettings, geometry: Geometry, samples: int, samples_per_harmonic: int) -> Problem:
+def _problem(
+    settings: DesignSettings, geometry: Geometry, samples: int, samples_per_harmonic: int
+) -> Problem:
     return problem(
         omega=2.0 * np.pi * settings.base_frequency_hz,
         harmonics=settings.harmonics,
@@ -99,8 +110,8 @@ def _problem(settings: DesignSettings, geometry: Geometry, samples: int, samples
 def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
     """Return what coefficients are combinations of: sine (0) and cosine (1), (2, n, free).
 
-    At t = 0 and after each period the velocity is w sum k a_k and the acceleration -w² sum k² b_k; at rest
-    both vanish, so the coefficients come from the null spaces of (k) and (k²).
+    At t = 0 and after each period the velocity is w sum k a_k and the acceleration -w² sum k² b_k;
+    at rest both vanish, so the coefficients come from the null spaces of (k) and (k²).
     """
     if not rest_to_rest:
         return np.array([np.eye(harmonics)] * 2)
@@ -117,7 +128,9 @@ def spread_of(problem: Problem) -> NDArray:
     return np.append(coordinates, half[0]) if problem.theta0_is_free else coordinates
 
 
-def _first_swarm(settings: DesignSettings, problem: Problem, spread: NDArray, rng: np.random.Generator) -> Swarm:
+def _first_swarm(
+    settings: DesignSettings, problem: Problem, spread: NDArray, rng: np.random.Generator
+) -> Swarm:
     shape = (settings.particles, len(spread))
     position = rng.standard_normal(shape) * spread
     if problem.theta0_is_free:
@@ -157,4 +170,6 @@ def _trajectory(candidate: NDArray, problem: Problem) -> FourierTrajectory:
     coefficients = np.empty((2, 2, len(problem.speeds)))
     expand(candidate, problem, coefficients)
     theta0 = candidate[-2:] if problem.theta0_is_free else problem.theta0
-    return FourierTrajectory(theta0.copy(), coefficients[0], coefficients[1], float(problem.speeds[0]))
+    return FourierTrajectory(
+        theta0.copy(), coefficients[0], coefficients[1], float(problem.speeds[0])
+    )

@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 VECTORIZED = {"reassoc", "contract", "nsz", "arcp"}
-"""What the compiler may do to arithmetic: order sums anew, fuse; NaN and infinity keep their meaning."""
+"""What the compiler may do to arithmetic: order sums anew, fuse; NaN and infinity keep their
+meaning."""
 
 # Taylor's series about 0, enough terms for 1e-15 on [-pi/2, pi/2].
 _SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
@@ -26,6 +27,8 @@ def sines(x, sine, cosine):
         odd = S7 + y * (S8 + y * (S9 + y * S10))
         odd = S0 + y * (S1 + y * (S2 + y * (S3 + y * (S4 + y * (S5 + y * (S6 + y * odd))))))
         even = C8 + y * (C9 + y * (C10 + y * C11))
-        even = C0 + y * (C1 + y * (C2 + y * (C3 + y * (C4 + y * (C5 + y * (C6 + y * (C7 + y * even)))))))
+        even = C0 + y * (
+            C1 + y * (C2 + y * (C3 + y * (C4 + y * (C5 + y * (C6 + y * (C7 + y * even))))))
+        )
         sine[i] = sign * r * odd
         cosine[i] = sign * even

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from pipelines.design.fitness import cost, costs, workspace
 
-# Clerc and Kennedy's constriction (2002, IEEE Trans. Evol. Comput. 6(1)): the swarm contracts by itself.
+# Clerc and Kennedy's constriction (2002, IEEE Trans. Evol. Comput. 6(1)): the swarm contracts by
+# itself.
 INERTIA = 0.7298
 PULL = 1.49618
 

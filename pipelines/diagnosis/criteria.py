@@ -13,12 +13,14 @@ class Criteria:
     """The hyper-parameters of the posterior over sets of causes and laws."""
 
     drive_weight: float = 1.17
-    """How much of a drive row's likelihood counts where nothing is missing; above one where noise is overestimated."""
+    """How much of a drive row's likelihood counts where nothing is missing; above one where noise
+    is overestimated."""
     cuff_weight: float = 0.137
     """The same of a cuff row."""
     model_error: float = 0.0075
-    """An output counts with weight / (1 + model error x weight x what all causes and laws explain there): no form is
-    exact. Held: the score of learning hardly tells it from twice as much, under which second causes are lost."""
+    """An output counts with weight / (1 + model error x weight x what all causes and laws explain
+    there): no form is exact. Held: the score of learning hardly tells it from twice as much, under
+    which second causes are lost."""
     cuff_model_error: float = 0.0138
     """The same of a cuff's output."""
     explained_share: float = 0.3
@@ -34,8 +36,8 @@ class Criteria:
     shape_sd: float = 0.393
     """Prior standard deviation of a shape about its best value, in its unit of change."""
     base_rate: float = -1.39
-    """Log odds that anything is missing, over those in the simulated sessions: four in five of these lack something,
-    of a lab's one in two is assumed."""
+    """Log odds that anything is missing, over those in the simulated sessions: four in five of
+    these lack something, of a lab's one in two is assumed."""
     cause: float = -3.075
     """Prior log odds of a cause against none."""
     law: float = -3.37
@@ -43,7 +45,8 @@ class Criteria:
     further: float = -1.6
     """Prior log odds of each element beyond the first."""
     searched: float = -0.663
-    """Log odds per log number of the values among which a wave, a tone, an onset or a step was sought."""
+    """Log odds per log number of the values among which a wave, a tone, an onset or a step was
+    sought."""
     each_run: float = -2.57
     """Log odds of a cause whose value is another in every run."""
     worn: float = -4.84
@@ -53,22 +56,24 @@ class Criteria:
     coherence: float = 0.451
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
     shape_freedom: float = 3.0
-    """Degrees of freedom of the Student prior of a free shape: its tails are heavy, for typical ranges are known
-    roughly."""
+    """Degrees of freedom of the Student prior of a free shape: its tails are heavy, for typical
+    ranges are known roughly."""
     likely: float = 0.5
-    """Least probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
+    """Least probability at which a cause, alone or with its ties, is named, and at which a finding
+    is reported."""
     tied: float = 0.1
     """Share of the named cause's probability from which another cause is its tie."""
     look_alike: tuple[float, float] = (4.44, 2.42)
-    """Intercept and slope of the log odds that a named cause is what it is called, over the logarithm of the share of
-    the systematic error that it removes on the validation runs."""
+    """Intercept and slope of the log odds that a named cause is what it is called, over the
+    logarithm of the share of the systematic error that it removes on the validation runs."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
     predicted_better: float = 1.0
-    """Log likelihood of the validation runs that an answer by all runs gains at least: less is not worth more than a
-    bare mention (Kass and Raftery, 1995, J. Am. Statist. Assoc. 90(430))."""
+    """Log likelihood of the validation runs that an answer by all runs gains at least: less is not
+    worth more than a bare mention (Kass and Raftery, 1995, J. Am. Statist. Assoc. 90(430))."""
     left_of_explained: float = 0.2
-    """Largest share of the systematic power that is left at a joint which counts as explained (contracts.md)."""
+    """Largest share of the systematic power that is left at a joint which counts as explained
+    (contracts.md)."""
 
 
 BEFORE_EVIDENCE = ("explained_share", "form_misfit", "shape_freedom")

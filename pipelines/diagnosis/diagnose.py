@@ -28,13 +28,15 @@ FIT_SHARE = 0.75
 """Of the progress bar, where the fit begins."""
 
 
-def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()) -> Diagnosis:
+def diagnose(
+    motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
+) -> Diagnosis:
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
     The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
-    every error. They may lower the probability of a cause that does harm there, and decide between ties.
-    Where what is named leaves an error above the noise there, causes are sought on all runs; they are
-    fitted to the training runs still.
+    every error. They may lower the probability of a cause that does harm there, and decide between
+    ties. Where what is named leaves an error above the noise there, causes are sought on all runs;
+    they are fitted to the training runs still.
 
     Parameters
     ----------
@@ -61,16 +63,21 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     return _diagnosis(data, prepared, judged)
 
 
-def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, report: Report) -> JudgedFit:
-    """Return what all runs together show, fitted to the training runs, where they show more than these alone.
+def _by_all_runs(
+    data: TrainingData, prepared: Prepared, judged: JudgedFit, report: Report
+) -> JudgedFit:
+    """Return what all runs together show, fitted to the training runs, where they show more than
+    these alone.
 
-    Its causes must predict the validation runs better. Where the training runs show something, all runs must name
-    other listed causes, and leave nothing unlisted. Where they show nothing and the new
-    causes fail, what all runs show is reported without a name.
+    Its causes must predict the validation runs better. Where the training runs show something, all
+    runs must name other listed causes, and leave nothing unlisted. Where they show nothing and the
+    new causes fail, what all runs show is reported without a name.
     """
     first = judged.selected
     runs = (*data.train, *data.validate)
-    searched = select(prepare(runs, data.baseline), _in_the_rest(report)).as_all_runs_search(first, len(data.train))
+    searched = select(prepare(runs, data.baseline), _in_the_rest(report)).as_all_runs_search(
+        first, len(data.train)
+    )
     by_all = judged_fit(searched, prepared, judged.before)
     now = by_all.selected
     if now.answer.named and by_all.predicts_better_than(judged):

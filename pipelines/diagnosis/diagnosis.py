@@ -97,7 +97,11 @@ class Diagnosis:
     @property
     def unexplained(self) -> list[float | None]:
         """Share of each joint's systematic power that is left; None where there was none."""
-        floor, before, after = self.floor_rms**2, self.before.errors.rms**2, self.after.errors.rms**2
+        floor, before, after = (
+            self.floor_rms**2,
+            self.before.errors.rms**2,
+            self.after.errors.rms**2,
+        )
         left = np.maximum(after - floor, 0.0)
         was = self.before.above(self.floor)
         shares = left / np.where(was, before - floor, 1.0)
@@ -105,9 +109,13 @@ class Diagnosis:
 
     @property
     def left_over(self) -> list[bool]:
-        """Joints that end above the floor, with more than ``left_of_explained`` of their systematic power."""
+        """Joints that end above the floor, with more than ``left_of_explained`` of their systematic
+        power."""
         shares = zip(self.unexplained, self.after.above(self.floor), strict=True)
-        return [bool(above) and share is not None and share > CRITERIA.left_of_explained for share, above in shares]
+        return [
+            bool(above) and share is not None and share > CRITERIA.left_of_explained
+            for share, above in shares
+        ]
 
     @property
     def has_periods(self) -> bool:
@@ -144,7 +152,9 @@ class Diagnosis:
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """What each run has for itself of the named causes, by label."""
-        return values_of_each_run(self.after.fit, self.baseline, self.uncertainty, self.train, self.validate)
+        return values_of_each_run(
+            self.after.fit, self.baseline, self.uncertainty, self.train, self.validate
+        )
 
     @cached_property
     def gains(self) -> dict[str, Gain]:

@@ -9,7 +9,12 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import with_load
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
-from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, removed_share, without_each
+from pipelines.diagnosis.fit.validation import (
+    Validated,
+    log_likelihoods,
+    removed_share,
+    without_each,
+)
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selected import Selected
@@ -43,16 +48,19 @@ class JudgedFit:
     def predicts_better_than(self, other: "JudgedFit") -> bool:
         """Tell whether it predicts the validation runs better than another, and not by chance."""
         gained = self.log_likelihood - other.log_likelihood
-        return gained > CRITERIA.predicted_better and gain(other.after.errors, self.after.errors).low > 0.0
+        return (
+            gained > CRITERIA.predicted_better
+            and gain(other.after.errors, self.after.errors).low > 0.0
+        )
 
 
 def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
     """Fit the named causes, and judge them on the validation runs until no charge is left.
 
-    The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
-    that the searched runs cannot tell apart, those are charged that predict the validation runs worse
-    than the best of them. Last, each named cause is tested for being a look-alike (``selection/look_alikes.py``);
-    those that remain are fitted again, and not judged again.
+    The most harmful cause is charged first: beside it, what others do may seem to harm too. Of
+    causes that the searched runs cannot tell apart, those are charged that predict the validation
+    runs worse than the best of them. Last, each named cause is tested for being a look-alike
+    (``selection/look_alikes.py``); those that remain are fitted again, and not judged again.
     """
     refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
@@ -62,7 +70,8 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
             after, without = _fitted(selected, refine, prepared, before)
             whole = log_likelihoods(after, prepared.noise)
             ratios = {
-                label: float(np.sum(whole - log_likelihoods(less, prepared.noise))) for label, less in without.items()
+                label: float(np.sum(whole - log_likelihoods(less, prepared.noise)))
+                for label, less in without.items()
             }
         if harm := selected.worst_harm(ratios):
             selected = selected.judged(harm, harms=True)
@@ -105,7 +114,9 @@ def _shortfalls(
             likelihoods[variant] = log_likelihoods(fitted, noise)
         explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
         weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
-        scores = {variant: float(weights @ likelihood) for variant, likelihood in likelihoods.items()}
+        scores = {
+            variant: float(weights @ likelihood) for variant, likelihood in likelihoods.items()
+        }
         for variant, score in scores.items():
             shortfall = score - max(scores.values())
             shortfalls[variant] = max(shortfalls.get(variant, -np.inf), shortfall)

@@ -1,8 +1,8 @@
 """The page docs/criteria.md: the numbers of the diagnosis, written from the code itself.
 
 ``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
-with the hyper-parameters (``make sensitivity``, ``make cross-validation``) stands in ``criteria_measured.json`` beside
-this file.
+with the hyper-parameters (``make sensitivity``, ``make cross-validation``) stands in
+``criteria_measured.json`` beside this file.
 """
 
 import ast
@@ -67,45 +67,73 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
     """Yield each statement with the string below it, empty without one."""
     for statement, below in pairwise([*body, ast.Pass()]):
         meaning = below.value if isinstance(below, ast.Expr) else None
-        yield statement, " ".join(str(meaning.value).split()) if isinstance(meaning, ast.Constant) else ""
+        yield (
+            statement,
+            " ".join(str(meaning.value).split()) if isinstance(meaning, ast.Constant) else "",
+        )
 
 
 def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Yield file, values by name, and meaning (empty without one) of the numbers that a folder's files define."""
+    """Yield file, values by name, and meaning (empty without one) of the numbers that a folder's
+    files define."""
     for path in sorted(folder.glob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
         for statement, meaning in _documented(body):
-            values = {name: value for name in _assigned(statement) if _is_number(value := getattr(module, name))}
+            values = {
+                name: value
+                for name in _assigned(statement)
+                if _is_number(value := getattr(module, name))
+            }
             if values:
                 yield path.name, values, meaning
 
 
 def _assigned(statement: ast.stmt) -> list[str]:
     """Return the names of constants that a statement assigns."""
-    targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
-    return [node.id for t in targets if t for node in ast.walk(t) if isinstance(node, ast.Name) and node.id.isupper()]
+    targets = (
+        statement.targets
+        if isinstance(statement, ast.Assign)
+        else [getattr(statement, "target", None)]
+    )
+    return [
+        node.id
+        for t in targets
+        if t
+        for node in ast.walk(t)
+        if isinstance(node, ast.Name) and node.id.isupper()
+    ]
 
 
 def _is_number(value: Any) -> bool:
     values = value if isinstance(value, tuple) else (value,)
-    return bool(values) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    return bool(values) and all(
+        isinstance(v, int | float) and not isinstance(v, bool) for v in values
+    )
 
 
 def reference() -> str:
     """Return the page as Markdown."""
     told = meanings()
     rows = [
-        [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), told[field.name]] for field in fields(Criteria)
+        [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), told[field.name]]
+        for field in fields(Criteria)
     ]
-    return "\n".join([INTRODUCTION, _table(["name", "value", "meaning"], rows), *_measured(), OTHERS, *_others()])
+    return "\n".join(
+        [INTRODUCTION, _table(["name", "value", "meaning"], rows), *_measured(), OTHERS, *_others()]
+    )
 
 
 def _others() -> Iterator[str]:
     """Yield the numbers beside the criteria, a section for each folder."""
     for folder, heading in HEADINGS.items():
         rows = [
-            [f"`{file}`", ", ".join(f"`{name}`" for name in values), _written(tuple(values.values())), meaning]
+            [
+                f"`{file}`",
+                ", ".join(f"`{name}`" for name in values),
+                _written(tuple(values.values())),
+                meaning,
+            ]
             for file, values, meaning in numbers_of(PACKAGE / folder)
         ]
         yield f"### {heading}\n\n{_table(['file', 'name', 'value', 'meaning'], rows)}"
@@ -121,7 +149,10 @@ def _written(value: Any) -> str:
 def _measured() -> list[str]:
     """Return what was measured with the values, a section each."""
     measured = json.loads(MEASURED.read_text(encoding="utf-8"))
-    return [f"## {title}\n\n{one['about']}\n\n{_table(one['columns'], one['rows'])}" for title, one in measured.items()]
+    return [
+        f"## {title}\n\n{one['about']}\n\n{_table(one['columns'], one['rows'])}"
+        for title, one in measured.items()
+    ]
 
 
 def keep(title: str, measured: dict[str, Any]) -> None:

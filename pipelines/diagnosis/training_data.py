@@ -68,7 +68,9 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     if not any(fault.spoils for fault in faults):
         _refuse_unknown_noise(validate, faults)
     baseline = baseline_of(train, effects)
-    return TrainingData(train, tuple(like_trained(run, baseline) for run in validate), baseline, faults, noisy)
+    return TrainingData(
+        train, tuple(like_trained(run, baseline) for run in validate), baseline, faults, noisy
+    )
 
 
 def _of(runs: Sequence[Run], purpose: str) -> tuple[Run, ...]:
@@ -80,7 +82,9 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     for purpose, why in WHY.items():
         if not any(m.purpose == purpose for m in motions):
-            raise InputError(f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}")
+            raise InputError(
+                f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"
+            )
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
     if strangers:
@@ -99,7 +103,9 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
         if not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             files = [run.motion.file for run in validate]
-            wrong = "".join(f"; {fault.file}: {fault.what}" for fault in faults if fault.file in files)
+            wrong = "".join(
+                f"; {fault.file}: {fault.what}" for fault in faults if fault.file in files
+            )
             raise InputError(
                 f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few in a row to tell "
                 f"noise from error; validate on longer runs{wrong}"

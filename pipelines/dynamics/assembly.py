@@ -18,7 +18,8 @@ from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.model import Model, Term
 
 MOTOR_SHARE = 0.04
-"""Of a joint's inertia that stays with its motor behind a spring, where the machine is no exoskeleton: as of a leg."""
+"""Of a joint's inertia that stays with its motor behind a spring, where the machine is no
+exoskeleton: as of a leg."""
 
 
 @reaction
@@ -50,9 +51,10 @@ class Assembly(NamedTuple):
     """What the compiled dynamics needs of a model; made by ``assemble``.
 
     Terms stand in the order: on links and inertial, on links, on drives and inertial, on drives;
-    ``bounds`` (5,) says where each group begins and the last ends. Per term i: the addresses of its kernels,
-    ``joint[i]`` (-1 for the whole leg), its values ``values[value_at[i] : value_at[i + 1]]``, its memory
-    ``state_at[i] : state_at[i + 1]``. Arrays alone, so that one compilation serves all models.
+    ``bounds`` (5,) says where each group begins and the last ends. Per term i: the addresses of its
+    kernels, ``joint[i]`` (-1 for the whole leg), its values ``values[value_at[i] : value_at[i +
+    1]]``, its memory ``state_at[i] : state_at[i + 1]``. Arrays alone, so that one compilation
+    serves all models.
     """
 
     joints: int
@@ -72,8 +74,8 @@ class Assembly(NamedTuple):
     """For each joint the term that is its transmission, -1 for a rigid one."""
     motor_inertia: np.ndarray
     cuffed: bool
-    """True where the springs are cuffs: links are then the limb's, and the machine's own bodies are on the
-    motors' side."""
+    """True where the springs are cuffs: links are then the limb's, and the machine's own bodies are
+    on the motors' side."""
     geometry: np.ndarray
     temperature: np.ndarray
     """(J,) °C of the motors; who simulates a machine that warms sets it before each sample."""
@@ -114,11 +116,15 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
                 "leave out the one or the other"
             )
         if sprung[joint[i]] >= 0:
-            raise InputError(f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most")
+            raise InputError(
+                f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most"
+            )
         sprung[joint[i]], inertias[joint[i]] = i, motor_inertia(effect, model, geometry)
     return Assembly(
         joints=len(joints),
-        bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(np.int64),
+        bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(
+            np.int64
+        ),
         reactions=_addresses([e.reaction for e in effects], _no_reaction),
         derivatives=_addresses([e.derivative for e in effects], _no_memory),
         springs=_addresses([e.spring for e in effects], _no_spring),
@@ -138,7 +144,8 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
 
 
 def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
-    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic joint.
+    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic
+    joint.
 
     Raises
     ------
@@ -155,7 +162,9 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     mechanism = effect.on.mechanism
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)
     j = effect.on.names.index(str(effect.joint))
-    return float(MOTOR_SHARE * mechanism.mass_matrix(np.zeros(len(mechanism.kinds)), X, geometry)[j, j])
+    return float(
+        MOTOR_SHARE * mechanism.mass_matrix(np.zeros(len(mechanism.kinds)), X, geometry)[j, j]
+    )
 
 
 def in_order(model: Model) -> list[Term]:

@@ -1,6 +1,7 @@
 """The motion that a model would have made of a run's references, under the same drives.
 
-It has the run's excitation and none of its sensors' noise: what instruments for a regression are made of.
+It has the run's excitation and none of its sensors' noise: what instruments for a regression are
+made of.
 """
 
 from collections.abc import Mapping
@@ -21,16 +22,19 @@ from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 
 RATE_HZ = 1000.0
-"""Of drives that do not tell theirs, and at most: what is faster changes nothing that a regression sees."""
+"""Of drives that do not tell theirs, and at most: what is faster changes nothing that a regression
+sees."""
 BANDWIDTH_RAD_S = 2.0 * np.pi * 8.0
 """Of the loop that stands for drives that tell nothing."""
 
 
 def closed_loop(model: Model, motion: Motion) -> Motion:
-    """Return the run as a model would have moved along its references: angle, velocity and acceleration anew.
+    """Return the run as a model would have moved along its references: angle, velocity and
+    acceleration anew.
 
-    The drives are those of the recording's ``controller``; where it tells none, loops of a bandwidth of 8 Hz take
-    their place, tuned to the model's inertia, as in DIDIM (Gautier, Janot and Vandanjon, 2013, IEEE TCST 21(2)).
+    The drives are those of the recording's ``controller``; where it tells none, loops of a
+    bandwidth of 8 Hz take their place, tuned to the model's inertia, as in DIDIM (Gautier, Janot
+    and Vandanjon, 2013, IEEE TCST 21(2)).
 
     Raises
     ------
@@ -66,7 +70,9 @@ def _set_points(motion: Motion) -> NDArray:
                 "loop follows; record them with the run, or choose a --method that needs none"
             )
     known = (np.isfinite(column) for column in told.T)
-    lines = [np.interp(motion.time, motion.time[k], c[k]) for k, c in zip(known, told.T, strict=True)]
+    lines = [
+        np.interp(motion.time, motion.time[k], c[k]) for k, c in zip(known, told.T, strict=True)
+    ]
     return np.ascontiguousarray(np.column_stack(lines))
 
 
@@ -74,15 +80,27 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
     told: Mapping[str, Any] = motion.metadata.get("controller") or {}
     each = [told.get(joint) or {} for joint in motion.joints]
     if all(_gain(c, "kp") for c in each):
-        kp, kd, limit, rate = (np.array([_gain(c, key) for c in each]) for key in ("kp", "kd", "limit", "rate_hz"))
-        limit, rate = (np.where(known > 0.0, known, other) for known, other in ((limit, np.inf), (rate, RATE_HZ)))
+        kp, kd, limit, rate = (
+            np.array([_gain(c, key) for c in each]) for key in ("kp", "kd", "limit", "rate_hz")
+        )
+        limit, rate = (
+            np.where(known > 0.0, known, other)
+            for known, other in ((limit, np.inf), (rate, RATE_HZ))
+        )
     else:
         mass = masses(a)[0].mean(axis=0).diagonal()
-        kp, kd, limit, rate = BANDWIDTH_RAD_S**2 * mass, 2.0 * BANDWIDTH_RAD_S * mass, np.inf * mass, RATE_HZ + 0 * mass
+        kp, kd, limit, rate = (
+            BANDWIDTH_RAD_S**2 * mass,
+            2.0 * BANDWIDTH_RAD_S * mass,
+            np.inf * mass,
+            RATE_HZ + 0 * mass,
+        )
     rate_hz = max(min(RATE_HZ, *rate), motion.sample_rate_hz)
     return make_drives(kp, kd, limit, np.zeros(len(each)), rate_hz, motion.sample_rate_hz)
 
 
 def _gain(controller: Mapping[str, Any], key: str) -> float:
     """Return a drive's number, whatever unit its name ends in; 0 where it is not told."""
-    return next((float(v) for k, v in controller.items() if k.startswith(key) and v is not None), 0.0)
+    return next(
+        (float(v) for k, v in controller.items() if k.startswith(key) and v is not None), 0.0
+    )

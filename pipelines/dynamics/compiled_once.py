@@ -1,8 +1,8 @@
 """Functions that are compiled once: their callers call the machine code that is there.
 
-numba otherwise optimises the code of a function anew within each of its callers, and theirs: of the dynamics' five
-levels each would take as long as the first. An optimiser that cannot see into a call cannot make it part of its
-caller either, which for functions as large as these gains nothing.
+numba otherwise optimises the code of a function anew within each of its callers, and theirs: of the
+dynamics' five levels each would take as long as the first. An optimiser that cannot see into a call
+cannot make it part of its caller either, which for functions as large as these gains nothing.
 """
 
 from functools import wraps
@@ -23,7 +23,8 @@ def compiled_once(signature):
 
     def decorate(function):
         compiled = njit(signature, **ALLOCATING_NOTHING)(function)
-        # The signature is part of the name, so that compiled code of another version finds nothing here.
+        # The signature is part of the name, so that compiled code of another version finds nothing
+        # here.
         symbol = f"{function.__module__}.{function.__qualname__}{signature}"
         binding.add_symbol(symbol, address(compiled))
 

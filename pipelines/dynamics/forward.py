@@ -1,13 +1,15 @@
 """Forward dynamics of any model: acceleration from drive torque, and one step of time.
 
 A joint has two coordinates, the motor's and the link's, which are one where it is rigid. Motors
-carry the drive's effects and the encoder; links carry everything else. With T the torque passed on::
+carry the drive's effects and the encoder; links carry everything else. With T the torque passed
+on::
 
     M(q) ddq + rest(q, dq) = T          links (structure, human)
     J dd_theta + drive(theta, d_theta) + T = drive torque     motors; T from the spring
 
-and a rigid joint is the sum of its two rows. Where a limb moves against its cuff, the cuff is the spring,
-the limb the link, and the whole machine the motors, whose J is then the machine's mass matrix.
+and a rigid joint is the sum of its two rows. Where a limb moves against its cuff, the cuff is the
+spring, the limb the link, and the whole machine the motors, whose J is then the machine's mass
+matrix.
 
 Dry friction is a set-valued function of speed. The step looks for the ``direction`` in [-1, 1]
 of each joint that is consistent with the speed at the step's end (projected Gauss-Seidel on the
@@ -30,8 +32,8 @@ STICTION_SWEEPS = 20
 STICTION_TOLERANCE = 1e-9
 
 HOT: dict[str, Any] = {"cache": True, "_nrt": False}
-"""How the innermost functions are compiled. They allocate nothing, and numba's counting of references
-to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
+"""How the innermost functions are compiled. They allocate nothing, and numba's counting of
+references to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
 INNER: dict[str, Any] = {**HOT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """How those are that Python never calls: what hands over an assembly takes long to compile."""
 
@@ -69,7 +71,22 @@ def workspace(joints: int) -> Workspace:
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
-    return Workspace(v[0], v[1], m[0], m[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], both, np.zeros(2 * joints))
+    return Workspace(
+        v[0],
+        v[1],
+        m[0],
+        m[1],
+        v[2],
+        v[3],
+        v[4],
+        v[5],
+        v[6],
+        v[7],
+        v[8],
+        v[9],
+        both,
+        np.zeros(2 * joints),
+    )
 
 
 states = float64[:, ::1]
@@ -88,17 +105,32 @@ def _react(a, first, last, at, memory, out):
 
 @njit(cache=True, inline="always")
 def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, M, rest):
-    """Write inertial terms' mass matrix into ``M`` (J, J), their torque at no acceleration into ``rest`` (J,).
+    """Write inertial terms' mass matrix into ``M`` (J, J), their torque at no acceleration into
+    ``rest`` (J,).
 
     The mass matrix is the torque at unit acceleration less that at none (Walker and Orin, 1982).
     """
     rest[:] = 0.0
-    _react(a, first, last, Instant(t, angle, speed, w.zero, direction, load, a.temperature), memory, rest)
+    _react(
+        a,
+        first,
+        last,
+        Instant(t, angle, speed, w.zero, direction, load, a.temperature),
+        memory,
+        rest,
+    )
     w.ddq[:] = 0.0
     for k in range(a.joints):
         w.ddq[k] = 1.0
         w.column[:] = 0.0
-        _react(a, first, last, Instant(t, angle, speed, w.ddq, direction, load, a.temperature), memory, w.column)
+        _react(
+            a,
+            first,
+            last,
+            Instant(t, angle, speed, w.ddq, direction, load, a.temperature),
+            memory,
+            w.column,
+        )
         w.ddq[k] = 0.0
         for row in range(a.joints):
             M[row, k] = w.column[row] - rest[row]
@@ -123,17 +155,42 @@ def _solve(M, b, scratch, x):
 
 @njit(cache=True, inline="always")
 def _prepare(a, w, t, state, memory, load):
-    """Compute all that does not depend on the direction of dry friction: masses, link torque, spring torque."""
+    """Compute all that does not depend on the direction of dry friction: masses, link torque,
+    spring torque."""
     link, after_inertial, drive = a.bounds[0], a.bounds[1], a.bounds[2]
     for j in range(a.joints):
         w.link_direction[j] = np.sign(state[DQ, j])
-    _mass_and_rest(a, w, link, after_inertial, t, state[Q], state[DQ], w.link_direction, load, memory, w.mass, w.rest)
+    _mass_and_rest(
+        a,
+        w,
+        link,
+        after_inertial,
+        t,
+        state[Q],
+        state[DQ],
+        w.link_direction,
+        load,
+        memory,
+        w.mass,
+        w.rest,
+    )
     if drive > after_inertial:
         at = Instant(t, state[Q], state[DQ], w.zero, w.link_direction, load, a.temperature)
         _react(a, after_inertial, drive, at, memory, w.rest)
     if a.bounds[3] > drive:
         _mass_and_rest(
-            a, w, drive, a.bounds[3], t, state[THETA], state[DTHETA], w.zero, load, memory, w.motor_mass, w.push
+            a,
+            w,
+            drive,
+            a.bounds[3],
+            t,
+            state[THETA],
+            state[DTHETA],
+            w.zero,
+            load,
+            memory,
+            w.motor_mass,
+            w.push,
         )
     for j in range(a.joints):
         term = a.sprung[j]
@@ -149,7 +206,8 @@ def _prepare(a, w, t, state, memory, load):
 
 @njit(**INNER)
 def _accelerate_both(a, w, state, drive, rates):
-    """Write d(state)/dt of machine and limb, whose masses are coupled across the joints that are rigid.
+    """Write d(state)/dt of machine and limb, whose masses are coupled across the joints that are
+    rigid.
 
     Unknown are the links' accelerations, then the motors'; a rigid joint's are equal.
     """
@@ -176,7 +234,8 @@ def _accelerate_both(a, w, state, drive, rates):
 
 @njit(**INNER)
 def _eliminate(A, b):
-    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) is left holding x.
+    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) is left
+    holding x.
 
     Of a larger ``A`` the first n rows and columns are meant.
     """
@@ -276,7 +335,8 @@ def _rates_under(a, w, t, state, memory, direction, load, drive, rates):
 
 @njit(**INNER)
 def _grip(a, w, t, state, memory, load, drive, rates, j):
-    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where friction is dry."""
+    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where
+    friction is dry."""
     now = w.direction[j]
     w.direction[j] = -1.0
     _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
@@ -291,8 +351,8 @@ def _grip(a, w, t, state, memory, load, drive, rates, j):
 def find_direction(a, w, t, h, state, memory, load, drive, rates):
     """Write into ``w.direction`` (J,) the sign of each motor's speed over the next ``h`` seconds.
 
-    Where neither sign is consistent with the speed that it leads to, the value that stops the joint.
-    ``rates`` (4, J) is left holding d(state)/dt with that direction.
+    Where neither sign is consistent with the speed that it leads to, the value that stops the
+    joint. ``rates`` (4, J) is left holding d(state)/dt with that direction.
     """
     for j in range(a.joints):
         w.direction[j] = np.sign(state[DTHETA, j])
@@ -332,7 +392,9 @@ class Stages(NamedTuple):
 
 def stages(joints: int, memories: int) -> Stages:
     """Make the scratch of the Runge-Kutta step."""
-    return Stages(np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories))
+    return Stages(
+        np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories)
+    )
 
 
 STAGES = typeof(stages(1, 1))
@@ -340,7 +402,8 @@ STAGES = typeof(stages(1, 1))
 
 @njit(cache=True, inline="always")
 def begin_stages(a, w, s, t, state, memory, load):
-    """Finish the first stage, whose ``s.rates[0]`` is known: rates of the memories, and ``load`` (J,) passed on."""
+    """Finish the first stage, whose ``s.rates[0]`` is known: rates of the memories, and ``load``
+    (J,) passed on."""
     memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
     load[:] = 0.0
     at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero, a.temperature)
@@ -349,7 +412,8 @@ def begin_stages(a, w, s, t, state, memory, load):
 
 @njit(cache=True, inline="always")
 def reach_stage(s, i, reach, state, memory):
-    """Write state and memory of stage ``i``, ``reach`` seconds after the step's begin, into ``s``."""
+    """Write state and memory of stage ``i``, ``reach`` seconds after the step's begin, into
+    ``s``."""
     for row in range(4):
         for j in range(state.shape[1]):
             s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
@@ -375,7 +439,8 @@ def end_stages(s, h, state, memory):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, STAGES, float64, float64, states, vector, vector, vector))
 def step(a, w, s, t, h, state, memory, load, drive):
-    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant drive torque.
+    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant
+    drive torque.
 
     Classical Runge-Kutta with the direction of dry friction held over the step.
     """

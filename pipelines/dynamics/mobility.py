@@ -6,25 +6,37 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.dynamics.forward import DTHETA, HOT, Q, accelerations, memory_size, resting_state, workspace
+from pipelines.dynamics.forward import (
+    DTHETA,
+    HOT,
+    Q,
+    accelerations,
+    memory_size,
+    resting_state,
+    workspace,
+)
 from pipelines.errors import InputError
 
 KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
-"""Where a leg's mass matrix is looked at, rad: it is even in the knee angle and depends on no other."""
+"""Where a leg's mass matrix is looked at, rad: it is even in the knee angle and depends on no
+other."""
 
 MORE_POSES = 500
 """Of a machine of more than two joints."""
 
 STABLE_REACH = 1.5
-"""Step times fastest rate up to which the Runge-Kutta method is stable (2.78) and still accurate."""
+"""Step times fastest rate up to which the Runge-Kutta method is stable (2.78) and still
+accurate."""
 
 MOST_STEPS = 200
-"""Integration steps a sample: at the default gain and rate the motors then feel 1e-3 kg·m², less than rotors have."""
+"""Integration steps a sample: at the default gain and rate the motors then feel 1e-3 kg·m², less
+than rotors have."""
 
 
 @njit(**HOT)
 def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
-    """Write mass matrices and mobilities at poses (k, J) into ``mass`` and ``mobility`` (k, J, J)."""
+    """Write mass matrices and mobilities at poses (k, J) into ``mass`` and ``mobility`` (k, J,
+    J)."""
     joints = a.joints
     for k in range(len(poses)):
         for j in range(joints):
@@ -48,12 +60,15 @@ def _poses(joints: int) -> NDArray:
     if joints < 3:
         poses[:, -1] = KNEE_ANGLES
     else:
-        poses[:, 1:] = np.pi * (2.0 * qmc.Halton(joints - 1, scramble=False).random(MORE_POSES) - 1.0)
+        poses[:, 1:] = np.pi * (
+            2.0 * qmc.Halton(joints - 1, scramble=False).random(MORE_POSES) - 1.0
+        )
     return poses
 
 
 def masses(a: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the links' mass matrix (kg·m²) and the motors' acceleration per drive torque, (k, J, J) each: k poses."""
+    """Return the links' mass matrix (kg·m²) and the motors' acceleration per drive torque, (k, J,
+    J) each: k poses."""
     poses, joints = _poses(a.joints), a.joints
     mass, mobility = np.empty((2, len(poses), joints, joints))
     state, still = resting_state(np.zeros(joints)), np.zeros(joints)
@@ -65,12 +80,14 @@ def masses(a: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
-    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays stable.
+    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays
+    stable.
 
     Raises
     ------
     InputError
-        Where that is more than ``MOST_STEPS``: a model can be so light at some pose that it hardly has mass.
+        Where that is more than ``MOST_STEPS``: a model can be so light at some pose that it hardly
+        has mass.
     """
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
     needed = feedback_gain * mobility * period / STABLE_REACH

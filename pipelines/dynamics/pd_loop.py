@@ -10,7 +10,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.dynamics.forward import DQ, HOT, THETA, Q, memory_size, resting_state, stages, step, workspace
+from pipelines.dynamics.forward import (
+    DQ,
+    HOT,
+    THETA,
+    Q,
+    memory_size,
+    resting_state,
+    stages,
+    step,
+    workspace,
+)
 from pipelines.effects.kernel import reading_at, torque_reading_at
 
 SUBSTEPS = 6
@@ -18,7 +28,8 @@ SUBSTEPS = 6
 
 
 class Drives(NamedTuple):
-    """Position controllers of all joints: torque = kp (reference - angle) + kd (its rate - speed), limited.
+    """Position controllers of all joints: torque = kp (reference - angle) + kd (its rate - speed),
+    limited.
 
     The reference runs in a straight line from one set-point to the next; speed is the low-passed
     difference of the counted angle.
@@ -107,7 +118,8 @@ def read_encoders(a, angle):
 
 @njit(cache=True)
 def read_torque(a, t, torque, sensed):
-    """Turn what the drives deliver into what their torque sensors say, in place; once a sample, in order."""
+    """Turn what the drives deliver into what their torque sensors say, in place; once a sample, in
+    order."""
     for i in range(a.bounds[4]):
         values = a.values[a.value_at[i] : a.value_at[i + 1]]
         state = sensed[a.sensed_at[i] : a.sensed_at[i + 1]]
@@ -157,10 +169,22 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
                 read_encoders(a, angle)
                 for j in range(j_count):
                     if d.rad_per_count[j] > 0.0:
-                        angle[j] = np.floor(angle[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
+                        angle[j] = (
+                            np.floor(angle[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
+                        )
                 speed[:] = loop.speed
                 before = loop.state.copy()
-            step(a, w, s, t + done * d.step_s, d.step_s, loop.state, loop.memory, loop.load, loop.torque)
+            step(
+                a,
+                w,
+                s,
+                t + done * d.step_s,
+                d.step_s,
+                loop.state,
+                loop.memory,
+                loop.load,
+                loop.torque,
+            )
             if done == middle:
                 truth[0], truth[1] = before[Q], before[DQ]
                 truth[2], truth[3] = s.rates[0, DQ], before[THETA]
@@ -172,9 +196,15 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
 
 
 def follow(
-    a: Assembly, d: Drives, loop: LoopState, reference: NDArray, start_s: float, temperature: NDArray | None = None
+    a: Assembly,
+    d: Drives,
+    loop: LoopState,
+    reference: NDArray,
+    start_s: float,
+    temperature: NDArray | None = None,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4, J) of each sample.
+    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4,
+    J) of each sample.
 
     ``temperature`` (n, J) is the motors', °C, where they warm.
     """
@@ -189,7 +219,9 @@ def follow(
 
 
 @njit(cache=True)
-def _follow(a, d, w, s, loop, reference, start_s, temperature, enabled, angle, speed, torque, truth):
+def _follow(
+    a, d, w, s, loop, reference, start_s, temperature, enabled, angle, speed, torque, truth
+):
     period = d.step_s * SUBSTEPS * d.periods
     for k in range(len(reference)):
         a.temperature[:] = temperature[k]

@@ -1,4 +1,5 @@
-"""The leg to be simulated: one kind of run of an identified model, laid out for the compiled dynamics."""
+"""The leg to be simulated: one kind of run of an identified model, laid out for the compiled
+dynamics."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,13 +38,16 @@ class Plant:
         return machine_of(self.joints, self.geometry)
 
     def metadata(self) -> dict:
-        """Return what a file says of the plant: run, geometry and every parameter of every effect."""
+        """Return what a file says of the plant: run, geometry and every parameter of every
+        effect."""
         effects = [
             {
                 "effect": term.effect.label,
                 **{
                     p.name: float(v)
-                    for p, v in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
+                    for p, v in zip(
+                        term.effect.parameters, term.effect.physical(term.values), strict=True
+                    )
                 },
             }
             for term in self.model
@@ -59,11 +63,16 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     if lightest <= 0:
         X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
         mechanism = machine_of(joints, geometry).mechanism
-        reasons = mechanism.unrealizable(X, geometry) or [f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"]
+        reasons = mechanism.unrealizable(X, geometry) or [
+            f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
+        ]
         whose, mend = (
             ("leg", "from motions that separate X1, X2 and X3 better")
             if mechanism is LEG
-            else ("machine", "from richer motions, with the signs of torque and angle as they should be")
+            else (
+                "machine",
+                "from richer motions, with the signs of torque and angle as they should be",
+            )
         )
         raise InputError(
             f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. A simulation of it would run away; "
@@ -73,7 +82,8 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
 
 
 def _lightest(assembly: Assembly) -> float:
-    """Return the least eigenvalue of the mass matrix at any pose, kg·m²; 0 where there is no mass to divide by."""
+    """Return the least eigenvalue of the mass matrix at any pose, kg·m²; 0 where there is no mass
+    to divide by."""
     try:
         return float(np.linalg.eigvalsh(masses(assembly)[0]).min())
     except ZeroDivisionError:
@@ -83,7 +93,8 @@ def _lightest(assembly: Assembly) -> float:
 def plant_from_table(
     table: Table, run: str, default_geometry: Geometry | None = None, recording: Path | None = None
 ) -> Plant:
-    """Return the plant that a ``parameters/1`` table describes for one kind of run, as it was in a recorded one.
+    """Return the plant that a ``parameters/1`` table describes for one kind of run, as it was in a
+    recorded one.
 
     Raises
     ------
@@ -93,10 +104,14 @@ def plant_from_table(
     bodies = table.frame.loc[table.frame["effect"] == "rigid_body", "run"]
     if not (bodies.isna() | (bodies == run)).any():
         known = ", ".join(sorted(set(bodies) - {"human"})) or "none"
-        raise InputError(f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run")
+        raise InputError(
+            f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run"
+        )
     joints, geometry = joints_of(table.metadata), geometry_of(table.metadata, default_geometry)
     machine = machine_of(joints, geometry, table.path)
-    model, guesses = with_own_values(model_from_parameters(table.frame, run, machine).for_run(run), table, recording)
+    model, guesses = with_own_values(
+        model_from_parameters(table.frame, run, machine).for_run(run), table, recording
+    )
     return replace(make_plant(model, geometry, joints, run), guesses=guesses)
 
 

@@ -1,4 +1,5 @@
-"""Adaptive tracking with a radial-basis network for each joint (paper section 2.2, mended as in docs/errata.md).
+"""Adaptive tracking with a radial-basis network for each joint (paper section 2.2, mended as in
+docs/errata.md).
 
 With e the error of the angle and r = de + Lambda e (the paper's q)::
 
@@ -6,9 +7,10 @@ With e the error of the angle and r = de + Lambda e (the paper's q)::
     dW/dt  = F H(x) r,                      paused while the torque is at its limit
     H_i(x) = exp(-|x - c_i|² / b²),         x = (e, de, qd, dqd, ddqd) of the joint
 
-Leg, memories and weights are integrated together by the classical Runge-Kutta method; the direction of
-dry friction is held over a step, as everywhere in the forward dynamics. A step in which a joint turns back, or
-a torque reaches or leaves its limit, is halved until the switch is found: its time is what limits the accuracy.
+Leg, memories and weights are integrated together by the classical Runge-Kutta method; the direction
+of dry friction is held over a step, as everywhere in the forward dynamics. A step in which a joint
+turns back, or a torque reaches or leaves its limit, is halved until the switch is found: its time
+is what limits the accuracy.
 """
 
 from typing import Any, NamedTuple
@@ -47,7 +49,8 @@ PARTS = 256
 """How finely a step is cut where something switches in it, a power of two."""
 
 ROUNDING, CREEP = 1e-6, 1e-3
-"""Against its direction a joint may move this much, rad/s; held by friction, as much as torque changes in a step."""
+"""Against its direction a joint may move this much, rad/s; held by friction, as much as torque
+changes in a step."""
 
 TURN = 2.0 * np.pi
 """A joint that leaves ± one turn has run away, rad."""
@@ -84,7 +87,8 @@ class Encoder(NamedTuple):
 
 
 class _Network(NamedTuple):
-    """Weights, their rates at the four stages, the weights of a stage, and the neurons' activation."""
+    """Weights, their rates at the four stages, the weights of a stage, and the neurons'
+    activation."""
 
     weights: np.ndarray
     rates: np.ndarray
@@ -93,7 +97,8 @@ class _Network(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """State, memory, load and weights at the begin of a step, and references and disturbance within it."""
+    """State, memory, load and weights at the begin of a step, and references and disturbance within
+    it."""
 
     state: np.ndarray
     memory: np.ndarray
@@ -120,7 +125,8 @@ SEEN = typeof(_Seen(*np.zeros((5, 1))))
 
 @njit(**INNER)
 def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
-    """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted`` (3, J)."""
+    """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted``
+    (3, J)."""
     sharpness = 1.0 / (c.width * c.width)
     for j in range(torque.shape[0]):
         q, dq, ddq = wanted[0, j], wanted[1, j], wanted[2, j]
@@ -129,7 +135,10 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
         r = de + c.error_gain * e
         network[j] = 0.0
         # |x - c|² multiplied out: a centre has the same coordinate in each of the five directions.
-        sum_of_inputs, sum_of_squares = e + de + q + dq + ddq, e * e + de * de + q * q + dq * dq + ddq * ddq
+        sum_of_inputs, sum_of_squares = (
+            e + de + q + dq + ddq,
+            e * e + de * de + q * q + dq * dq + ddq * ddq,
+        )
         for i in range(c.nodes.shape[0]):
             distance = sum_of_squares + c.nodes[i] * (5.0 * c.nodes[i] - 2.0 * sum_of_inputs)
             activation[i] = np.exp(-distance * sharpness)
@@ -143,7 +152,8 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
 
 @njit(cache=True, inline="always")
 def _keeps_going(direction, state):
-    """Tell whether every motor moves in the direction of its friction, or stands where friction holds it."""
+    """Tell whether every motor moves in the direction of its friction, or stands where friction
+    holds it."""
     agrees = True
     for j in range(direction.shape[0]):
         v = state[DTHETA, j]
@@ -157,11 +167,15 @@ def _keeps_going(direction, state):
         float64[:, :, ::1], states, vector, vector, states,
     )
 )  # fmt: skip
-def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive):
-    """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin, middle and end.
+def _step(
+    a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
+):
+    """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin,
+    middle and end.
 
-    Torque and network output at the begin are written to ``torque`` and ``network`` (J,); ``drive`` is scratch.
-    Returns True where nothing switched on the way: no joint turned back, no torque reached or left its limit.
+    Torque and network output at the begin are written to ``torque`` and ``network`` (J,); ``drive``
+    is scratch. Returns True where nothing switched on the way: no joint turned back, no torque
+    reached or left its limit.
     """
     _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
     for j in range(a.joints):
@@ -176,7 +190,17 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
         for j in range(a.joints):
             for k in range(net.weights.shape[1]):
                 net.stage[j, k] = net.weights[j, k] + reach * net.rates[i - 1, j, k]
-        _control(c, seen, s.state, wanted[half_steps], net.stage, net.activation, drive[0], drive[3], net.rates[i])
+        _control(
+            c,
+            seen,
+            s.state,
+            wanted[half_steps],
+            net.stage,
+            net.activation,
+            drive[0],
+            drive[3],
+            net.rates[i],
+        )
         for j in range(a.joints):
             smooth &= (abs(drive[0, j]) == c.limit) == (abs(torque[j]) == c.limit)
             drive[0, j] -= disturbance[half_steps, j]
@@ -203,19 +227,43 @@ def _copy(state, memory, load, weights, into_state, into_memory, into_load, into
 
 @njit(cache=True, inline="always")
 def _within(wanted, disturbance, begin, length, kept):
-    """Write references and disturbance of a part of a step, in shares of it; parabolas through the three given."""
+    """Write references and disturbance of a part of a step, in shares of it; parabolas through the
+    three given."""
     for i in range(3):
         x = begin + 0.5 * i * length
         first, middle, last = (1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)
         for j in range(wanted.shape[2]):
-            kept.disturbance[i, j] = first * disturbance[0, j] + middle * disturbance[1, j] + last * disturbance[2, j]
+            kept.disturbance[i, j] = (
+                first * disturbance[0, j] + middle * disturbance[1, j] + last * disturbance[2, j]
+            )
             for k in range(3):
-                kept.wanted[i, k, j] = first * wanted[0, k, j] + middle * wanted[1, k, j] + last * wanted[2, k, j]
+                kept.wanted[i, k, j] = (
+                    first * wanted[0, k, j] + middle * wanted[1, k, j] + last * wanted[2, k, j]
+                )
 
 
 @njit(**INNER)
-def _advance(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive, kept):
-    """As ``_step``, but a part in which something switches is taken again as two halves, down to a ``PARTS``-th."""
+def _advance(
+    a,
+    c,
+    w,
+    s,
+    net,
+    seen,
+    t,
+    h,
+    state,
+    memory,
+    load,
+    wanted,
+    disturbance,
+    torque,
+    network,
+    drive,
+    kept,
+):
+    """As ``_step``, but a part in which something switches is taken again as two halves, down to a
+    ``PARTS``-th."""
     done, size = 0, PARTS
     while done < PARTS:
         _copy(state, memory, load, net.weights, kept.state, kept.memory, kept.load, kept.weights)
@@ -232,7 +280,9 @@ def _advance(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturban
             while size < PARTS and done % (2 * size) == 0:
                 size *= 2
         else:
-            _copy(kept.state, kept.memory, kept.load, kept.weights, state, memory, load, net.weights)
+            _copy(
+                kept.state, kept.memory, kept.load, kept.weights, state, memory, load, net.weights
+            )
             size //= 2
 
 
@@ -249,7 +299,9 @@ def _look(a, encoder, seen, state, k, period):
             if encoder.rad_per_count > 0.0:
                 angle = np.floor(angle / encoder.rad_per_count + 0.5) * encoder.rad_per_count
             if k > 0:
-                seen.speed[j] += encoder.speed_share * ((angle - seen.angle[j]) / period - seen.speed[j])
+                seen.speed[j] += encoder.speed_share * (
+                    (angle - seen.angle[j]) / period - seen.speed[j]
+                )
             seen.speed_error[j] = seen.speed[j] - state[DTHETA, j]
         seen.angle[j] = angle
         seen.angle_error[j] = angle - state[THETA, j]
@@ -257,9 +309,26 @@ def _look(a, encoder, seen, state, k, period):
 
 @njit(**HOT)
 def _run(
-    a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, kept, out
+    a,
+    c,
+    encoder,
+    w,
+    s,
+    net,
+    seen,
+    state,
+    memory,
+    load,
+    reference,
+    disturbance,
+    period,
+    substeps,
+    drive,
+    kept,
+    out,
 ):
-    """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends it."""
+    """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends
+    it."""
     h = period / substeps
     last = out.shape[0] - 1
     for k in range(out.shape[0]):
@@ -271,7 +340,17 @@ def _run(
         torque, network = out[k, 2], out[k, 3]
         at = 2 * k * substeps
         if ends:
-            _control(c, seen, state, reference[at], net.weights, net.activation, torque, network, net.rates[0])
+            _control(
+                c,
+                seen,
+                state,
+                reference[at],
+                net.weights,
+                net.activation,
+                torque,
+                network,
+                net.rates[0],
+            )
             break
         for i in range(substeps):
             now = slice(at + 2 * i, at + 2 * i + 3)
@@ -313,7 +392,8 @@ def follow_with_rbf(
     start: NDArray,
     substeps: int = 1,
 ) -> RbfRun:
-    """Let a leg follow a reference under the adaptive controller, weights zero and at rest to begin with.
+    """Let a leg follow a reference under the adaptive controller, weights zero and at rest to begin
+    with.
 
     Parameters
     ----------
@@ -340,7 +420,9 @@ def follow_with_rbf(
     out = np.empty((n, 4, joints))
     state, memory = resting_state(start), np.zeros(memory_size(a))
     w, s = workspace(joints), stages(joints, len(memory))
-    network = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
+    network = _Network(
+        np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m)
+    )
     kept = _Kept(
         np.zeros((4, joints)), np.zeros(len(memory)), np.zeros(joints), np.zeros((joints, m)),
         np.zeros((3, 3, joints)), np.zeros((3, joints)),

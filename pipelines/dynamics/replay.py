@@ -12,7 +12,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import assemble
-from pipelines.dynamics.forward import DTHETA, HOT, INNER, THETA, memory_rates, memory_size, stages, step, workspace
+from pipelines.dynamics.forward import (
+    DTHETA,
+    HOT,
+    INNER,
+    THETA,
+    memory_rates,
+    memory_size,
+    stages,
+    step,
+    workspace,
+)
 from pipelines.errors import InputError
 from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.mechanics.motion import Motion
@@ -45,11 +55,14 @@ class ReplayResult:
         return np.sqrt(np.mean(self.error**2, axis=(0, 1)))
 
 
-def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: float = EVERY_S) -> ReplayResult:
-    """Drive a model by the recorded torque from the recorded state, over windows within each segment.
+def replay(
+    model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: float = EVERY_S
+) -> ReplayResult:
+    """Drive a model by the recorded torque from the recorded state, over windows within each
+    segment.
 
-    Windows lie within stretches of valid samples. A torque sample holds from half a sample before its time to
-    half a sample after it, as a mean over that time does.
+    Windows lie within stretches of valid samples. A torque sample holds from half a sample before
+    its time to half a sample after it, as a mean over that time does.
 
     Parameters
     ----------
@@ -66,7 +79,10 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
     """
     length = round(window_s * motion.sample_rate_hz)
     every = max(1, round(every_s * motion.sample_rate_hz))
-    first = np.array([k for s in _stretches(motion) for k in range(s.start, s.stop - length, every)], dtype=np.int64)
+    first = np.array(
+        [k for s in _stretches(motion) for k in range(s.start, s.stop - length, every)],
+        dtype=np.int64,
+    )
     if first.size == 0:
         raise InputError(
             f"{motion.file or 'the motion'}: no stretch of valid samples lasts the {window_s:g} s of a window; "
@@ -82,19 +98,40 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
     memory = np.zeros((len(motion), memory_size(a)))
     w, s = workspace(a.joints), stages(a.joints, memory.shape[1])
     for stretch in motion.segments():
-        _remember(a, w, s, motion.time[stretch], states[stretch], load[stretch], temperature[stretch], memory[stretch])
+        _remember(
+            a,
+            w,
+            s,
+            motion.time[stretch],
+            states[stretch],
+            load[stretch],
+            temperature[stretch],
+            memory[stretch],
+        )
     torque = np.ascontiguousarray(model.delivered(motor))
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * LONGEST_STEP_S)))
     out = np.empty((len(first), length + 1, 2, a.joints))
     for k, window in zip(first, out, strict=True):
         a.temperature[:] = temperature[k]
-        _window(a, w, s, motion.time[k:], torque[k:], parts, states[k].copy(), memory[k].copy(), load[k].copy(), window)
+        _window(
+            a,
+            w,
+            s,
+            motion.time[k:],
+            torque[k:],
+            parts,
+            states[k].copy(),
+            memory[k].copy(),
+            load[k].copy(),
+            window,
+        )
     samples = first[:, np.newaxis] + np.arange(length + 1)
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
 
 
 def known_temperature(motion: Motion) -> NDArray:
-    """Return the motors' temperature along a motion, (n, J) °C: the reference where it was not read."""
+    """Return the motors' temperature along a motion, (n, J) °C: the reference where it was not
+    read."""
     return np.nan_to_num(motion.motor_temperature, nan=REFERENCE_C)
 
 
@@ -109,11 +146,14 @@ def _stretches(motion: Motion) -> Iterator[slice]:
 
 @njit(**INNER)
 def _recall(a, w, s, time, states, load, k, share, memory):
-    """Write the memories' rates a share of the way from sample ``k`` to the next into the first of ``s``."""
+    """Write the memories' rates a share of the way from sample ``k`` to the next into the first of
+    ``s``."""
     for j in range(a.joints):
         w.passed[j] = load[k, j] + share * (load[k + 1, j] - load[k, j])
         for row in range(4):
-            s.state[row, j] = states[k, row, j] + share * (states[k + 1, row, j] - states[k, row, j])
+            s.state[row, j] = states[k, row, j] + share * (
+                states[k + 1, row, j] - states[k, row, j]
+            )
         w.direction[j] = np.sign(s.state[DTHETA, j])
     t = time[k] + share * (time[k + 1] - time[k])
     memory_rates(a, w, t, s.state, memory, w.direction, w.passed, s.memory_rates[0])
@@ -121,7 +161,8 @@ def _recall(a, w, s, time, states, load, k, share, memory):
 
 @njit(**HOT)
 def _remember(a, w, s, time, states, load, temperature, memory):
-    """Write the memories along a recorded stretch (n, 4, J), from rest at its first sample, into ``memory`` (n, m)."""
+    """Write the memories along a recorded stretch (n, 4, J), from rest at its first sample, into
+    ``memory`` (n, m)."""
     for k in range(len(time) - 1 if memory.shape[1] > 0 else 0):
         for j in range(a.joints):
             a.temperature[j] = temperature[k, j]

@@ -37,7 +37,8 @@ class ClosedLoop:
         return self.reference - self.run.angle
 
     def worst_error(self, after_s: float) -> NDArray:
-        """Return the largest error of each joint after a time, (J,) rad; NaN where a joint ran away."""
+        """Return the largest error of each joint after a time, (J,) rad; NaN where a joint ran
+        away."""
         if self.ran_away:
             return np.full(len(self.joints), np.nan)
         return np.abs(self.error[self.time >= after_s]).max(axis=0)
@@ -64,7 +65,10 @@ class ClosedLoop:
 
 
 def track(
-    plant: Plant, settings: SimulateSettings, reference: Trajectory, feedback_gain: float | None = None
+    plant: Plant,
+    settings: SimulateSettings,
+    reference: Trajectory,
+    feedback_gain: float | None = None,
 ) -> ClosedLoop:
     """Let the leg follow a reference from rest, hanging straight down.
 
@@ -91,7 +95,9 @@ def track(
         substeps,
     )
     reached = len(run.angle)
-    return ClosedLoop(np.arange(reached) * period, wanted[:: 2 * substeps, 0][:reached], run, plant.joints, n)
+    return ClosedLoop(
+        np.arange(reached) * period, wanted[:: 2 * substeps, 0][:reached], run, plant.joints, n
+    )
 
 
 def _controller(settings: SimulateSettings, feedback_gain: float) -> RbfController:
@@ -120,9 +126,12 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
 def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
     if reference.joints != plant.joints:
         told, expected = (
-            ", ".join(f"{joint.name} ({joint.kind})" for joint in joints) for joints in (reference.joints, plant.joints)
+            ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
+            for joints in (reference.joints, plant.joints)
         )
-        raise InputError(f"the reference moves {told}, expected the model's joints, {expected}; give one for these")
+        raise InputError(
+            f"the reference moves {told}, expected the model's joints, {expected}; give one for these"
+        )
 
 
 def _refuse_short(reference: Trajectory, settings: SimulateSettings) -> None:

@@ -12,19 +12,23 @@ from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
-"""N·m/rad of hard teeth in contact; stiff against every joint, soft enough for the integration step."""
+"""N·m/rad of hard teeth in contact; stiff against every joint, soft enough for the integration
+step."""
 
 SHAFT_STIFFNESS = 4000.0
-"""N·m/rad of teeth on a shaft that twists. Only then a measured motion tells how the link strikes them."""
+"""N·m/rad of teeth on a shaft that twists. Only then a measured motion tells how the link strikes
+them."""
 
 STRIKING_RATIO = 1.0
-"""Damping ratio at which the link is let strike the teeth behind a measured motion: how it bounces no motion tells."""
+"""Damping ratio at which the link is let strike the teeth behind a measured motion: how it bounces
+no motion tells."""
 
 CONTACT_DAMPING_RATIO = 0.3
 """Of the motor's swing on its teeth."""
 
 CROSSING_TORQUE = 2.0
-"""N·m on both sides of zero within which the estimate of the transmitted torque does not tell the side."""
+"""N·m on both sides of zero within which the estimate of the transmitted torque does not tell the
+side."""
 
 
 class Backlash(Effect):
@@ -66,12 +70,17 @@ class Backlash(Effect):
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the link, which falls through the play and strikes the teeth.
 
-        Where these are hard, or the link's mass is unknown, it hangs on that side towards which the transmitted
-        torque pushes it, at the motor's speed: a motor that hard teeth strike jumps faster than it is sampled.
+        Where these are hard, or the link's mass is unknown, it hangs on that side towards which the
+        transmitted torque pushes it, at the motor's speed: a motor that hard teeth strike jumps
+        faster than it is sampled.
         """
         values = self.completed(shape)
         if motion.link_swing is not None and values[1] < max(self.shape[1].forms):
             return link_behind_motor(motion, motion.link_swing, self, values, STRIKING_RATIO)
         j, q = self.column(motion), motion.q.copy()
-        q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
+        q[:, j] -= (
+            0.5
+            * shape[0]
+            * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
+        )
         return motion.with_state(q, motion.dq, motion.ddq)

@@ -12,7 +12,8 @@ from pipelines.mechanics.motion import Motion
 class BaseTilt(Effect):
     """Gravity's direction is off, so every segment's angle from the vertical is.
 
-    Inertia does not depend on the hip angle: a tilt is the same as a hip angle counted from another direction.
+    Inertia does not depend on the hip angle: a tilt is the same as a hip angle counted from another
+    direction.
     """
 
     name = "base_tilt"
@@ -24,14 +25,19 @@ class BaseTilt(Effect):
     equation = "hip angle from the vertical = hip angle from the base + tilt"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the base's frame)"
     looks_like = "gravity torque that leads or lags the first joint's angle in every run alike"
-    confirm = "put a spirit level on the base, or let the machine hang freely and read its first angle"
+    confirm = (
+        "put a spirit level on the base, or let the machine hang freely and read its first angle"
+    )
     by_angle = True
     whole_leg = True
-    shape = (Parameter("tilt", "rad", "adds to the first joint's absolute angle", "t", (-0.15, 0.15)),)
+    shape = (
+        Parameter("tilt", "rad", "adds to the first joint's absolute angle", "t", (-0.15, 0.15)),
+    )
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return it where the first joint turns: a tilt adds to an angle, not to where a slide stands."""
+        """Return it where the first joint turns: a tilt adds to an angle, not to where a slide
+        stands."""
         return super().possible(machine) if machine.joints[0].kind == "revolute" else []
 
     @reading

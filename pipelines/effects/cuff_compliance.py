@@ -12,18 +12,22 @@ RELAXATION_S = 0.02
 """Damping over stiffness of soft tissue under a strap."""
 
 MACHINE_INERTIA = 0.02
-"""kg·m² on the machine's side, so that the joint has some where a model counts all of its mass as the limb's."""
+"""kg·m² on the machine's side, so that the joint has some where a model counts all of its mass as
+the limb's."""
 
 
 class CuffCompliance(Effect):
-    """Soft tissue and straps: the limb lags the exoskeleton by the torque between them over a stiffness.
+    """Soft tissue and straps: the limb lags the exoskeleton by the torque between them over a
+    stiffness.
 
-    What sits on the wearer's side of the cuffs, and only that, sees the limb's motion: human effects, and the
-    rigid body bound to ``with_human`` runs. Where that body counts machine and human together, as a fit of each
-    kind of run for itself has it, the stiffness comes out too high by the machine's share of the mass; with the
-    machine's body of its own beside the human's it is exact.
+    What sits on the wearer's side of the cuffs, and only that, sees the limb's motion: human
+    effects, and the rigid body bound to ``with_human`` runs. Where that body counts machine and
+    human together, as a fit of each kind of run for itself has it, the stiffness comes out too high
+    by the machine's share of the mass; with the machine's body of its own beside the human's it is
+    exact.
 
-    Forward dynamics knows the shank that goes with the thigh only; ``shank_held`` is for what was measured.
+    Forward dynamics knows the shank that goes with the thigh only; ``shank_held`` is for what was
+    measured.
     """
 
     name = "cuff_compliance"
@@ -35,7 +39,9 @@ class CuffCompliance(Effect):
     equation = "torque on the limb = k twist (1 + h twist²); limb angle = exoskeleton angle - twist"
     source = "Yandell, Quinlivan, Popov, Walsh, Zelik (2017), J. NeuroEngineering and Rehabilitation 14:40"
     looks_like = "with the human only, gravity and inertia torques off in step with the cuff forces"
-    confirm = "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
+    confirm = (
+        "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
+    )
     acts_in = ("with_human",)
     shape = (
         Parameter("stiffness", "N·m/rad", "torque between machine and limb per small angle", "k", (30.0, 2000.0)),
@@ -59,11 +65,14 @@ class CuffCompliance(Effect):
         return values[0] * (twist * (1.0 + values[2] * twist * twist) + RELAXATION_S * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the limb; it follows its torque at once where its mass is unknown."""
+        """Return the motion of the limb; it follows its torque at once where its mass is
+        unknown."""
         stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
         if motion.limb_swing is not None:
-            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held, hardening))
+            return behind_spring(
+                motion, motion.limb_swing, direction, self, (stiffness, held, hardening)
+            )
         q, dq, ddq = (
             state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness
             for state, torque in zip((motion.q, motion.dq, motion.ddq), motion.on_limb, strict=True)
@@ -73,7 +82,8 @@ class CuffCompliance(Effect):
     def _direction(self, motion: Motion, shank_held: bool) -> NDArray:
         """Return how the limb's joints turn per unit of twist, (n, J).
 
-        A thigh that moves in its cuff moves the knee. The shank goes with it, or pivots in a cuff that is firm.
+        A thigh that moves in its cuff moves the knee. The shank goes with it, or pivots in a cuff
+        that is firm.
         """
         j = self.column(motion)
         direction = np.zeros_like(motion.q)

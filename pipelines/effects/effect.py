@@ -11,8 +11,9 @@ An effect says where it acts by which hooks it has:
 ``corrected``       the inverse of ``spring`` or ``reading`` for a measured motion
 ==================  ===========================================================
 
-Identification and diagnosis use ``columns``, ``observed`` and ``corrected``; the forward dynamics uses
-the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so the two cannot disagree.
+Identification and diagnosis use ``columns``, ``observed`` and ``corrected``; the forward dynamics
+uses the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so the two cannot
+disagree.
 """
 
 from abc import ABC
@@ -50,7 +51,8 @@ class Side(StrEnum):
 
 
 class Family(StrEnum):
-    """The kind of law that an effect follows, as a reader who does not know the catalogue names it."""
+    """The kind of law that an effect follows, as a reader who does not know the catalogue names
+    it."""
 
     ANGLE = "angle"
     SPEED = "speed"
@@ -126,15 +128,18 @@ class Parameter:
     default: float | None = None
     """What it is where nobody says; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
-    """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
+    """Values that stand for the known members of a family of shapes; empty where the range is all
+    there is."""
     between_forms: bool = True
     """False where only the forms exist, as of a sign or a switch."""
     grain: float = 1.0
     """Step of a search along what an effect oscillates with."""
     swept: bool = False
-    """True where it is a place on the joint's way: a search spans what the motion sweeps, not ``typical``."""
+    """True where it is a place on the joint's way: a search spans what the motion sweeps, not
+    ``typical``."""
     of_joint: bool = True
-    """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
+    """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic
+    joint too."""
 
     @property
     def neutral(self) -> float:
@@ -188,14 +193,18 @@ class Effect(ABC):
     confirm: ClassVar[str]
     """How to make sure of it on the rig."""
     family: ClassVar[Family]
-    """The kind of law it follows; one that states none has the family of its side (``FAMILY_OF_SIDE``)."""
+    """The kind of law it follows; one that states none has the family of its side
+    (``FAMILY_OF_SIDE``)."""
     any_form: ClassVar[str] = ""
-    """The smooth law that is this effect whatever its form; empty where only forms near its own are."""
+    """The smooth law that is this effect whatever its form; empty where only forms near its own
+    are."""
     resembles: ClassVar[tuple[str, ...]]
-    """Smooth laws of its joint (``LAWS``) that contain it approximately: as such a law a verdict tells of a real effect
-    that is too far from our equation. One that states none has those of its family (``LAWS_OF_FAMILY``)."""
+    """Smooth laws of its joint (``LAWS``) that contain it approximately: as such a law a verdict
+    tells of a real effect that is too far from our equation. One that states none has those of its
+    family (``LAWS_OF_FAMILY``)."""
     forms_differ: ClassVar[str] = ""
-    """How the real effect may differ from the equation, a sentence without its full stop; empty where nobody said."""
+    """How the real effect may differ from the equation, a sentence without its full stop; empty
+    where nobody said."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
@@ -203,8 +212,8 @@ class Effect(ABC):
     needs_temperature: ClassVar[bool] = False
     """True where it is known only in runs in which its motor's temperature was read."""
     by_angle: ClassVar[bool] = False
-    """True where it shows only in a torque that depends on where its joint stands, as gravity's does; at the whole
-    machine, on where the first one does."""
+    """True where it shows only in a torque that depends on where its joint stands, as gravity's
+    does; at the whole machine, on where the first one does."""
     holds: ClassVar[bool] = False
     """True where it raises what can hold a joint that stands."""
     whole_leg: ClassVar[bool] = False
@@ -214,7 +223,8 @@ class Effect(ABC):
     shape: ClassVar[tuple[Parameter, ...]] = ()
     """What the torque is a nonlinear function of; those with a default come last."""
     reported: ClassVar[tuple[Parameter, ...] | None] = None
-    """What files say of it where that is not what a fit solves for, as amplitude and phase of sine and cosine."""
+    """What files say of it where that is not what a fit solves for, as amplitude and phase of sine
+    and cosine."""
 
     parity: ClassVar[Parity | None] = None
     """Of the torque in velocity; None where it has none, or has a memory."""
@@ -226,15 +236,19 @@ class Effect(ABC):
     motor_inertia: ClassVar[float] = 0.0
     """kg·m² on the motor's side of ``spring``."""
     known_to: ClassVar[float] = 0.0
-    """Relative standard error that the effect's approximation of itself adds to its first shape, whatever the data."""
+    """Relative standard error that the effect's approximation of itself adds to its first shape,
+    whatever the data."""
     may_differ: ClassVar[str] = ""
-    """What is set anew at every start, so that each run may have another; empty where all runs share it."""
+    """What is set anew at every start, so that each run may have another; empty where all runs
+    share it."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False
-    """True where ``corrected`` lets the load swing on the spring: what it does then depends on its frequency."""
+    """True where ``corrected`` lets the load swing on the spring: what it does then depends on its
+    frequency."""
     reads_load: ClassVar[bool] = False
-    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has to be smoothed.
+    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has
+    to be smoothed.
 
     Of others, columns are computed once for motions that differ in their loads alone.
     """
@@ -257,10 +271,13 @@ class Effect(ABC):
             cls.resembles = LAWS_OF_FAMILY[cls.family]
 
     def __post_init__(self) -> None:
-        """Say in the machine's own units and equations what the class says of a leg, and what each run has."""
+        """Say in the machine's own units and equations what the class says of a leg, and what each
+        run has."""
         if self.each_run:
             for role in ("linear", "shape"):
-                object.__setattr__(self, role, tuple(replace(p, per_run=True) for p in getattr(type(self), role)))
+                object.__setattr__(
+                    self, role, tuple(replace(p, per_run=True) for p in getattr(type(self), role))
+                )
         if self.on == THE_LEG:
             return
         if self.joint:
@@ -273,7 +290,8 @@ class Effect(ABC):
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return the joints of a machine that can have it and show it; ``[None]`` where it is the whole machine's."""
+        """Return the joints of a machine that can have it and show it; ``[None]`` where it is the
+        whole machine's."""
         mechanism = machine.mechanism
         if cls.name in mechanism.absorbs:
             return []
@@ -317,12 +335,14 @@ class Effect(ABC):
 
     @property
     def goes_with_time(self) -> bool:
-        """Tell whether its torque goes with wall time, as a rhythm's and a drift's do: more than a zero set anew."""
+        """Tell whether its torque goes with wall time, as a rhythm's and a drift's do: more than a
+        zero set anew."""
         return self.per_run and not self.each_run
 
     @property
     def sized_each_run(self) -> bool:
-        """Tell whether each run has a size of it for itself, so that one run says nothing of another's."""
+        """Tell whether each run has a size of it for itself, so that one run says nothing of
+        another's."""
         return self.each_run or any(p.per_run for p in self.linear)
 
     @property
@@ -337,26 +357,34 @@ class Effect(ABC):
 
     def explains(self, motion: Motion) -> bool:
         """Tell whether the effect is there in this run, and what it depends on was read."""
-        known = not self.needs_temperature or bool(np.isfinite(motion.motor_temperature[:, self.column(motion)]).all())
+        known = not self.needs_temperature or bool(
+            np.isfinite(motion.motor_temperature[:, self.column(motion)]).all()
+        )
         return known and self.acts(motion.run)
 
     def shows_in(self, motions: Sequence[Motion]) -> bool:
-        """Tell whether runs hold what the effect depends on, so that it can be asked for in them."""
-        if self.needs_temperature and not self.temperature_varies([m for m in motions if self.acts(m.run)]):
+        """Tell whether runs hold what the effect depends on, so that it can be asked for in
+        them."""
+        if self.needs_temperature and not self.temperature_varies(
+            [m for m in motions if self.acts(m.run)]
+        ):
             return False
         return any(self.explains(motion) for motion in motions)
 
     def temperature_varies(self, motions: Sequence[Motion]) -> bool:
-        """Tell whether every run has its motor's temperature, and not the same one throughout all of them."""
+        """Tell whether every run has its motor's temperature, and not the same one throughout all
+        of them."""
         read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
         ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
         return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)  # NaN is not
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return shapes in proportion to which the effect transforms the measurement; empty where it is not linear.
+        """Return shapes in proportion to which the effect transforms the measurement; empty where
+        it is not linear.
 
-        Each set of shapes (s,) is a candidate that has one column for each of them: the effect of any combination is
-        that combination of the columns, so that no grid of shapes needs to be searched.
+        Each set of shapes (s,) is a candidate that has one column for each of them: the effect of
+        any combination is that combination of the columns, so that no grid of shapes needs to be
+        searched.
         """
         return ()
 
@@ -373,11 +401,13 @@ class Effect(ABC):
         return np.asarray(values, dtype=float)
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the values of ``fitted`` for those of ``parameters``, (p,) each: the inverse of ``physical``."""
+        """Return the values of ``fitted`` for those of ``parameters``, (p,) each: the inverse of
+        ``physical``."""
         return np.asarray(physical, dtype=float)
 
     def jacobian(self, values: NDArray) -> NDArray:
-        """Return how ``physical`` changes with ``values``, (parameters, fitted), to carry intervals over."""
+        """Return how ``physical`` changes with ``values``, (parameters, fitted), to carry intervals
+        over."""
         values = np.asarray(values, dtype=float)
         if type(self).physical is Effect.physical:
             return np.eye(len(values))
@@ -387,16 +417,19 @@ class Effect(ABC):
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
 
     def told_by(self, names: Collection[str]) -> "Effect":
-        """Return the effect with as many parts as the names of some values tell of; of most effects there is one."""
+        """Return the effect with as many parts as the names of some values tell of; of most effects
+        there is one."""
         return self
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
-        """Return values of ``fitted``, (p,), with the defaults of those that are left out at the end."""
+        """Return values of ``fitted``, (p,), with the defaults of those that are left out at the
+        end."""
         rest = [p.default for p in self.fitted[len(values) :]]
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Torque that the effect adds to what is measured, per unit of each linear parameter, (n, J, p) N·m per unit.
+        """Torque that the effect adds to what is measured, per unit of each linear parameter, (n,
+        J, p) N·m per unit.
 
         ``shape`` holds the nonlinear parameters of this run, in the order of ``self.shape``.
         """
@@ -406,7 +439,9 @@ class Effect(ABC):
         values = self.completed(np.append(np.zeros(len(self.linear)), shape))
         if self.torque_reading is not None:
             for i, unit in enumerate(np.eye(len(values))[: len(self.linear)]):
-                columns[:, :, i : i + 1] = self._read(columns[:, :, i : i + 1], motion, values + unit)
+                columns[:, :, i : i + 1] = self._read(
+                    columns[:, :, i : i + 1], motion, values + unit
+                )
         elif self.reaction is not None:
             self._react(motion, values, columns)
         return columns
@@ -417,7 +452,9 @@ class Effect(ABC):
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:
-            columns_along(address(self.reaction), values, joint, *arrays, geometry, np.zeros(2 * joints), out)
+            columns_along(
+                address(self.reaction), values, joint, *arrays, geometry, np.zeros(2 * joints), out
+            )
             return
         for stretch in motion.segments():
             columns_along_with_memory(
@@ -434,24 +471,31 @@ class Effect(ABC):
     def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray | None:
         """Return the torque that the cuffs measure of the effect per unit of each linear parameter.
 
-        ``columns``, (n, J, p), is what the drives measure of it along the same motion. Cuffs measure
-        what is on the wearer's side of them, (n, J, p) too, and nothing else: then it is None.
+        ``columns``, (n, J, p), is what the drives measure of it along the same motion. Cuffs
+        measure what is on the wearer's side of them, (n, J, p) too, and nothing else: then it is
+        None.
         """
         return columns if self.on_limb else None
 
-    def observed(self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
+    def observed(
+        self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()
+    ) -> NDArray:
         """Return what the torque sensors make of torques that the drives deliver, both (n, J, p).
 
         What they add of their own is in ``columns``.
         """
         if self.torque_reading is None or not self.shape or not self.explains(motion):
             return columns
-        return self._read(columns, motion, self.completed(np.append(np.zeros(len(self.linear)), shape)))
+        return self._read(
+            columns, motion, self.completed(np.append(np.zeros(len(self.linear)), shape))
+        )
 
     def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         out = np.empty_like(torque)
         joint = self.column(motion)
-        time, temperature = (np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature))
+        time, temperature = (
+            np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature)
+        )
         for stretch in motion.segments():
             read_along(
                 address(self.torque_reading), values, joint, time[stretch], temperature[stretch], torque[stretch],
@@ -460,11 +504,14 @@ class Effect(ABC):
         return out
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Return what the drives deliver where their sensors say ``torque`` (n, J): the inverse of the reading."""
+        """Return what the drives deliver where their sensors say ``torque`` (n, J): the inverse of
+        the reading."""
         return torque - self.torque(motion, values) if self.torque_reading is not None else torque
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion as it would have been measured without this effect in the sensor or transmission.
+        """Return the motion as it would have been measured without this effect in the sensor or
+        transmission.
 
-        ``shape`` (s,) holds the nonlinear parameters of this run, in the order of ``self.shape``."""
+        ``shape`` (s,) holds the nonlinear parameters of this run, in the order of ``self.shape``.
+        """
         return motion

@@ -9,7 +9,8 @@ from pipelines.mechanics.motion import Motion
 
 
 class EncoderOffset(Effect):
-    """The measured angle is the true one plus a constant; another at each start, where the joint is zeroed there."""
+    """The measured angle is the true one plus a constant; another at each start, where the joint is
+    zeroed there."""
 
     name = "encoder_offset"
     title = "Encoder offset"

@@ -1,4 +1,5 @@
-"""Coulomb and viscous friction of a drive: the baseline every other drive effect is judged against."""
+"""Coulomb and viscous friction of a drive: the baseline every other drive effect is judged
+against."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
@@ -15,8 +16,12 @@ class Friction(Effect):
     forms_differ = "real friction has no sharp corner at standstill and no straight line above it"
     equation = "tau = Ks sgn(v) + Km v"
     source = "paper, appendix A (tau_fic); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7)"
-    looks_like = "a square wave that flips with the direction of motion, on a ramp in proportion to speed"
-    confirm = "move the empty joint at several constant speeds both ways and plot torque against speed"
+    looks_like = (
+        "a square wave that flips with the direction of motion, on a ramp in proportion to speed"
+    )
+    confirm = (
+        "move the empty joint at several constant speeds both ways and plot torque against speed"
+    )
     linear = (
         Parameter("coulomb", "N·m", "friction torque once the joint moves", "Ks", (0.5, 8.0)),
         Parameter("viscous", "N·m·s/rad", "friction torque per unit of speed", "Km", (0.5, 10.0)),

@@ -20,10 +20,14 @@ class FrictionWarmup(Effect):
     looks_like = "residual in step with speed that shrinks from period to period"
     confirm = "repeat one motion from cold for ten minutes and watch torque and motor temperature"
     linear = (
-        Parameter("viscous_drop", "N·m·s/rad", "viscous friction lost while warming", "dv", (0.3, 6.0)),
+        Parameter(
+            "viscous_drop", "N·m·s/rad", "viscous friction lost while warming", "dv", (0.3, 6.0)
+        ),
         Parameter("coulomb_drop", "N·m", "Coulomb friction lost while warming", "ds", (0.0, 4.0)),
     )
-    shape = (Parameter("time_constant", "s", "time in which the excess falls to 1/e", "T", (8.0, 120.0)),)
+    shape = (
+        Parameter("time_constant", "s", "time in which the excess falls to 1/e", "T", (8.0, 120.0)),
+    )
     parity = Parity.ODD
     dissipative = True
 

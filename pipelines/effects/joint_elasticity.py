@@ -16,7 +16,8 @@ DAMPING_RATIO = 0.1
 """Of the motor's swing on the spring: a harmonic drive's flexspline."""
 
 SWING_RATIO = 0.05
-"""Damping ratio at which the link is let swing behind a measured motion; more forgets, less errs for longer."""
+"""Damping ratio at which the link is let swing behind a measured motion; more forgets, less errs
+for longer."""
 
 
 class JointElasticity(Effect):
@@ -50,9 +51,12 @@ class JointElasticity(Effect):
         return values[0] * twist * (1.0 + values[1] * twist * twist) + damping * twist_rate
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the link behind the spring; it follows its torque at once where its mass is unknown."""
+        """Return the motion of the link behind the spring; it follows its torque at once where its
+        mass is unknown."""
         if motion.link_swing is not None:
-            return link_behind_motor(motion, motion.link_swing, self, self.completed(shape), SWING_RATIO)
+            return link_behind_motor(
+                motion, motion.link_swing, self, self.completed(shape), SWING_RATIO
+            )
         j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):

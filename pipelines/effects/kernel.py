@@ -24,9 +24,11 @@ from pipelines.mechanics.instant import reaction as reaction
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 DERIVATIVE = void(INSTANT, vector, vector, vector, int64, vector)
-"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to ``out``.
+"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to
+``out``.
 
-It may depend on the shape values, never on the linear ones: torque would then not be linear in them."""
+It may depend on the shape values, never on the linear ones: torque would then not be linear in
+them."""
 
 SPRING = float64(float64, float64, vector)
 """spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
@@ -35,11 +37,11 @@ READING = void(vector, vector, int64)
 """reading(angle, values, joint): turn true angles into what the encoders say, in place."""
 
 TORQUE_READING = void(float64, vector, vector, int64, vector, vector)
-"""torque_reading(t, torque, values, joint, state, temperature): turn what the drives deliver into what their sensors
-say, in place.
+"""torque_reading(t, torque, values, joint, state, temperature): turn what the drives deliver into
+what their sensors say, in place.
 
-Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first; ``temperature`` is the
-motors', °C, NaN where it was not read."""
+Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first;
+``temperature`` is the motors', °C, NaN where it was not read."""
 
 
 def derivative(function):
@@ -58,7 +60,8 @@ def reading(function):
 
 
 def torque_reading(function):
-    """Compile what a torque sensor makes of the torque; one that needs no temperature may leave out that argument."""
+    """Compile what a torque sensor makes of the torque; one that needs no temperature may leave out
+    that argument."""
     if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
         return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
     return staticmethod(njit(TORQUE_READING, cache=True)(function))
@@ -90,7 +93,9 @@ def _kernel_at(signature):
 
         def lower(context, builder, signature, arguments):
             function = cgutils.create_struct_proxy(kind)(context, builder)
-            function.jit_addr = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
+            function.jit_addr = builder.inttoptr(
+                arguments[0], context.get_value_type(types.voidptr)
+            )
             return function._getvalue()
 
         return kind(where), lower
@@ -107,7 +112,8 @@ torque_reading_at = _kernel_at(TORQUE_READING)
 _table = float64[:, ::1]
 _columns = float64[:, :, ::1]
 _MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperature, geometry
-# Signatures are spelt out so that one compilation serves every effect: the kernel's address is an argument.
+# Signatures are spelt out so that one compilation serves every effect: the kernel's address is an
+# argument.
 _ALONG = void(int64, vector, int64, *_MOTION, vector, _columns)
 _ALONG_WITH_MEMORY = void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns)
 _READ_ALONG = void(
@@ -118,28 +124,31 @@ _READ_ALONG = void(
 _SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
 MEMORY_SUBSTEPS = 8
-"""Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
+"""Steps per sample along a measured motion: a presliding state turns over within a few
+milliseconds."""
 
 SETTLING_S = 2.0
-"""For so long a measured motion is taken to have gone on at its first velocity before it begins: a memory that
-began from nothing would be wrong until the first reversal."""
+"""For so long a measured motion is taken to have gone on at its first velocity before it begins: a
+memory that began from nothing would be wrong until the first reversal."""
 
 SWING_SUBSTEPS = 4
-"""Steps per sample of a load on its spring; the rule is stable at any stiffness, and true up to some 30 Hz."""
+"""Steps per sample of a load on its spring; the rule is stable at any stiffness, and true up to
+some 30 Hz."""
 
 WIDEST_TWIST = 1.0
 """rad within which a swinging load begins at rest."""
 
 TORN = np.pi
-"""rad that no transmission twists by. A load that a fit has made of too little, whose gravity pushes up or whose mass
-is negative, would run away from its spring within a second: here it stays."""
+"""rad that no transmission twists by. A load that a fit has made of too little, whose gravity
+pushes up or whose mass is negative, would run away from its spring within a second: here it stays.
+"""
 
 NUDGE = 1e-7
 """rad and rad/s of the difference quotients of a spring."""
 
 ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
-"""How functions are compiled whose arrays are all arguments: numba then leaves out counting references to them,
-which would take most of their time."""
+"""How functions are compiled whose arrays are all arguments: numba then leaves out counting
+references to them, which would take most of their time."""
 
 
 @njit(inline="always")
@@ -155,8 +164,11 @@ def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
 
 
 @njit(_ALONG, **ALLOCATING_NOTHING)
-def columns_along(where, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out):
-    """Evaluate the reaction kernel at an address along a motion, into ``out`` (n, J, p) N·m per unit.
+def columns_along(
+    where, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out
+):
+    """Evaluate the reaction kernel at an address along a motion, into ``out`` (n, J, p) N·m per
+    unit.
 
     It has no memory. ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
     """
@@ -172,7 +184,8 @@ def columns_along(where, values, joint, time, q, dq, ddq, load, temperature, geo
 
 @njit(inline="always")
 def _between(time, q, dq, ddq, load, k, share, at):
-    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (5, J); return its time."""
+    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (5, J); return
+    its time."""
     for j in range(q.shape[1]):
         at[0, j] = q[k, j] + share * (q[k + 1, j] - q[k, j])
         at[1, j] = dq[k, j] + share * (dq[k + 1, j] - dq[k, j])
@@ -184,7 +197,8 @@ def _between(time, q, dq, ddq, load, k, share, at):
 
 @njit(inline="always")
 def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
-    """Advance a memory by the midpoint rule, from the instant ``at``; ``ahead`` is half a step later."""
+    """Advance a memory by the midpoint rule, from the instant ``at``; ``ahead`` is half a step
+    later."""
     rate(at, state, values, geometry, joint, slope)
     for m in range(state.shape[0]):
         middle[m] = state[m] + 0.5 * h * slope[m]
@@ -195,14 +209,28 @@ def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
 
 @njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
 def columns_along_with_memory(
-    where, where_rate, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, memory, out
+    where,
+    where_rate,
+    values,
+    joint,
+    time,
+    q,
+    dq,
+    ddq,
+    load,
+    temperature,
+    geometry,
+    scratch,
+    memory,
+    out,
 ):
-    """Evaluate the reaction kernel at an address along one unbroken stretch, into ``out`` (n, J, p).
+    """Evaluate the reaction kernel at an address along one unbroken stretch, into ``out`` (n, J,
+    p).
 
     The rate of its memory, which settles first, is the kernel at the other address.
 
-    Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3, states), the
-    first row zero.
+    Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3,
+    states), the first row zero.
     """
     kernel, rate = reaction_at(where), derivative_at(where_rate)
     state, middle, slope = memory[0], memory[1], memory[2]
@@ -231,7 +259,8 @@ def columns_along_with_memory(
 
 @njit(_READ_ALONG, **ALLOCATING_NOTHING)
 def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
-    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m.
+    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J,
+    p), N·m.
 
     The sensor is the kernel at an address; ``at_once`` has room for J, ``state`` for its memory.
     """
@@ -261,13 +290,14 @@ def _twist_at_rest(kernel, values, torque, stiffness):
 
 @njit(_SWING_ALONG, **ALLOCATING_NOTHING)
 def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffness, out):
-    """Let a load swing on a spring along one unbroken stretch, from rest, the twist (n,) rad into ``out``.
+    """Let a load swing on a spring along one unbroken stretch, from rest, the twist (n,) rad into
+    ``out``.
 
-    inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque, each but the spring given
-    by sample and linear between samples; ``ratio`` is that of damping added to what the spring has, ``least`` the
-    inertia that any load has: a fit may make it negative where a light link hardly shows. The midpoint
-    rule, linearised at each step's begin, neither damps nor excites, and is stable however stiff the spring.
-    The spring is the kernel at an address.
+    inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque, each but
+    the spring given by sample and linear between samples; ``ratio`` is that of damping added to
+    what the spring has, ``least`` the inertia that any load has: a fit may make it negative where a
+    light link hardly shows. The midpoint rule, linearised at each step's begin, neither damps nor
+    excites, and is stable however stiff the spring. The spring is the kernel at an address.
     """
     kernel = spring_at(where)
     twist, rate = _twist_at_rest(kernel, values, torque[0], stiffness[0]), 0.0
@@ -284,8 +314,12 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
             per_twist = (kernel(twist + NUDGE, rate, values) - passed) / NUDGE
             per_rate = (kernel(twist, rate + NUDGE, values) - passed) / NUDGE
             drag += 2.0 * ratio * np.sqrt(max(0.0, per_twist) * mass)
-            push = load - drag * rate - slope * twist - passed - 0.5 * s * (slope + per_twist) * rate
-            change = s * push / (mass + 0.5 * s * (drag + per_rate) + 0.25 * s * s * (slope + per_twist))
+            push = (
+                load - drag * rate - slope * twist - passed - 0.5 * s * (slope + per_twist) * rate
+            )
+            change = (
+                s * push / (mass + 0.5 * s * (drag + per_rate) + 0.25 * s * s * (slope + per_twist))
+            )
             twist += s * (rate + 0.5 * change)
             rate += change
             if not abs(twist) < TORN:

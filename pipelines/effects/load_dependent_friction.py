@@ -23,7 +23,11 @@ class LoadDependentFriction(Effect):
         "hang weights on the joint, move it slowly both ways, and plot half the difference against the load; "
         "half the sum, less gravity, shows the driving excess"
     )
-    linear = (Parameter("load_coefficient", "1", "friction per unit of transmitted torque", "mu", (0.02, 0.3)),)
+    linear = (
+        Parameter(
+            "load_coefficient", "1", "friction per unit of transmitted torque", "mu", (0.02, 0.3)
+        ),
+    )
     shape = (
         Parameter(
             "driving_excess", "1",
@@ -35,7 +39,8 @@ class LoadDependentFriction(Effect):
     reads_load = True
 
     def __post_init__(self) -> None:
-        """Hold the excess at zero on a machine of one joint, where its torque is one of the rigid body's."""
+        """Hold the excess at zero on a machine of one joint, where its torque is one of the rigid
+        body's."""
         super().__post_init__()
         if len(self.on.names) == 1:
             (excess,) = self.shape

@@ -7,9 +7,10 @@ from pipelines.mechanics.mechanisms.leg import LEG
 class MassOffAxis(Effect):
     """A foot, a motor housing: a first moment of mass across the segment.
 
-    A mass across the axis is one along it, turned forward by a right angle: with Y the moment across,
-    kinetic and potential energy have Y where they have X3 (shank) or X4 (thigh), and the segment's
-    absolute angle plus pi/2 where they have that angle. Its moment of inertia is in X1 and X2.
+    A mass across the axis is one along it, turned forward by a right angle: with Y the moment
+    across, kinetic and potential energy have Y where they have X3 (shank) or X4 (thigh), and the
+    segment's absolute angle plus pi/2 where they have that angle. Its moment of inertia is in X1
+    and X2.
     """
 
     name = "mass_off_axis"
@@ -23,7 +24,11 @@ class MassOffAxis(Effect):
     looks_like = "gravity torque like the cosine of the link's angle: largest where the link hangs"
     confirm = "let the joint hang freely: it rests off the vertical, towards the mass"
     by_angle = True
-    linear = (Parameter("mass_moment", "kg·m", "mass times distance forward of the axis", "Y", (-0.6, 0.6)),)
+    linear = (
+        Parameter(
+            "mass_moment", "kg·m", "mass times distance forward of the axis", "Y", (-0.6, 0.6)
+        ),
+    )
     inertial = True
     parity = Parity.EVEN
     reaction = staticmethod(LEG.reactions["mass_off_axis"])

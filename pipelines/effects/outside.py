@@ -32,7 +32,11 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         effect = _loaded(entry)
         if effect.name in taken:
-            raise _broken(entry, f"its name {effect.name} is already that of {taken[effect.name]}", "rename it")
+            raise _broken(
+                entry,
+                f"its name {effect.name} is already that of {taken[effect.name]}",
+                "rename it",
+            )
         taken[effect.name] = effect.__module__
         found.append(effect)
     return tuple(found)
@@ -42,12 +46,18 @@ def _loaded(entry: EntryPoint) -> type[Effect]:
     try:
         effect = entry.load()
     except Exception as error:
-        raise _broken(entry, f"loading it failed: {type(error).__name__}: {error}", "mend it") from error
+        raise _broken(
+            entry, f"loading it failed: {type(error).__name__}: {error}", "mend it"
+        ) from error
     if not (inspect.isclass(effect) and issubclass(effect, Effect)):
-        raise _broken(entry, f"it is {effect!r}, expected a subclass of pipelines.effects.Effect", "mend it")
+        raise _broken(
+            entry, f"it is {effect!r}, expected a subclass of pipelines.effects.Effect", "mend it"
+        )
     silent = [name for name in STATED if not hasattr(effect, name)]
     if silent:
-        raise _broken(entry, f"{effect.__name__} does not state {', '.join(silent)}", "add what is missing")
+        raise _broken(
+            entry, f"{effect.__name__} does not state {', '.join(silent)}", "add what is missing"
+        )
     return effect
 
 

@@ -31,9 +31,13 @@ class ParallelSpring(Effect):
     resembles = ("angle", "both_angles")
     forms_differ = "a real spring hardens, goes slack at one end, or pulls at a lever that turns"
     equation = "tau = k (q - q0) = k q - b"
-    source = "Wang, van Dijk, van der Kooij (2011), ICORR: spring uses in exoskeleton actuation design"
+    source = (
+        "Wang, van Dijk, van der Kooij (2011), ICORR: spring uses in exoskeleton actuation design"
+    )
     looks_like = "residual against angle: a straight line, the same both ways; partly hidden in gravity and friction"
-    confirm = "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
+    confirm = (
+        "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
+    )
     linear = (
         Parameter("stiffness", "N·m/rad", "torque per angle", "k", (2.0, 40.0)),
         Parameter("preload", "N·m", "stiffness times rest angle", "b", (-30.0, 30.0)),
@@ -55,9 +59,11 @@ class ParallelSpring(Effect):
         out[joint] += values[0] * at.q[joint] - values[1]
 
     def __post_init__(self) -> None:
-        """Take the rest angle as nought where the mechanism's own parameters take up a constant torque.
+        """Take the rest angle as nought where the mechanism's own parameters take up a constant
+        torque.
 
-        What the spring pulls with at angle zero is then part of them, and no motion tells its share.
+        What the spring pulls with at angle zero is then part of them, and no motion tells its
+        share.
         """
         super().__post_init__()
         if self.joint is None or self.on == THE_LEG:

@@ -9,8 +9,8 @@ from pipelines.effects.kernel import reaction
 class PassiveJointTorque(Effect):
     """Ligaments and stretched muscles: a torque that grows exponentially beyond an angle.
 
-    One formula for both ends: a negative width acts below the onset. A wide one is a straight spring
-    beyond the onset, a narrow one a hard stop.
+    One formula for both ends: a negative width acts below the onset. A wide one is a straight
+    spring beyond the onset, a narrow one a hard stop.
     """
 
     name = "passive_joint_torque"
@@ -21,8 +21,12 @@ class PassiveJointTorque(Effect):
     forms_differ = "real muscles cross the next joint too, and lose energy when they are stretched"
     equation = "tau = k w (exp((q - q0) / w) - 1) beyond q0 on the side of w's sign, else 0"
     source = "Riener, Edrich (1999), J. Biomechanics 32(5): passive elastic joint moments in the lower extremities"
-    looks_like = "residual against angle: flat, then steep at one end of the range; only with the human"
-    confirm = "move the relaxed leg slowly to that end of its range and watch torque and cuff forces"
+    looks_like = (
+        "residual against angle: flat, then steep at one end of the range; only with the human"
+    )
+    confirm = (
+        "move the relaxed leg slowly to that end of its range and watch torque and cuff forces"
+    )
     acts_in = ("with_human",)
     linear = (Parameter("stiffness", "N·m/rad", "torque per angle at the onset", "k", (2.0, 60.0)),)
     shape = (

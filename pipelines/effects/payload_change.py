@@ -8,7 +8,8 @@ from pipelines.mechanics.mechanisms.leg import LEG
 
 
 class PayloadChange(Effect):
-    """A point mass on the segment's axis from some time on; negative where it is lost. Where a joint slides, a mass."""
+    """A point mass on the segment's axis from some time on; negative where it is lost. Where a
+    joint slides, a mass."""
 
     name = "payload_change"
     title = "Payload change"
@@ -17,13 +18,21 @@ class PayloadChange(Effect):
     resembles = ("angle", "both_angles", "time")
     forms_differ = "a real load is picked up over a second or so, and may swing"
     equation = "tau = p (t >= t0) dA/dp, p = m r; shank: A3 + r A2 + (r + L1²/r) A1 + L1/r A4; thigh: A4 + r A1"
-    source = "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
+    source = (
+        "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
+    )
     looks_like = "gravity residual that begins at one instant and stays"
     confirm = "ask what was picked up or fell off then; weigh it"
-    linear = (Parameter("mass_moment", "kg·m", "mass times distance along the segment", "p", (-1.0, 1.0)),)
+    linear = (
+        Parameter("mass_moment", "kg·m", "mass times distance along the segment", "p", (-1.0, 1.0)),
+    )
     shape = (
-        Parameter("time", "s", "when it comes, from the run's begin", "t0", (0.0, 120.0), per_run=True),
-        Parameter("distance", "m", "from the segment's joint to the mass", "r", (0.1, 0.45), default=0.3),
+        Parameter(
+            "time", "s", "when it comes, from the run's begin", "t0", (0.0, 120.0), per_run=True
+        ),
+        Parameter(
+            "distance", "m", "from the segment's joint to the mass", "r", (0.1, 0.45), default=0.3
+        ),
     )
     inertial = True
     parity = Parity.EVEN
@@ -34,5 +43,7 @@ class PayloadChange(Effect):
         super().__post_init__()
         if self.joint and self.on != THE_LEG and self.on.joint(self.joint).kind == "prismatic":
             moment, time = self.linear[0], self.shape[0]
-            object.__setattr__(self, "linear", (replace(moment, meaning="mass that comes", symbol="m"),))
+            object.__setattr__(
+                self, "linear", (replace(moment, meaning="mass that comes", symbol="m"),)
+            )
             object.__setattr__(self, "shape", (time,))

@@ -1,4 +1,5 @@
-"""Presliding: after a reversal friction builds up over a small travel, like a spring that yields."""
+"""Presliding: after a reversal friction builds up over a small travel, like a spring that
+yields."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import derivative, reaction
@@ -20,8 +21,22 @@ class PreslidingHysteresis(Effect):
     confirm = "move the empty joint to and fro by a few hundredths of its travel and plot torque against where it is"
     linear = (Parameter("friction_torque", "N·m", "friction torque once sliding", "F", (0.5, 8.0)),)
     shape = (
-        Parameter("presliding_angle", "rad", "travel over which friction builds up to 63 %", "travel", (0.003, 0.15)),
-        Parameter("exponent", "1", "form of the build-up", "i", (0.5, 2.0), default=1.0, forms=(1.0, 2.0, 0.5)),
+        Parameter(
+            "presliding_angle",
+            "rad",
+            "travel over which friction builds up to 63 %",
+            "travel",
+            (0.003, 0.15),
+        ),
+        Parameter(
+            "exponent",
+            "1",
+            "form of the build-up",
+            "i",
+            (0.5, 2.0),
+            default=1.0,
+            forms=(1.0, 2.0, 0.5),
+        ),
     )
     states = 1
 

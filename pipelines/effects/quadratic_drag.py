@@ -16,7 +16,9 @@ class QuadraticDrag(Effect):
     equation = "tau = c v abs(v)"
     source = "Olsson, Åström, Canudas de Wit, Gäfvert, Lischinsky (1998), European J. Control 4(3), eq. 4, exponent 2"
     looks_like = "friction against speed: curved upward at the fast end on both sides"
-    confirm = "move the empty joint at constant speeds up to the fastest and plot torque against speed"
+    confirm = (
+        "move the empty joint at constant speeds up to the fastest and plot torque against speed"
+    )
     linear = (Parameter("drag", "N·m·s²/rad²", "torque per speed squared", "c", (0.3, 6.0)),)
     parity = Parity.ODD
     dissipative = True

@@ -1,6 +1,7 @@
 """The pages of docs/effects, written from the effects themselves.
 
-``python -m pipelines.effects.reference docs/effects`` brings them up to date; a test says when they are not.
+``python -m pipelines.effects.reference docs/effects`` brings them up to date; a test says when they
+are not.
 """
 
 import inspect
@@ -58,7 +59,12 @@ def where(effect: type[Effect]) -> str:
         return "whole leg"
     if effect.joints is None:
         return "each"
-    return " ".join([", ".join(effect.joints), *(f"({joint}: in {into})" for joint, into in effect.absorbed.items())])
+    return " ".join(
+        [
+            ", ".join(effect.joints),
+            *(f"({joint}: in {into})" for joint, into in effect.absorbed.items()),
+        ]
+    )
 
 
 def typical_size(effect: type[Effect]) -> str:
@@ -128,9 +134,12 @@ def pages() -> dict[str, str]:
     ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (
-        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} | {typical_size(e)} |" for e in ours
+        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} | {typical_size(e)} |"
+        for e in ours
     )
-    return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {f"{e.name}.md": page(e) for e in ours}
+    return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {
+        f"{e.name}.md": page(e) for e in ours
+    }
 
 
 if __name__ == "__main__":

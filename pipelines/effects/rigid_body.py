@@ -10,7 +10,9 @@ from pipelines.mechanics.motion import Motion
 
 
 def _parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
-    return tuple(Parameter(p.name, p.unit, p.meaning, p.name, p.typical) for p in mechanism.parameters)
+    return tuple(
+        Parameter(p.name, p.unit, p.meaning, p.name, p.typical) for p in mechanism.parameters
+    )
 
 
 def _equation(mechanism: Mechanism) -> str:
@@ -18,7 +20,8 @@ def _equation(mechanism: Mechanism) -> str:
 
 
 class RigidBody(Effect):
-    """Inertia, Coriolis, centrifugal and gravity torque of the links; what is said here is the leg's."""
+    """Inertia, Coriolis, centrifugal and gravity torque of the links; what is said here is the
+    leg's."""
 
     name = "rigid_body"
     title = "Rigid body"
@@ -43,7 +46,8 @@ class RigidBody(Effect):
         object.__setattr__(self, "equation", _equation(self.on.mechanism))
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Return the mechanism's regressor, (n, J, p): one pass where the kernel takes one a column."""
+        """Return the mechanism's regressor, (n, J, p): one pass where the kernel takes one a
+        column."""
         if not self.explains(motion):
             return np.zeros((*motion.q.shape, len(self.linear)))
         return self.on.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)

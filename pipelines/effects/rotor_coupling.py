@@ -9,12 +9,13 @@ from pipelines.effects.kernel import reaction
 class RotorCoupling(Effect):
     """The knee's motor on the thigh, its axis along the joints'.
 
-    A rotor of inertia Ir behind a gear of ratio N has the energy Ir (dq1 + N dq2)² / 2: Ir more in X1, the rotor
-    inertia J = N² Ir at the knee, and between the joints this coupling c = N Ir, negative where the gear reverses.
+    A rotor of inertia Ir behind a gear of ratio N has the energy Ir (dq1 + N dq2)² / 2: Ir more in
+    X1, the rotor inertia J = N² Ir at the knee, and between the joints this coupling c = N Ir,
+    negative where the gear reverses.
 
-    No motion tells it apart from the others: X2's column is the sum of this one's and ``rotor_inertia``'s. What a
-    fit finds is X2 + c and J - c, the same torques with c = 0; so ``exoid diagnose`` names ``rotor_inertia``, and
-    of a rotor of known Ir and N it is (N² - N) Ir.
+    No motion tells it apart from the others: X2's column is the sum of this one's and
+    ``rotor_inertia``'s. What a fit finds is X2 + c and J - c, the same torques with c = 0; so
+    ``exoid diagnose`` names ``rotor_inertia``, and of a rotor of known Ir and N it is (N² - N) Ir.
     """
 
     name = "rotor_coupling"
@@ -25,8 +26,12 @@ class RotorCoupling(Effect):
     forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau1 = c ddq2, tau2 = c ddq1; c = N Ir"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
-    looks_like = "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"
-    confirm = "look up rotor inertia and gear ratio, and which way the gear turns: c is their product"
+    looks_like = (
+        "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"
+    )
+    confirm = (
+        "look up rotor inertia and gear ratio, and which way the gear turns: c is their product"
+    )
     joints = ("knee",)
     absorbed: ClassVar = {"knee": "X2 and rotor_inertia together"}
     linear = (Parameter("coupling", "kg·m²", "rotor inertia times gear ratio", "c", (-0.3, 0.3)),)

@@ -17,11 +17,17 @@ class RotorInertia(Effect):
     forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau = J ddq, at its own joint only"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
-    looks_like = "residual in step with its joint's own acceleration; X2 too large for a link of that weight"
-    confirm = "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
+    looks_like = (
+        "residual in step with its joint's own acceleration; X2 too large for a link of that weight"
+    )
+    confirm = (
+        "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
+    )
     joints = ("knee",)
     absorbed: ClassVar = {"hip": "X1"}
-    linear = (Parameter("inertia", "kg·m²", "rotor inertia reflected to the joint", "J", (0.03, 1.0)),)
+    linear = (
+        Parameter("inertia", "kg·m²", "rotor inertia reflected to the joint", "J", (0.03, 1.0)),
+    )
     inertial = True
     parity = Parity.EVEN
 

@@ -8,7 +8,8 @@ from pipelines.effects.kernel import reaction
 
 
 class Spasticity(Effect):
-    """Muscle that resists a stretch faster than its threshold, in the direction that stretches it."""
+    """Muscle that resists a stretch faster than its threshold, in the direction that stretches
+    it."""
 
     name = "spasticity"
     title = "Spasticity"
@@ -21,14 +22,23 @@ class Spasticity(Effect):
     looks_like = "residual against speed: flat, then a ramp beyond a speed, one way only and only with the human"
     confirm = "stretch the relaxed leg at several speeds: the torque jumps at the fast ones (Tardieu's test)"
     acts_in = ("with_human",)
-    linear = (Parameter("gain", "N·m·s/rad", "torque per speed beyond the threshold", "G", (1.0, 20.0)),)
+    linear = (
+        Parameter("gain", "N·m·s/rad", "torque per speed beyond the threshold", "G", (1.0, 20.0)),
+    )
     shape = (
         Parameter("threshold_velocity", "rad/s", "speed from which it acts; its sign is the way", "v0", (-1.5, 1.5)),
     )  # fmt: skip
     reported = (
         linear[0],
         Parameter("threshold_velocity", "rad/s", "speed from which it acts", "|v0|", (0.05, 1.5)),
-        Parameter("direction", "1", "the way in which it acts: 1 or -1", "sgn v0", (-1.0, 1.0), default=1.0),
+        Parameter(
+            "direction",
+            "1",
+            "the way in which it acts: 1 or -1",
+            "sgn v0",
+            (-1.0, 1.0),
+            default=1.0,
+        ),
     )
     dissipative = True
 

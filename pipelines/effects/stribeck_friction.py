@@ -20,10 +20,26 @@ class StribeckFriction(Effect):
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
     looks_like = "a narrow peak of friction on both sides of zero speed"
     confirm = "creep the empty joint at several speeds up to a tenth of its fastest and plot torque against speed"
-    linear = (Parameter("stribeck_torque", "N·m", "friction above the Coulomb level at standstill", "F", (0.3, 6.0)),)
+    linear = (
+        Parameter(
+            "stribeck_torque",
+            "N·m",
+            "friction above the Coulomb level at standstill",
+            "F",
+            (0.3, 6.0),
+        ),
+    )
     shape = (
-        Parameter("stribeck_velocity", "rad/s", "speed at which the excess has fallen to 1/e", "vs", (0.03, 0.8)),
-        Parameter("exponent", "1", "form of the fall", "d", (0.5, 2.0), default=2.0, forms=(2.0, 1.0, 0.5)),
+        Parameter(
+            "stribeck_velocity",
+            "rad/s",
+            "speed at which the excess has fallen to 1/e",
+            "vs",
+            (0.03, 0.8),
+        ),
+        Parameter(
+            "exponent", "1", "form of the fall", "d", (0.5, 2.0), default=2.0, forms=(2.0, 1.0, 0.5)
+        ),
     )
     parity = Parity.ODD
     dissipative = True

@@ -1,7 +1,7 @@
 """The motion behind a spring: a load that swings on it, driven by the motion before it.
 
-A soft or loose transmission follows its load only below its own frequency. Above it, and after every reversal,
-the load swings, and a twist of torque over stiffness is wrong in size and sign.
+A soft or loose transmission follows its load only below its own frequency. Above it, and after
+every reversal, the load swings, and a twist of torque over stiffness is wrong in size and sign.
 """
 
 import numpy as np
@@ -21,7 +21,9 @@ ROTOR_INERTIA = 0.17
 """kg·m² of a rotor that the rigid body's parameters hold: the middle of what is typical."""
 
 
-def link_behind_motor(motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float) -> Motion:
+def link_behind_motor(
+    motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float
+) -> Motion:
     """Return the motion of the link behind an effect's transmission.
 
     The arguments are those of ``behind_spring``; ``values`` are (k,), in the effect's order.
@@ -57,8 +59,8 @@ def behind_spring(
     values : sequence of float
         The effect's.
     ratio : float, optional
-        Damping ratio added to the spring's own. The motion drives a copy of the load: undamped, the copy would
-        swing on with every error of the load for ever.
+        Damping ratio added to the spring's own. The motion drives a copy of the load: undamped, the
+        copy would swing on with every error of the load for ever.
     with_motor : float, optional
         Inertia in the load that turns with the motor instead, kg·m².
     """
@@ -71,11 +73,20 @@ def behind_spring(
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
         parts = (part[stretch] for part in along)
-        swing_along(address(effect.spring), np.array(values, dtype=float), ratio, least, h, *parts, twist[stretch])
+        swing_along(
+            address(effect.spring),
+            np.array(values, dtype=float),
+            ratio,
+            least,
+            h,
+            *parts,
+            twist[stretch],
+        )
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
         turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]
-        # Behind the filter that the measured motion is behind, or both would not be of the same moment.
+        # Behind the filter that the measured motion is behind, or both would not be of the same
+        # moment.
         turned = low_pass(turned, motion.sample_rate_hz, motion.cutoff_hz)
         moved[0][stretch, joints] -= turned
         for order in (1, 2):

@@ -29,7 +29,8 @@ class TimeDelay(Effect):
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
-        """Return the torque of then, in a straight line between samples; the first one's until there is one."""
+        """Return the torque of then, in a straight line between samples; the first one's until
+        there is one."""
         newest = int(state[0])
         state[0] += 1.0
         slot = 1 + 2 * (newest % SLOTS)

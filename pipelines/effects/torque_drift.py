@@ -22,12 +22,21 @@ class TorqueDrift(Effect):
     confirm = "switch the drive off and read its torque for some minutes while the electronics warm"
     linear = (
         Parameter("rate", "N·m/s", "growth of the offset", "d", (-0.1, 0.1)),
-        Parameter("level", "N·m", "offset when the run begins", "o", (-4.0, 4.0), per_run=True, default=0.0),
+        Parameter(
+            "level",
+            "N·m",
+            "offset when the run begins",
+            "o",
+            (-4.0, 4.0),
+            per_run=True,
+            default=0.0,
+        ),
     )
     parity = Parity.EVEN
 
     def __post_init__(self) -> None:
-        """Take the level as nought where the mechanism's own parameters take up a constant torque."""
+        """Take the level as nought where the mechanism's own parameters take up a constant
+        torque."""
         super().__post_init__()
         if TorqueOffset.name in self.on.mechanism.absorbs:
             rate, level = self.linear

@@ -8,7 +8,8 @@ from pipelines.mechanics.motion import Motion
 
 
 class TorqueGain(Effect):
-    """The measured torque is the true one times a factor: a wrong torque constant or gear efficiency."""
+    """The measured torque is the true one times a factor: a wrong torque constant or gear
+    efficiency."""
 
     name = "torque_gain"
     title = "Torque gain"

@@ -5,7 +5,8 @@ from pipelines.effects.kernel import torque_reading
 
 
 class TorqueOffset(Effect):
-    """The measured torque is the true one plus a constant; another at each start, where the sensor is tared there."""
+    """The measured torque is the true one plus a constant; another at each start, where the sensor
+    is tared there."""
 
     name = "torque_offset"
     title = "Torque offset"

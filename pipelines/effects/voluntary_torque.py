@@ -21,20 +21,36 @@ class VoluntaryTorque(Effect):
     forms_differ = "a real rhythm drifts in frequency and size, and starts and stops"
     equation = "tau = A sin(2 pi f t) + B cos(2 pi f t) + c"
     source = "Hogan, Sternad (2007), Experimental Brain Research 181: rhythmic movement"
-    looks_like = "a tone in residual and cuff forces, at a frequency that no period of the motion explains"
+    looks_like = (
+        "a tone in residual and cuff forces, at a frequency that no period of the motion explains"
+    )
     confirm = "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not show it"
     acts_in = ("with_human",)
     linear = (
         Parameter("sine", "N·m", "amplitude of the sine", "A", (-10.0, 10.0), per_run=True),
         Parameter("cosine", "N·m", "amplitude of the cosine", "B", (-10.0, 10.0), per_run=True),
-        Parameter("bias", "N·m", "mean of a wearer who pushes one way more than the other", "c", (-5.0, 5.0), True),
+        Parameter(
+            "bias",
+            "N·m",
+            "mean of a wearer who pushes one way more than the other",
+            "c",
+            (-5.0, 5.0),
+            True,
+        ),
     )
     shape = (Parameter("frequency", "Hz", "of the rhythm", "f", (0.1, 3.0)),)
     reported = (
         Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.5, 10.0)),
         *shape,
         Parameter(
-            "phase", "rad", "of the rhythm when the run begins", "phi", (-np.pi, np.pi), True, 0.0, of_joint=False
+            "phase",
+            "rad",
+            "of the rhythm when the run begins",
+            "phi",
+            (-np.pi, np.pi),
+            True,
+            0.0,
+            of_joint=False,
         ),
         replace(linear[2], default=0.0),
     )
@@ -47,7 +63,8 @@ class VoluntaryTorque(Effect):
         out[joint] += values[0] * sin(angle) + values[1] * cos(angle) + values[2]
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, frequency and phase of amplitude sin(2 pi f t + phase), and the bias."""
+        """Return amplitude, frequency and phase of amplitude sin(2 pi f t + phase), and the
+        bias."""
         sine, cosine, bias, frequency = values
         return np.array([np.hypot(sine, cosine), frequency, np.arctan2(cosine, sine), bias])
 

@@ -1,8 +1,10 @@
-"""Noise of the angles: accelerations that no torque goes with let every fit take the machine for too light.
+"""Noise of the angles: accelerations that no torque goes with let every fit take the machine for
+too light.
 
-Where the motion nearly cancels what its torques would be, as in a free swing, little noise is enough. What the angles
-hold above a low cut-off is either motion, which takes torque, or noise, which takes none: so the torque that the slow
-motion's fit foretells from that part alone is held against the torque that was measured.
+Where the motion nearly cancels what its torques would be, as in a free swing, little noise is
+enough. What the angles hold above a low cut-off is either motion, which takes torque, or noise,
+which takes none: so the torque that the slow motion's fit foretells from that part alone is held
+against the torque that was measured.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,17 +20,20 @@ from pipelines.model import Model, ParameterLayout, baseline
 
 CUTOFF_HZ = 5.0
 LOOKED_S = 600.0
-"""How much of a run that is read piece by piece is looked at: encoders shake as much in ten minutes as in a day."""
+"""How much of a run that is read piece by piece is looked at: encoders shake as much in ten minutes
+as in a day."""
 REAL = 0.5
-"""Share of the foretold torque that must be measured: 1 where the fast part is motion, 0 where it is noise."""
+"""Share of the foretold torque that must be measured: 1 where the fast part is motion, 0 where it
+is noise."""
 LOUD = 1.0
-"""Times by which noise must outdo, rms, all that the slow motion's fit leaves: being less than half of the error's
-power, it biases little."""
+"""Times by which noise must outdo, rms, all that the slow motion's fit leaves: being less than half
+of the error's power, it biases little."""
 IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles hold accelerations that no torque goes with: noise"
 
 
 def is_loud(runs: Sequence[Run]) -> bool:
-    """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a fit leaves."""
+    """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a
+    fit leaves."""
     effects = baseline(runs[0].machine, kinds_of(runs))
     model, layout = Model.of(effects), ParameterLayout.of(effects)
     body = layout.bodies.ravel()
@@ -41,7 +46,8 @@ def is_loud(runs: Sequence[Run]) -> bool:
 
 
 def _beginning(run: Run) -> Iterator[Piece]:
-    """Yield a run's pieces, with what the filters need to both sides, until enough of it was looked at."""
+    """Yield a run's pieces, with what the filters need to both sides, until enough of it was looked
+    at."""
     rate, seen = run.sample_rate_hz, 0
     for piece in run.pieces(edge(rate, CUTOFF_HZ) + padding(run) + block_average(run).decimation):
         yield piece
@@ -51,17 +57,22 @@ def _beginning(run: Run) -> Iterator[Piece]:
 
 
 def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
-    """Return the Gram matrix of each joint, (J, c, c): the slow motion's columns, the bodies' fast part, the torque."""
+    """Return the Gram matrix of each joint, (J, c, c): the slow motion's columns, the bodies' fast
+    part, the torque."""
     fast = regress(piece, model)
     slow = regress(piece._replace(motion=below(piece.motion, CUTOFF_HZ)), model)
     usable = fast.usable & slow.valid[:, np.newaxis]
     extra = (fast.regressor - slow.regressor)[..., body]
-    rows = np.concatenate([slow.regressor, extra, fast.torque[..., np.newaxis]], axis=2) * usable[..., np.newaxis]
+    rows = (
+        np.concatenate([slow.regressor, extra, fast.torque[..., np.newaxis]], axis=2)
+        * usable[..., np.newaxis]
+    )
     return np.einsum("mji,mjk->jik", rows, rows)
 
 
 def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
-    """Fit the slow motion, p columns, and hold what it foretells of the fast part against what was measured of it."""
+    """Fit the slow motion, p columns, and hold what it foretells of the fast part against what was
+    measured of it."""
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]
     # A joint whose torque is nought all along tells nothing; what fits it refuses it.

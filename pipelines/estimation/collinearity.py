@@ -19,13 +19,16 @@ def scaled_gram(gram: NDArray) -> NDArray:
 
 
 def profiled(gram: NDArray, others: NDArray) -> NDArray:
-    """Return what A'A, (p, p), tells of some parameters where the ``others``, indices (k,), are unknown as well.
+    """Return what A'A, (p, p), tells of some parameters where the ``others``, indices (k,), are
+    unknown as well.
 
     It is the Schur complement of the others' block, (p - k, p - k).
     """
     kept = np.setdiff1d(np.arange(len(gram)), others)
     across = gram[np.ix_(kept, others)]
-    return np.asarray(gram[np.ix_(kept, kept)] - across @ np.linalg.pinv(gram[np.ix_(others, others)]) @ across.T)
+    return np.asarray(
+        gram[np.ix_(kept, kept)] - across @ np.linalg.pinv(gram[np.ix_(others, others)]) @ across.T
+    )
 
 
 def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
@@ -51,7 +54,8 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
 
 
 def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
-    """Return the parameters that the least determined combination of a scaled A'A, (p, p), mixes."""
+    """Return the parameters that the least determined combination of a scaled A'A, (p, p),
+    mixes."""
     _, vectors = np.linalg.eigh(scaled)
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]

@@ -1,8 +1,10 @@
-"""The rows of a regression in as few as there are columns, from which every fit with one weight a joint follows.
+"""The rows of a regression in as few as there are columns, from which every fit with one weight a
+joint follows.
 
-Rows that come piece by piece are compressed as they pass (Golub and Van Loan, Matrix Computations, 5.3; the triangles
-of pieces are stacked and made one triangle again, as in Demmel et al., 2012, SIAM J. Sci. Comput. 34(1)): residuals of
-any fit have the same square sum in both, and no digits are lost to squaring.
+Rows that come piece by piece are compressed as they pass (Golub and Van Loan, Matrix Computations,
+5.3; the triangles of pieces are stacked and made one triangle again, as in Demmel et al., 2012,
+SIAM J. Sci. Comput. 34(1)): residuals of any fit have the same square sum in both, and no digits
+are lost to squaring.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,7 +19,8 @@ from pipelines.estimation.regression import Regression
 
 @dataclass(frozen=True)
 class Compressed:
-    """All usable rows of some runs in few, r for each of J joints: ``torque = regressor @ parameters + noise``."""
+    """All usable rows of some runs in few, r for each of J joints: ``torque = regressor @
+    parameters + noise``."""
 
     regressor: NDArray
     """(J, r, p)."""
@@ -31,7 +34,8 @@ class Compressed:
         return replace(self, regressor=self.regressor[:, :, columns])
 
     def with_held(self, columns: NDArray, values: NDArray) -> "Compressed":
-        """Return the same rows, less the torque of parameters, (k,) columns, whose values (k,) are known."""
+        """Return the same rows, less the torque of parameters, (k,) columns, whose values (k,) are
+        known."""
         return replace(self, torque=self.torque - self.regressor[:, :, columns] @ values)
 
 
@@ -43,7 +47,9 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
         rows = np.concatenate([r.regressor, r.torque[:, :, np.newaxis]], axis=2)
         triangles = triangles or [np.zeros((0, rows.shape[2]))] * rows.shape[1]
         for j, triangle in enumerate(triangles):
-            triangles[j] = qr(np.concatenate([triangle, rows[r.usable[:, j], j]]), mode="r")[0][: rows.shape[2]]
+            triangles[j] = qr(np.concatenate([triangle, rows[r.usable[:, j], j]]), mode="r")[0][
+                : rows.shape[2]
+            ]
         count = count + r.usable.sum(axis=0)
     # Few usable rows make fewer rows than columns; zeros say nothing, and all joints have as many.
     width = triangles[0].shape[1]

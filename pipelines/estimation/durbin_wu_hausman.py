@@ -1,11 +1,13 @@
-"""The test of Durbin, Wu and Hausman: whether two estimators that agree on good data agree on these.
+"""The test of Durbin, Wu and Hausman: whether two estimators that agree on good data agree on
+these.
 
-Least squares and instrumental variables have the same limit unless what stands in the regressor, the angles, goes with
-what the fit leaves: noise in the angles. Their difference over its own covariance then is no larger than chance
-(Hausman, 1978, Econometrica 46(6); for robots Janot, Vandanjon and Gautier, 2014, Proc. ICRA).
-That covariance is the long-run one of the difference of both influence functions, so autocorrelated noise raises no
-alarm; what it is uncertain itself is allowed for as in Hotelling's T². Where it is nearly singular, only those
-combinations of parameters are judged in which the estimators can differ, as with Hausman's generalized inverse.
+Least squares and instrumental variables have the same limit unless what stands in the regressor,
+the angles, goes with what the fit leaves: noise in the angles. Their difference over its own
+covariance then is no larger than chance (Hausman, 1978, Econometrica 46(6); for robots Janot,
+Vandanjon and Gautier, 2014, Proc. ICRA). That covariance is the long-run one of the difference of
+both influence functions, so autocorrelated noise raises no alarm; what it is uncertain itself is
+allowed for as in Hotelling's T². Where it is nearly singular, only those combinations of parameters
+are judged in which the estimators can differ, as with Hausman's generalized inverse.
 """
 
 from collections.abc import Hashable, Iterator
@@ -21,8 +23,9 @@ from pipelines.estimation.long_run import long_run_covariance
 
 LEVEL = 0.05
 FAINT = 0.1
-"""Variance, of a mean of 1 once each parameter is scaled by its error, below which a combination of parameters is not
-judged: so little differs there that errors of second order outdo it, which the covariance counts twice."""
+"""Variance, of a mean of 1 once each parameter is scaled by its error, below which a combination of
+parameters is not judged: so little differs there that errors of second order outdo it, which the
+covariance counts twice."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class DurbinWuHausman:
 
     @property
     def rejects(self) -> bool:
-        """Tell whether the estimators differ by more than chance makes them in 19 of 20 sessions."""
+        """Tell whether the estimators differ by more than chance makes them in 19 of 20
+        sessions."""
         return self.p_value < LEVEL
 
     def as_json(self) -> dict[str, Any]:
@@ -71,4 +75,6 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     k = int(told.sum())
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
-    return DurbinWuHausman(difference, error, statistic, (float(k), rest), float(f.sf(statistic, k, rest)))
+    return DurbinWuHausman(
+        difference, error, statistic, (float(k), rest), float(f.sf(statistic, k, rest))
+    )

@@ -1,9 +1,10 @@
 """The interface of an estimator: it makes the sum of scores zero, and says what scores.
 
-Every method here solves k equations in k parameters: the sum over all rows of a row's *score* is zero. For least
-squares a score is the row's column vector times its residual, for instrumental variables the instruments times it,
-and so on. Its covariance then follows from the scores alone and is computed in one place, ``estimated``: a sandwich
-H⁻¹ S H⁻ᵀ of how the sum changes with the parameters (H) and the scores' long-run covariance (S).
+Every method here solves k equations in k parameters: the sum over all rows of a row's *score* is
+zero. For least squares a score is the row's column vector times its residual, for instrumental
+variables the instruments times it, and so on. Its covariance then follows from the scores alone and
+is computed in one place, ``estimated``: a sandwich H⁻¹ S H⁻ᵀ of how the sum changes with the
+parameters (H) and the scores' long-run covariance (S).
 """
 
 from abc import ABC, abstractmethod
@@ -85,7 +86,8 @@ def distrust(settled: bool, after: str) -> tuple[str, ...]:
 
 
 def carry_of(problem: Problem, sensitivity: NDArray, slope: NDArray) -> NDArray:
-    """Return how fitted values answer to held ones, (k, p): the sum of scores falls by ``slope`` (k, p) per unit."""
+    """Return how fitted values answer to held ones, (k, p): the sum of scores falls by ``slope``
+    (k, p) per unit."""
     carry = np.zeros_like(slope)
     carry[:, problem.of_held] = -sensitivity @ slope[:, problem.of_held]
     return carry

@@ -23,14 +23,20 @@ ESTIMATORS: tuple[type[Estimator], ...] = (
 
 
 def estimator_named(name: str) -> Estimator:
-    """Look an estimator up by the name that exoid.toml uses, or by its short one, as ``--method`` may.
+    """Look an estimator up by the name that exoid.toml uses, or by its short one, as ``--method``
+    may.
 
     Raises
     ------
     InputError
         Where there is none of this name.
     """
-    known = {name: estimator for estimator in ESTIMATORS for name in (estimator.name, estimator.short) if name}
+    known = {
+        name: estimator
+        for estimator in ESTIMATORS
+        for name in (estimator.name, estimator.short)
+        if name
+    }
     if name not in known:
         raise InputError(f"--method: there is no method {name!r}; {suggestion(name, list(known))}")
     return known[name]()

@@ -1,10 +1,11 @@
 """Instrumental variables (IDIM-IV): unbiased where noise in the angles biases least squares.
 
-What stands in a least-squares regressor is measured: noise in angles, and more so in their derivatives, goes with the
-residual and pulls the parameters down. Instruments have the motion's shape and no noise: the regressor along the motion
-that the model itself makes of the references, in closed loop. Values and instruments are computed in turn until they
-rest (Janot, Vandanjon and Gautier, 2014, IEEE Trans. Control Systems Technology 22(1); Young, 2011, Recursive
-Estimation and Time-Series Analysis, 6-7). The simulation need not be right, only free of the noise.
+What stands in a least-squares regressor is measured: noise in angles, and more so in their
+derivatives, goes with the residual and pulls the parameters down. Instruments have the motion's
+shape and no noise: the regressor along the motion that the model itself makes of the references, in
+closed loop. Values and instruments are computed in turn until they rest (Janot, Vandanjon and
+Gautier, 2014, IEEE Trans. Control Systems Technology 22(1); Young, 2011, Recursive Estimation and
+Time-Series Analysis, 6-7). The simulation need not be right, only free of the noise.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -28,16 +29,18 @@ SETTLED = 0.01
 """Largest change of a value, in standard errors of independent blocks, at which iterations end."""
 
 SLIGHT = 0.1
-"""Of the half-width of a parameter's 95 % interval, so a twentieth of the interval, within which a bias does not
-matter: the two estimates share their noise, so the test sees much less, but the interval about either still covers the
-truth 94.5 times of 100."""
+"""Of the half-width of a parameter's 95 % interval, so a twentieth of the interval, within which a
+bias does not matter: the two estimates share their noise, so the test sees much less, but the
+interval about either still covers the truth 94.5 times of 100."""
 
 SLIGHT_SHARE = 0.001
-"""Of a parameter itself, likewise: no scale of a torque is known any better, however long the recording."""
+"""Of a parameter itself, likewise: no scale of a torque is known any better, however long the
+recording."""
 
 
 class InstrumentalVariables(Estimator):
-    """Instruments from the closed-loop simulation of the identified model; whole runs are held in memory."""
+    """Instruments from the closed-loop simulation of the identified model; whole runs are held in
+    memory."""
 
     name = "instrumental_variables"
     short = "iv"
@@ -59,12 +62,16 @@ class InstrumentalVariables(Estimator):
             values = found.values
             if change.max() < SETTLED:
                 break
-        # On the same rows by the same weights: they would differ by what one of them leaves out, too.
+        # On the same rows by the same weights: they would differ by what one of them leaves out,
+        # too.
         itself = [replace(r, instruments=r.measured.regressor) for r in rows]
         test = durbin_wu_hausman(_solved(problem, itself, found.weights), found)
         settled = bool(change.max() < SETTLED)
         told = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
-        remarks = (*distrust(settled, f"{ITERATIONS} iterations"), _sentence(test, problem.names, found))
+        remarks = (
+            *distrust(settled, f"{ITERATIONS} iterations"),
+            _sentence(test, problem.names, found),
+        )
         return replace(found, told=told, remarks=remarks)
 
 
@@ -109,7 +116,9 @@ def _solved(problem: Problem, rows: Sequence[_Rows], weights: NDArray) -> Fit:
 
 def _weights(problem: Problem, rows: Sequence[_Rows], values: NDArray) -> NDArray:
     every = problem.completed(values)
-    squares = sum(np.sum(np.where(r.usable, residual_of(r.measured, every), 0.0) ** 2, axis=0) for r in rows)
+    squares = sum(
+        np.sum(np.where(r.usable, residual_of(r.measured, every), 0.0) ** 2, axis=0) for r in rows
+    )
     count = sum(r.usable.sum(axis=0) for r in rows)
     return np.asarray(1.0 / np.maximum(squares / np.maximum(count, 1), LEAST_NM**2))
 
@@ -131,9 +140,7 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
     among, rest = test.freedom
     numbers = f"Durbin-Wu-Hausman F({among:.0f}, {rest:.0f}) = {test.statistic:.2f}, p = {test.p_value:.2g}"
     if not test.rejects:
-        return (
-            f"no sign that noise in the angles biases least squares ({numbers}): weighted_least_squares serves as well"
-        )
+        return f"no sign that noise in the angles biases least squares ({numbers}): weighted_least_squares serves as well"
     matters = _matters(test, fit)
     if not matters.any():
         return (
@@ -149,7 +156,8 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
 
 
 def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
-    """Tell of each parameter whether least squares is off by enough for anybody to mind, (k,) bool."""
+    """Tell of each parameter whether least squares is off by enough for anybody to mind, (k,)
+    bool."""
     found = estimated(fit)
     reach = found.critical * np.sqrt(np.diag(found.covariance))
     off = np.abs(test.difference)

@@ -1,9 +1,11 @@
-"""Iteratively reweighted least squares: blocks far off count less, and those farthest off not at all.
+"""Iteratively reweighted least squares: blocks far off count less, and those farthest off not at
+all.
 
-An M-estimate after Huber (1964, Ann. Math. Statist. 35(1)) and Beaton and Tukey (1974, Technometrics 16(2)), in the
-order of Yohai's MM-estimate (1987, Ann. Statist. 15(2)): Huber's convex weights with each joint's scale, the median
-absolute residual, until both rest; then Tukey's bisquare with that scale. On Gaussian noise it needs 5 % more data than
-least squares for equal intervals.
+An M-estimate after Huber (1964, Ann. Math. Statist. 35(1)) and Beaton and Tukey (1974,
+Technometrics 16(2)), in the order of Yohai's MM-estimate (1987, Ann. Statist. 15(2)): Huber's
+convex weights with each joint's scale, the median absolute residual, until both rest; then Tukey's
+bisquare with that scale. On Gaussian noise it needs 5 % more data than least squares for equal
+intervals.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -22,7 +24,8 @@ from pipelines.estimation.regression import by_segment, residual_of
 
 HUBER = 1.345
 BISQUARE = 4.685
-"""Standard deviations where the weights begin to fall, and where they end: 95 % efficiency on Gaussian noise."""
+"""Standard deviations where the weights begin to fall, and where they end: 95 % efficiency on
+Gaussian noise."""
 MAD = 1.4826
 """Standard deviation of Gaussian noise over its median absolute value."""
 ITERATIONS = 50
@@ -46,8 +49,12 @@ def _bisquare(u: NDArray) -> NDArray:
     return np.maximum(1.0 - (u / BISQUARE) ** 2, 0.0)
 
 
-Huber = Loss(lambda u: HUBER / np.maximum(np.abs(u), HUBER), lambda u: (np.abs(u) <= HUBER).astype(float))
-Bisquare = Loss(lambda u: _bisquare(u) ** 2, lambda u: _bisquare(u) * (1.0 - 5.0 * (u / BISQUARE) ** 2))
+Huber = Loss(
+    lambda u: HUBER / np.maximum(np.abs(u), HUBER), lambda u: (np.abs(u) <= HUBER).astype(float)
+)
+Bisquare = Loss(
+    lambda u: _bisquare(u) ** 2, lambda u: _bisquare(u) * (1.0 - 5.0 * (u / BISQUARE) ** 2)
+)
 
 
 @dataclass(frozen=True)
@@ -121,7 +128,9 @@ def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> 
         sums = _sums(problem, values, scale, loss)
         sensitivity = inverse(sums.normal[np.ix_(free, free)], problem.names)
         before = values
-        values = sensitivity @ (sums.right[free] - sums.normal[np.ix_(free, held)] @ problem.held[held])
+        values = sensitivity @ (
+            sums.right[free] - sums.normal[np.ix_(free, held)] @ problem.held[held]
+        )
         if loss is Huber:
             scale = sums.scale
         if np.all(np.abs(values - before) < SETTLED * np.sqrt(np.diag(sensitivity))):

@@ -1,7 +1,9 @@
-"""Ordinary and weighted least squares: each joint's weight is the inverse of its residual's variance.
+"""Ordinary and weighted least squares: each joint's weight is the inverse of its residual's
+variance.
 
-Gautier and Khalil (1992, Int. J. Robotics Research 11(4)) and, for the weights, Gautier (1997, Proc. ICRA). The first
-answer to give, and the cheapest: the runs are gone through once, and twice more for the covariance.
+Gautier and Khalil (1992, Int. J. Robotics Research 11(4)) and, for the weights, Gautier (1997,
+Proc. ICRA). The first answer to give, and the cheapest: the runs are gone through once, and twice
+more for the covariance.
 """
 
 from collections.abc import Hashable, Iterator
@@ -63,7 +65,8 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
 
 
 def scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
-    """Return what every block adds to the normal equations' residual, (m, k); values (k,), joints' weights (J,)."""
+    """Return what every block adds to the normal equations' residual, (m, k); values (k,), joints'
+    weights (J,)."""
     every = problem.completed(values)
 
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:

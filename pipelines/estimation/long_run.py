@@ -1,9 +1,10 @@
 """The covariance of a sum of autocorrelated scores, which come piece by piece.
 
-Residuals of a moving leg are autocorrelated, and the textbook covariance, which takes every sample for
-news, then covers the truth 27 % of the time instead of 95 %. Here it is the long-run covariance of the
-scores (Newey and West, 1987, Econometrica 55(3); lag chosen after Andrews, 1991, Econometrica 59(3));
-critical values allow for the lag's length (Kiefer and Vogelsang, 2005, Econometric Theory 21(6)).
+Residuals of a moving leg are autocorrelated, and the textbook covariance, which takes every sample
+for news, then covers the truth 27 % of the time instead of 95 %. Here it is the long-run covariance
+of the scores (Newey and West, 1987, Econometrica 55(3); lag chosen after Andrews, 1991,
+Econometrica 59(3)); critical values allow for the lag's length (Kiefer and Vogelsang, 2005,
+Econometric Theory 21(6)).
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -13,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Scores = Callable[[], Iterable[tuple[Hashable, NDArray]]]
-"""Goes through the scores from the first on each time it is called: an unbroken stretch's name and its next scores
-(m, p). What follows under the same name goes on where it ended."""
+"""Goes through the scores from the first on each time it is called: an unbroken stretch's name and
+its next scores (m, p). What follows under the same name goes on where it ended."""
 
 
 class LongRun(NamedTuple):
@@ -25,7 +26,8 @@ class LongRun(NamedTuple):
     critical: float
     """Half-width of a 95 % interval in standard errors."""
     freedom: float
-    """Of a variance that is estimated so well: 3 / (2 b), b the lag's share of the rows (Priestley, 1981, 6.2.4)."""
+    """Of a variance that is estimated so well: 3 / (2 b), b the lag's share of the rows (Priestley,
+    1981, 6.2.4)."""
 
 
 def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
@@ -46,10 +48,12 @@ def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
 
 
 def _bartlett(scores: Scores, lag: int) -> NDArray:
-    """Return the sum of s_t s_u' (1 - |t - u| / (lag + 1)) over all t and u of a stretch no more than ``lag`` apart.
+    """Return the sum of s_t s_u' (1 - |t - u| / (lag + 1)) over all t and u of a stretch no more
+    than ``lag`` apart.
 
-    It is the mean square of running sums over lag + 1 scores, zeros before and after the stretch: each product
-    stands in as many of them as its weight says. That takes one step a score, whatever the lag.
+    It is the mean square of running sums over lag + 1 scores, zeros before and after the stretch:
+    each product stands in as many of them as its weight says. That takes one step a score, whatever
+    the lag.
     """
     S: NDArray | float = 0.0
     for x in _led(scores, lag):
@@ -61,7 +65,8 @@ def _bartlett(scores: Scores, lag: int) -> NDArray:
 
 
 def _led(scores: Scores, lag: int) -> Iterator[NDArray]:
-    """Yield each piece behind the ``lag`` scores before it, and after a stretch's last as many zeros."""
+    """Yield each piece behind the ``lag`` scores before it, and after a stretch's last as many
+    zeros."""
     name, before = None, np.zeros((0, 0))
     for stretch, x in scores():
         silence = np.zeros((lag, x.shape[1]))

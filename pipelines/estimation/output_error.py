@@ -1,9 +1,10 @@
 """Output error: the parameters whose simulation stays nearest to the measured angles.
 
-The model is driven by the recorded torque from the recorded state over short windows, and the angle it strays by is
-made least by Gauss and Newton's steps within a trust region (Ljung, 1999, System Identification, 7; for robots Gautier,
-Janot and Vandanjon, 2013, IEEE TCST 21(2)). No acceleration is needed, a joint that sticks does so in the simulation
-too, and noise in the angles stands in the residual where it belongs. It costs some hundred simulations of each run.
+The model is driven by the recorded torque from the recorded state over short windows, and the angle
+it strays by is made least by Gauss and Newton's steps within a trust region (Ljung, 1999, System
+Identification, 7; for robots Gautier, Janot and Vandanjon, 2013, IEEE TCST 21(2)). No acceleration
+is needed, a joint that sticks does so in the simulation too, and noise in the angles stands in the
+residual where it belongs. It costs some hundred simulations of each run.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -22,14 +23,16 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
 
 WINDOW_S = 0.5
-"""One after the other; longer ones would feel the noise of the torque more, shorter ones that of the first state."""
+"""One after the other; longer ones would feel the noise of the torque more, shorter ones that of
+the first state."""
 PASSES = 2
 """Of reweighting the joints."""
 STEP = 0.5
-"""Standard errors of the start by which a value is moved to see what the simulation does: less than a joint's
-sticking a moment longer or shorter would let it jump."""
+"""Standard errors of the start by which a value is moved to see what the simulation does: less than
+a joint's sticking a moment longer or shorter would let it jump."""
 SETTLED = 1e-5
-"""Relative fall of the square error at which the search ends: less than a tenth of a standard error."""
+"""Relative fall of the square error at which the search ends: less than a tenth of a standard
+error."""
 RESTS = 0.01
 """Step, as a share of the way from the start, at which it ends."""
 LEAST_RAD = 1e-9
@@ -50,7 +53,8 @@ class OutputError(Estimator):
         """Fit all runs at once, beginning with the least-squares model that can exist."""
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
-        # One step of each value: of the fitted ones in their standard errors, of the held ones in fiftieths.
+        # One step of each value: of the fitted ones in their standard errors, of the held ones in
+        # fiftieths.
         size = np.abs(problem.held) / 50.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
         values = nearest(problem, start.values, start.normal)
@@ -61,17 +65,25 @@ class OutputError(Estimator):
             simulations += more
         found = _fit(problem, values, size, weights)
         told = found.told | {"simulations": simulations, "settled": settled}
-        return replace(found, told=told, remarks=distrust(settled, f"{simulations} simulations of all runs"))
+        return replace(
+            found, told=told, remarks=distrust(settled, f"{simulations} simulations of all runs")
+        )
 
 
 def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
     """Return by how much the simulation strays, (windows, samples, J) for each run."""
     model_of = problem.training.model_of
-    return [replay(model_of(run, every), run.whole(), WINDOW_S, WINDOW_S).error for _, run in problem.runs]
+    return [
+        replay(model_of(run, every), run.whole(), WINDOW_S, WINDOW_S).error
+        for _, run in problem.runs
+    ]
 
 
-def _slopes(problem: Problem, every: NDArray, columns: Sequence[int], size: NDArray) -> list[NDArray]:
-    """Return how that changes with some columns' values, (windows, samples, J, columns) for each run."""
+def _slopes(
+    problem: Problem, every: NDArray, columns: Sequence[int], size: NDArray
+) -> list[NDArray]:
+    """Return how that changes with some columns' values, (windows, samples, J, columns) for each
+    run."""
     at = _errors(problem, every)
     slopes = [np.zeros((*error.shape, len(columns))) for error in at]
     for place, column in enumerate(columns):
@@ -88,9 +100,11 @@ def _weights(errors: Sequence[NDArray]) -> NDArray:
     return np.asarray(1.0 / np.maximum(squares.mean(axis=0), LEAST_RAD**2))
 
 
-def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> tuple[NDArray, int, bool]:
-    """Return the values with the least weighted square error, after how many simulations of all runs, and whether the
-    search came to rest there.
+def _searched(
+    problem: Problem, values: NDArray, size: NDArray, weights: NDArray
+) -> tuple[NDArray, int, bool]:
+    """Return the values with the least weighted square error, after how many simulations of all
+    runs, and whether the search came to rest there.
     """
     unit, root = size[problem.fitted], np.sqrt(weights)
     outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
@@ -99,27 +113,41 @@ def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray
         return problem.completed(values + unit * step)
 
     def residual(step: NDArray) -> NDArray:
-        # What runs away, or has a mass matrix that no machine has, is refused by the search: it takes a shorter step.
+        # What runs away, or has a mass matrix that no machine has, is refused by the search: it
+        # takes a shorter step.
         try:
-            found = np.concatenate([(error * root).ravel() for error in _errors(problem, completed(step))])
+            found = np.concatenate(
+                [(error * root).ravel() for error in _errors(problem, completed(step))]
+            )
         except ZeroDivisionError:
             return np.full(outputs, np.nan)
-        return found if np.all(np.abs(found) < RAN_AWAY * root.max()) else np.full_like(found, np.nan)
+        return (
+            found if np.all(np.abs(found) < RAN_AWAY * root.max()) else np.full_like(found, np.nan)
+        )
 
     def jacobian(step: NDArray) -> NDArray:
         slopes = _slopes(problem, completed(step), problem.fitted.tolist(), size)
         k = len(problem.fitted)
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
-    found = least_squares(residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None)
-    return values + unit * found.x, int(found.nfev + found.njev * (1 + len(unit))), bool(found.success)
+    found = least_squares(
+        residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None
+    )
+    return (
+        values + unit * found.x,
+        int(found.nfev + found.njev * (1 + len(unit))),
+        bool(found.success),
+    )
 
 
 def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> Fit:
     every = problem.completed(values)
     errors = _errors(problem, every)
     slopes = _slopes(problem, every, range(len(every)), size)
-    slope = sum(np.einsum("j,wnjk,wnjp->kp", weights, s[..., problem.fitted], s, optimize=True) for s in slopes)
+    slope = sum(
+        np.einsum("j,wnjk,wnjp->kp", weights, s[..., problem.fitted], s, optimize=True)
+        for s in slopes
+    )
     normal = np.asarray(slope)[:, problem.fitted]
     sensitivity = inverse(normal, problem.names)
     scores = [
@@ -129,19 +157,30 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> 
     rms = np.sqrt([np.mean(e**2, axis=(0, 1)) for e in errors]).tolist()
     told = {"window_s": WINDOW_S, "angle_rms": rms}
     return Fit(
-        values, normal, sensitivity, carry_of(problem, sensitivity, np.asarray(slope)), weights, _by_run(scores), told
+        values,
+        normal,
+        sensitivity,
+        carry_of(problem, sensitivity, np.asarray(slope)),
+        weights,
+        _by_run(scores),
+        told,
     )
 
 
-def _window_scores(slopes: NDArray, errors: NDArray, weights: NDArray, sensitivity: NDArray) -> NDArray:
+def _window_scores(
+    slopes: NDArray, errors: NDArray, weights: NDArray, sensitivity: NDArray
+) -> NDArray:
     """Return one score for each window, (windows, k): within it nothing is independent.
 
-    There are few, and each has pulled the fit towards itself: what it would score without that is (I - G H⁻¹)⁻¹ times
-    as much, G its part of the normal matrix (the CR3 of Bell and McCaffrey, 2002, Survey Methodology 28(2)).
+    There are few, and each has pulled the fit towards itself: what it would score without that is
+    (I - G H⁻¹)⁻¹ times as much, G its part of the normal matrix (the CR3 of Bell and McCaffrey,
+    2002, Survey Methodology 28(2)).
     """
     scores = -np.einsum("j,wnjk,wnj->wk", weights, slopes, errors, optimize=True)
     parts = np.einsum("j,wnjk,wnjl->wkl", weights, slopes, slopes, optimize=True)
-    return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[..., 0]
+    return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[
+        ..., 0
+    ]
 
 
 def _by_run(scores: Sequence[NDArray]) -> Scores:

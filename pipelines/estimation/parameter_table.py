@@ -48,11 +48,15 @@ def rows_of(
     """
     of_rows = effect.jacobian(values)[:, : len(slopes)] @ slopes
     rows = zip(effect.parameters, effect.physical(values), of_rows, strict=True)
-    return [Row(effect, p, step, float(value), slope, p in positive and p.typical[0] >= 0) for p, value, slope in rows]
+    return [
+        Row(effect, p, step, float(value), slope, p in positive and p.typical[0] >= 0)
+        for p, value, slope in rows
+    ]
 
 
 def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> pd.DataFrame:
-    """Return ``parameters/1`` of r rows, whose standard errors are (r,), NaN of what was held and is not known.
+    """Return ``parameters/1`` of r rows, whose standard errors are (r,), NaN of what was held and
+    is not known.
 
     ``critical``, (r,) or one for all, is the half-width of their intervals in standard errors.
     """
@@ -80,7 +84,10 @@ def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> 
 def interval(value: NDArray, half: NDArray, one_way: NDArray) -> NDArray:
     """Return the ends of intervals about values (p,) with half-widths (p,): (p, 2).
 
-    What is ``one_way`` (p,), play, a stiffness or a time constant, is never negative, however little is known of it.
+    What is ``one_way`` (p,), play, a stiffness or a time constant, is never negative, however
+    little is known of it.
     """
     low = value - half
-    return np.stack([np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1)
+    return np.stack(
+        [np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1
+    )

@@ -1,4 +1,5 @@
-"""What is to be estimated from what: some columns of a model, from the training runs of some kinds."""
+"""What is to be estimated from what: some columns of a model, from the training runs of some
+kinds."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,9 +23,11 @@ class Training:
     model: Model
     """Of all kinds of run; what a run has not is a column of zeros there."""
     own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
-    """By a run's file, the model's terms as they are there: another zero, another onset; None of what never came."""
+    """By a run's file, the model's terms as they are there: another zero, another onset; None of
+    what never came."""
     bodies: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict)
-    """By the kind of run, whose loads a term may go with: what hangs behind the drive trains, and the limb."""
+    """By the kind of run, whose loads a term may go with: what hangs behind the drive trains, and
+    the limb."""
     reversals: bool = False
     """Whether samples near reversals are fitted, too."""
     cutoff_hz: float | None = None
@@ -37,7 +40,8 @@ class Training:
 
     @cached_property
     def layout(self) -> ParameterLayout:
-        """The p linear parameters; one that differs from run to run is there for each run that has it."""
+        """The p linear parameters; one that differs from run to run is there for each run that has
+        it."""
         absent = [
             (term, number)
             for number, run in enumerate(self.runs)
@@ -52,8 +56,11 @@ class Training:
         return self.own.get(run.file, self.model.terms)
 
     def number_of(self, run: Run) -> int | None:
-        """Return the number of a run among those to train on, by its file; None where it is none of them."""
-        return next((number for number, other in enumerate(self.runs) if other.file == run.file), None)
+        """Return the number of a run among those to train on, by its file; None where it is none of
+        them."""
+        return next(
+            (number for number, other in enumerate(self.runs) if other.file == run.file), None
+        )
 
     def model_of(self, run: Run, values: NDArray) -> Model:
         """Return the model of one run with the columns' values, (p,)."""
@@ -61,7 +68,8 @@ class Training:
         return Model(tuple(term for term in found if term is not None))
 
     def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
-        """Return a term as a run has it, with the columns' values, (p,); None where it never came."""
+        """Return a term as a run has it, with the columns' values, (p,); None where it never
+        came."""
         own = self.terms_of(run)[term]
         if own is None:
             return None
@@ -93,7 +101,11 @@ class Training:
         model = self.model_of(run, np.zeros(self.layout.size))
         for r in regressions(run, model, self.cutoff_hz):
             r = replace(r, regressor=self.layout.expand(r.regressor, number, present))
-            yield replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1)) if self.reversals else r
+            yield (
+                replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
+                if self.reversals
+                else r
+            )
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
@@ -119,7 +131,8 @@ class Training:
 
 @dataclass(frozen=True)
 class Problem:
-    """``torque = regressor @ parameters + noise``, p parameters, some of which are fitted and the others held."""
+    """``torque = regressor @ parameters + noise``, p parameters, some of which are fitted and the
+    others held."""
 
     training: Training
     kinds: tuple[str, ...]
@@ -141,7 +154,9 @@ class Problem:
     @property
     def runs(self) -> list[tuple[int, Run]]:
         """Number and run of those that are fitted."""
-        return [(number, run) for number, run in enumerate(self.training.runs) if run.run in self.kinds]
+        return [
+            (number, run) for number, run in enumerate(self.training.runs) if run.run in self.kinds
+        ]
 
     @property
     def rows(self) -> Compressed:

@@ -1,12 +1,13 @@
 """Physically realizable least squares: the least residual among the models that can exist.
 
-That the mass matrix is positive definite at every angle is a linear matrix inequality in the inertial parameters, and
-friction that takes energy is a sign, so the fit is a convex program with one answer (Sousa and Cortesão, 2014, Int. J.
-Robotics Research 33(6); Wensing, Kim and Slotine, 2018, IEEE RA-L 3(1)). Clarabel solves it.
+That the mass matrix is positive definite at every angle is a linear matrix inequality in the
+inertial parameters, and friction that takes energy is a sign, so the fit is a convex program with
+one answer (Sousa and Cortesão, 2014, Int. J. Robotics Research 33(6); Wensing, Kim and Slotine,
+2018, IEEE RA-L 3(1)). Clarabel solves it.
 
-Moving to the nearest point of a convex set that holds the truth brings a fit no farther from it, in the norm of the
-normal matrix; the covariance of the free fit is kept, and intervals are rather too wide than too narrow where a
-constraint is active.
+Moving to the nearest point of a convex set that holds the truth brings a fit no farther from it, in
+the norm of the normal matrix; the covariance of the free fit is kept, and intervals are rather too
+wide than too narrow where a constraint is active.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,9 +25,11 @@ from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.problem import Problem
 
 MARGIN = 1e-6
-"""Least eigenvalue of a body's inertia form over its trace: a boundary that rounding does not cross."""
+"""Least eigenvalue of a body's inertia form over its trace: a boundary that rounding does not
+cross."""
 MOVED = 1e-3
-"""Standard errors of independent blocks by which a value has to move before a constraint is called active."""
+"""Standard errors of independent blocks by which a value has to move before a constraint is called
+active."""
 
 
 class Realizable(Estimator):
@@ -56,7 +59,8 @@ class Realizable(Estimator):
 
 
 def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
-    """Return the realizable values (k,) nearest to ``values`` in the norm of the ``normal`` matrix (k, k).
+    """Return the realizable values (k,) nearest to ``values`` in the norm of the ``normal`` matrix
+    (k, k).
 
     For least-squares values and their normal matrix these leave the least residual.
 
@@ -94,9 +98,14 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
     """
     every = problem.completed(values)
     for form in _inertia_forms(problem):
-        leading = form - MARGIN * np.trace(form, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(form.shape[1])
+        leading = form - MARGIN * np.trace(form, axis1=1, axis2=2)[
+            :, np.newaxis, np.newaxis
+        ] * np.eye(form.shape[1])
         rows = np.array([_triangle(matrix) for matrix in leading]).T
-        yield (rows[:, problem.fitted] * size, rows @ every), clarabel.PSDTriangleConeT(form.shape[1])
+        yield (
+            (rows[:, problem.fitted] * size, rows @ every),
+            clarabel.PSDTriangleConeT(form.shape[1]),
+        )
     signed = [i for i, column in enumerate(problem.fitted) if _takes_energy(problem, column)]
     if signed:
         yield (np.diag(size)[signed], values[signed]), clarabel.NonnegativeConeT(len(signed))
@@ -107,7 +116,8 @@ def _takes_energy(problem: Problem, column: int) -> bool:
 
 
 def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
-    """Yield for each body that is fitted (p, m, m): of all parameters, what is positive definite of a real one."""
+    """Yield for each body that is fitted (p, m, m): of all parameters, what is positive definite of
+    a real one."""
     run = problem.training.runs[0]
     forms = run.machine.mechanism.inertia_forms(run.geometry)
     layout, fitted = problem.training.layout, set(problem.fitted)
@@ -119,6 +129,9 @@ def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
 
 
 def _triangle(matrix: NDArray) -> Sequence[float]:
-    """Return the upper triangle, column by column, off-diagonal elements times √2, as Clarabel has it."""
+    """Return the upper triangle, column by column, off-diagonal elements times √2, as Clarabel has
+    it."""
     n = len(matrix)
-    return [matrix[i, j] * (1.0 if i == j else np.sqrt(2.0)) for j in range(n) for i in range(j + 1)]
+    return [
+        matrix[i, j] * (1.0 if i == j else np.sqrt(2.0)) for j in range(n) for i in range(j + 1)
+    ]

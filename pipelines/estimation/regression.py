@@ -1,4 +1,5 @@
-"""A run as a linear regression: torque and regressor behind the same filter, and which rows to trust."""
+"""A run as a linear regression: torque and regressor behind the same filter, and which rows to
+trust."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +16,8 @@ from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
 REVERSAL_SPEED = 0.04
-"""rad/s below which the sign of an exoskeleton's speed, and so friction, is not known; others go slower or faster."""
+"""rad/s below which the sign of an exoskeleton's speed, and so friction, is not known; others go
+slower or faster."""
 TURN_S = 0.075
 """Beside a turn, where measured forces and the filtered acceleration are not of the same moment."""
 REVERSAL_PADDING_S = 0.08
@@ -52,7 +54,8 @@ def residual_of(r: Regression, values: NDArray) -> NDArray:
 
 
 def by_segment(segment: NDArray, scores: NDArray) -> Iterator[tuple[int, NDArray]]:
-    """Yield each segment's number and its part of the blocks' ``scores`` (m, k), whose segments (m,) follow in turn."""
+    """Yield each segment's number and its part of the blocks' ``scores`` (m, k), whose segments
+    (m,) follow in turn."""
     begins = np.flatnonzero(np.diff(segment)) + 1
     for rows in np.split(np.arange(len(scores)), begins):
         if len(rows):
@@ -60,7 +63,8 @@ def by_segment(segment: NDArray, scores: NDArray) -> Iterator[tuple[int, NDArray
 
 
 def block_average(motion: Run) -> BlockAverage:
-    """Return the regression filter that the motion's file asks for; a filter of another kind is refused."""
+    """Return the regression filter that the motion's file asks for; a filter of another kind is
+    refused."""
     chosen = motion.metadata.get("regression_filter") or {}
     kind = chosen.get("kind", "block_average")
     if kind != "block_average":
@@ -75,7 +79,8 @@ def block_average(motion: Run) -> BlockAverage:
 
 
 def reversal_speeds(machine: Machine) -> NDArray:
-    """Return the speed of each joint below which its sign is not known, (J,) rad/s, m/s at a prismatic joint."""
+    """Return the speed of each joint below which its sign is not known, (J,) rad/s, m/s at a
+    prismatic joint."""
     return np.array([REVERSAL_SPEED * machine.scale(joint).speed for joint in machine.names])
 
 
@@ -84,7 +89,11 @@ def mask_in_words(machine: Machine) -> str:
     speeds = reversal_speeds(machine)
     units = [joint.unit("velocity") for joint in machine.joints]
     said = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
-    alike = said[:1] if len(set(said)) == 1 else [f"{s} ({name})" for s, name in zip(said, machine.names, strict=True)]
+    alike = (
+        said[:1]
+        if len(set(said)) == 1
+        else [f"{s} ({name})" for s, name in zip(said, machine.names, strict=True)]
+    )
     return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
 
 
@@ -102,20 +111,23 @@ def padding(run: Run) -> int:
 def away_from_turns(motion: Motion) -> NDArray:
     """Tell for each sample whether no joint turns round within ``TURN_S``, (n,) bool.
 
-    Where a joint stops, friction jumps and so does the acceleration of every link; filtered, neither is at its time.
+    Where a joint stops, friction jumps and so does the acceleration of every link; filtered,
+    neither is at its time.
     """
     return np.asarray(~dilate(np.any(turns(motion), axis=1), round(TURN_S * motion.sample_rate_hz)))
 
 
 def turns(motion: Motion) -> NDArray:
-    """Tell for each sample and joint whether it has turned round since the sample before: (n, J) bool."""
+    """Tell for each sample and joint whether it has turned round since the sample before: (n, J)
+    bool."""
     turned = np.zeros(motion.dq.shape, dtype=bool)
     turned[1:] = np.diff(motion.dq > 0, axis=0)
     return turned
 
 
 def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Iterator[Regression]:
-    """Yield a run as one linear regression, piece by piece; where there is a cut-off, only what is slower."""
+    """Yield a run as one linear regression, piece by piece; where there is a cut-off, only what is
+    slower."""
     felt = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
     for piece in run.pieces(block_average(run).decimation + padding(run) + felt):
         yield regress(piece, model, cutoff_hz)
@@ -124,8 +136,8 @@ def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Itera
 def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regression:
     """Compute the regressor at full rate, then average it and the torque over the same blocks.
 
-    Both go through the same low-pass before, where there is a cut-off. A block belongs to the piece in whose core it
-    begins; what it needs beyond stands in the margin.
+    Both go through the same low-pass before, where there is a cut-off. A block belongs to the piece
+    in whose core it begins; what it needs beyond stands in the margin.
     """
     motion, core = piece.motion, piece.core
     block = block_average(motion)
@@ -133,7 +145,9 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
     starts = starts[(starts >= core.start) & (starts < core.stop)]
     regressor, torque, trusted = model.regressor(motion), motion.torque, motion.valid
     if cutoff_hz:
-        regressor, torque = (filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque))
+        regressor, torque = (
+            filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque)
+        )
         trusted = trusted & ~unsure(motion, cutoff_hz)
     valid = block.all(trusted, starts)
     return Regression(
@@ -143,5 +157,9 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
         torque=block.mean(torque, starts),
         valid=valid,
         usable=valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts),
-        state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
+        state=(
+            block.mean(motion.q, starts),
+            block.mean(motion.dq, starts),
+            block.mean(motion.ddq, starts),
+        ),
     )

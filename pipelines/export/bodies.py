@@ -1,17 +1,20 @@
-"""Bodies that move as the identified machine does: masses chosen, everything that was identified kept.
+"""Bodies that move as the identified machine does: masses chosen, everything that was identified
+kept.
 
-Torques at the joints of a leg determine X1 to X4 (and moments across the segments), not the mass, centre and inertia
-of each segment: a mass can go from the shank to the thigh's lower end unnoticed. Simulators ask for all of these.
-With m the masses, c the centres along and a across the segments, I the inertias about the centres,
+Torques at the joints of a leg determine X1 to X4 (and moments across the segments), not the mass,
+centre and inertia of each segment: a mass can go from the shank to the thigh's lower end unnoticed.
+Simulators ask for all of these. With m the masses, c the centres along and a across the segments, I
+the inertias about the centres,
 
     X2 = m2 (c2² + a2²) + I2,  X3 = m2 c2,  X4 = m1 c1 + m2 L1,  X1 = m1 (c1² + a1²) + I1 + m2 L1² + X2
 
-is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X2) / L1² and m1 is large enough; there is
-such an m2 exactly where the mass matrix is positive definite. Here m2 is the middle of that range, and m1 twice the
-least it may be, but no less than m2: a nominal leg, whose X are the identified ones to rounding.
+is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X2) / L1² and m1 is
+large enough; there is such an m2 exactly where the mass matrix is positive definite. Here m2 is the
+middle of that range, and m1 twice the least it may be, but no less than m2: a nominal leg, whose X
+are the identified ones to rounding.
 
-A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be, or 1 kg if that is more.
-What slides weighs X1.
+A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be, or 1 kg
+if that is more. What slides weighs X1.
 """
 
 from collections.abc import Callable
@@ -48,8 +51,8 @@ class Body:
     joint: Joint
     mass: float
     inertia: float
-    """About the centre of mass, kg·m²; about every axis: those across the plane of motion do not show, and three equal
-    ones keep the triangle inequality that simulators check."""
+    """About the centre of mass, kg·m²; about every axis: those across the plane of motion do not
+    show, and three equal ones keep the triangle inequality that simulators check."""
     across: float = 0.0
     """Of the centre of mass, m, to where a positive angle takes the body."""
     along: float = 0.0
@@ -67,7 +70,8 @@ class Body:
     @property
     def centre(self) -> NDArray:
         """Of mass, (3,) m."""
-        return self.across * np.cross(self.axis, self.lies) + self.along * np.array(self.lies) + 0.0  # no -0
+        # No -0.
+        return self.across * np.cross(self.axis, self.lies) + self.along * np.array(self.lies) + 0.0
 
     @property
     def place(self) -> NDArray:
@@ -81,8 +85,8 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     Raises
     ------
     InputError
-        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia alone. And where it
-        is not known how a mechanism's bodies are chosen.
+        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia
+        alone. And where it is not known how a mechanism's bodies are chosen.
     """
     mechanism = exported.machine.mechanism
     if mechanism not in MADE:
@@ -100,11 +104,17 @@ def _leg(exported: Exported) -> tuple[Body, ...]:
 
 def _level_leg(exported: Exported) -> tuple[Body, ...]:
     X1, X2, X3 = exported.X
-    return tuple(replace(body, axis=RISES, lies=LIES_FORWARD) for body in _in_series(exported, X1, X2, X3, None))
+    return tuple(
+        replace(body, axis=RISES, lies=LIES_FORWARD)
+        for body in _in_series(exported, X1, X2, X3, None)
+    )
 
 
-def _in_series(exported: Exported, X1: float, X2: float, X3: float, X4: float | None) -> tuple[Body, ...]:
-    """Return two links; without an X4, which nothing shows where gravity does not act, what the second makes of it."""
+def _in_series(
+    exported: Exported, X1: float, X2: float, X3: float, X4: float | None
+) -> tuple[Body, ...]:
+    """Return two links; without an X4, which nothing shows where gravity does not act, what the
+    second makes of it."""
     hip, knee = exported.joints
     across = [_moment_across(exported, joint) for joint in (hip, knee)]
     length, shift = exported.geometry.thigh_length_m, exported.shift()
@@ -120,7 +130,9 @@ def _in_series(exported: Exported, X1: float, X2: float, X3: float, X4: float | 
     of_thigh = np.hypot(along, across[0])
     m1 = max(2.0 * of_thigh**2 / left, m2)
     thigh = Body(hip, m1, left - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
-    shank = Body(knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, beyond=length, shift=shift[1])
+    shank = Body(
+        knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, beyond=length, shift=shift[1]
+    )
     return thigh, shank
 
 

@@ -166,15 +166,21 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         "memory_comment": comment(
             [f"memory of {of_memory}" if of_memory else "no effect here has one; pass any number"]
         ),
-        "constants": "\n".join(_constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in made.used),
+        "constants": "\n".join(
+            _constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in made.used
+        ),
         "sensor_shift": _array(made.sensor_shift),
         "link_shift": _array(made.link_shift),
         "groups": "\n\n".join(_group(group, made.groups[group]) for group in GROUPS),
         "rates": "".join(
-            f"{line}\n" for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
+            f"{line}\n"
+            for e in made.rates
+            for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
         ),
         "readings": "".join(
-            f"{line}\n" for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
+            f"{line}\n"
+            for e in made.readings
+            for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
         ),
     }
     return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
@@ -202,7 +208,9 @@ def _array(values: Iterable[float]) -> str:
 def _group(name: str, made: list[Equation]) -> str:
     lines = [line for e in made for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
     nothing = [] if made else ["    (void)at;", "    (void)tau;"]
-    return "\n".join([f"static void {name}(const struct instant *at, double *tau) {{", *nothing, *lines, "}"])
+    return "\n".join(
+        [f"static void {name}(const struct instant *at, double *tau) {{", *nothing, *lines, "}"]
+    )
 
 
 def _body(equation: Equation, statements: list[str]) -> list[str]:

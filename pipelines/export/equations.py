@@ -1,7 +1,8 @@
 """The equations of a model, written out: what the C and the MATLAB file hold.
 
-The terms stand in the four groups of ``pipelines.dynamics``: on links and inertial, on links, on drives and inertial,
-on drives. Drives feel the torque that is passed on to the links as their ``load``.
+The terms stand in the four groups of ``pipelines.dynamics``: on links and inertial, on links, on
+drives and inertial, on drives. Drives feel the torque that is passed on to the links as their
+``load``.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +16,16 @@ from pipelines.effects import Effect, Parameter, Side
 from pipelines.effects.kernel import Instant
 from pipelines.export.exported import Exported, column_of, shift_of
 from pipelines.export.format import Degree, Holding, exact, left_out
-from pipelines.export.formula import Branch, Elements, Formula, NotWritable, arrays_in, constant, constants_in, written
+from pipelines.export.formula import (
+    Branch,
+    Elements,
+    Formula,
+    NotWritable,
+    arrays_in,
+    constant,
+    constants_in,
+    written,
+)
 from pipelines.export.language import identifier, unique
 from pipelines.model import Term
 
@@ -61,7 +71,8 @@ class Constant:
 
 @dataclass(frozen=True)
 class Equation:
-    """What a term adds to the torques, or the rate of its memory, or what a sensor makes of the torques."""
+    """What a term adds to the torques, or the rate of its memory, or what a sensor makes of the
+    torques."""
 
     label: str
     says: str
@@ -89,7 +100,9 @@ class Equations:
     @property
     def used(self) -> list[Constant]:
         """The constants that stand in an equation; some have only decided which one is written."""
-        written_out = [e.outcome for e in (*chain(*self.groups.values()), *self.rates, *self.readings)]
+        written_out = [
+            e.outcome for e in (*chain(*self.groups.values()), *self.rates, *self.readings)
+        ]
         known = set(constants_in(written_out))
         return [c for c in self.constants if c.name in known]
 
@@ -103,16 +116,24 @@ def holding(term: Term) -> Holding:
         return left_out("it needs the torques of the past")
     if effect.reading is not None:
         is_shift = shift_of(term) is not None
-        return exact("a constant between angles") if is_shift else left_out("its reading is more than a shift")
+        return (
+            exact("a constant between angles")
+            if is_shift
+            else left_out("its reading is more than a shift")
+        )
     try:
         for kernel in (effect.reaction, effect.derivative, effect.torque_reading):
-            if kernel is not None and TEMPERATURE in arrays_in(_outcome(term, kernel, list(term.values), "at.q", 0)):
+            if kernel is not None and TEMPERATURE in arrays_in(
+                _outcome(term, kernel, list(term.values), "at.q", 0)
+            ):
                 return left_out("it needs the motor's temperature")
     except NotWritable as error:
         return left_out(str(error))
     if effect.torque_reading is not None:
         return exact("torque_reading")
-    return exact("inverse dynamics, its memory an argument" if effect.states else "inverse dynamics")
+    return exact(
+        "inverse dynamics, its memory an argument" if effect.states else "inverse dynamics"
+    )
 
 
 def equations(exported: Exported) -> Equations:
@@ -134,7 +155,17 @@ def equations(exported: Exported) -> Equations:
         strict=True,
     )
     fixed = [Constant(name, float(value), unit, meaning) for name, value, unit, meaning in shape]
-    made = Equations(exported.joints, (*fixed, *constants), {group: [] for group in GROUPS}, [], [], 0, (), (), ())
+    made = Equations(
+        exported.joints,
+        (*fixed, *constants),
+        {group: [] for group in GROUPS},
+        [],
+        [],
+        0,
+        (),
+        (),
+        (),
+    )
     memory_of: list[str] = []
     at = 0
     for term in held:
@@ -154,7 +185,9 @@ def equations(exported: Exported) -> Equations:
 
 
 def _constant_name(effect: Effect, parameter: Parameter) -> str:
-    return identifier("_".join(part for part in (effect.joint, effect.name, parameter.name) if part))
+    return identifier(
+        "_".join(part for part in (effect.joint, effect.name, parameter.name) if part)
+    )
 
 
 def _write(made: Equations, term: Term, values: list[Formula], first: int) -> None:
@@ -178,7 +211,10 @@ def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> l
     geometry = [Formula("constant", (name,)) for name in GEOMETRY]
     joints, joint = len(term.effect.on.joints), column_of(term)
     memory = [Formula("element", ("at.memory", first + i)) for i in range(term.effect.states)]
-    whole = (Elements(name, joints) for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load", TEMPERATURE))
+    whole = (
+        Elements(name, joints)
+        for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load", TEMPERATURE)
+    )
     at: Any = Instant._make([Formula("constant", ("at.t",)), *whole])
 
     def arguments() -> tuple[tuple, list]:

@@ -60,14 +60,17 @@ class Exported:
 
     def of(self, effect: str, joint: str) -> Term | None:
         """Return an effect's term at a joint, if the model has it."""
-        return next((t for t in self.terms if t.effect.name == effect and t.effect.joint == joint), None)
+        return next(
+            (t for t in self.terms if t.effect.name == effect and t.effect.joint == joint), None
+        )
 
     def holdings(self, format: Format) -> list[tuple[Term, Holding]]:
         """Return what becomes of each term of the file, none passed over."""
         return [(term, format.holding(term)) for term in self.terms] + list(self.absent)
 
     def driving(self) -> list[str]:
-        """Return which friction would drive its joint, which a simulation or a controller must not be given unseen."""
+        """Return which friction would drive its joint, which a simulation or a controller must not
+        be given unseen."""
         return [
             f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the joint, and a simulation "
             "of it may run away; identify again, or set it to 0"
@@ -78,7 +81,8 @@ class Exported:
         ]
 
     def shift(self, side: Side | None = None) -> NDArray:
-        """Return by how much the encoders' angles are more than the links' own, (J,) rad, at a prismatic joint m.
+        """Return by how much the encoders' angles are more than the links' own, (J,) rad, at a
+        prismatic joint m.
 
         ``side`` asks for the part of it that effects of one side make.
         """
@@ -105,7 +109,8 @@ def column_of(term: Term) -> int:
 
 
 def shift_of(term: Term) -> NDArray | None:
-    """Return what an effect adds to the encoders' angles, (J,) rad; None where it adds no constant."""
+    """Return what an effect adds to the encoders' angles, (J,) rad; None where it adds no
+    constant."""
     if term.effect.reading is None:
         return None
     joints, joint = len(term.effect.on.joints), column_of(term)
@@ -126,14 +131,17 @@ def values_in_words(term: Term) -> str:
     )
 
 
-def exported(table: Table, run: str | None = None, default_geometry: Geometry | None = None) -> Exported:
+def exported(
+    table: Table, run: str | None = None, default_geometry: Geometry | None = None
+) -> Exported:
     """Return what a ``parameters/1`` table says of one kind of run.
 
     Parameters
     ----------
     table : Table
     run : str, optional
-        ``exo_alone``, ``with_human`` or ``human``; unless given, the only one there is, or ``with_human``.
+        ``exo_alone``, ``with_human`` or ``human``; unless given, the only one there is, or
+        ``with_human``.
     default_geometry : Geometry, optional
         Used where the table does not say its own.
 
@@ -148,7 +156,9 @@ def exported(table: Table, run: str | None = None, default_geometry: Geometry | 
     machine = machine_of(joints_of(table.metadata), geometry, table.path)
     with about(table.path):
         if run not in bodies:
-            raise InputError(f"holds no rigid body for run {run!r}, only for {', '.join(sorted(bodies))}; set --run")
+            raise InputError(
+                f"holds no rigid body for run {run!r}, only for {', '.join(sorted(bodies))}; set --run"
+            )
         whole = model_from_parameters(table.frame, run, machine)
         present, absent = [], []
         for term in whole:
@@ -161,7 +171,8 @@ def exported(table: Table, run: str | None = None, default_geometry: Geometry | 
 
 
 def _rigid(model: Model) -> Model:
-    """Return the model with rigid joints: what only a simulation cannot lay out is listed by each format, not refused.
+    """Return the model with rigid joints: what only a simulation cannot lay out is listed by each
+    format, not refused.
 
     Cuffs stay, for behind them the limb has a body of its own.
     """
@@ -173,7 +184,12 @@ def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:
     if not any((effect.reaction, effect.spring, effect.reading, effect.torque_reading)):
         return "a machine of this kind cannot have it"
     if run != HUMAN:
-        return "" if run in effect.acts_in and effect.run in (None, run) else f"it does not act in {run} runs"
-    # Where machine and limb move apart, each has a body; elsewhere the one there is, is the wearer's.
+        return (
+            ""
+            if run in effect.acts_in and effect.run in (None, run)
+            else f"it does not act in {run} runs"
+        )
+    # Where machine and limb move apart, each has a body; elsewhere the one there is, is the
+    # wearer's.
     wearers = effect.on_limb or (isinstance(effect, RigidBody) and not has_cuffs)
     return "" if wearers and not effect.at_cuff else "it is the machine's, not the wearer's"

@@ -53,12 +53,14 @@ class Format:
     suffix: str
     """Of the file, its dot included."""
     holds: Callable[[Term], Holding]
-    """What becomes of a term, its values looked at: a negative friction, say, may be more than a format holds."""
+    """What becomes of a term, its values looked at: a negative friction, say, may be more than a
+    format holds."""
     write: Callable[["Exported", str], Mapping[str, str]]
     """Of a model and the file's stem: the text of each file by its suffix."""
 
     def holding(self, term: Term) -> Holding:
-        """Return what becomes of a term, and that each run has its own where what is held is one run's."""
+        """Return what becomes of a term, and that each run has its own where what is held is one
+        run's."""
         found, own = self.holds(term), [p.name for p in term.effect.parameters if p.per_run]
         if found.degree is Degree.NOT or not own:
             return found

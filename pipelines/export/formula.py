@@ -1,8 +1,9 @@
-"""An equation as it is written down: what a kernel computes, told by running it on numbers that are not yet known.
+"""An equation as it is written down: what a kernel computes, told by running it on numbers that are
+not yet known.
 
-Kernels are plain scalar Python before numba compiles them. Called with `Formula` objects instead of numbers they
-return formulae, which a format prints in its own language. So an exported file holds the very equations that every
-stage uses, and no second copy of them stands anywhere.
+Kernels are plain scalar Python before numba compiles them. Called with `Formula` objects instead of
+numbers they return formulae, which a format prints in its own language. So an exported file holds
+the very equations that every stage uses, and no second copy of them stands anywhere.
 """
 
 import math
@@ -15,7 +16,22 @@ from typing import Any
 
 from pipelines.errors import ExoidError
 
-FUNCTIONS = ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2", "abs", "sign", "max", "min")
+FUNCTIONS = (
+    "sin",
+    "cos",
+    "tan",
+    "exp",
+    "expm1",
+    "log",
+    "sqrt",
+    "tanh",
+    "atan",
+    "atan2",
+    "abs",
+    "sign",
+    "max",
+    "min",
+)
 """What an equation may call; every format knows how to spell them."""
 
 MOST_BRANCHES = 64
@@ -30,7 +46,8 @@ class NotWritable(ExoidError):
 class Formula:
     """A number that is computed later.
 
-    ``operator`` is one of + - * / ** neg, a function's name, ``element`` (of an array) or ``constant``.
+    ``operator`` is one of + - * / ** neg, a function's name, ``element`` (of an array) or
+    ``constant``.
     """
 
     operator: str
@@ -137,7 +154,8 @@ def constants_in(outcome: Any) -> Iterator[str]:
 
 
 def arrays_in(outcome: Any) -> Iterator[str]:
-    """Yield the names of the arrays of which an outcome has elements, as often as they stand there."""
+    """Yield the names of the arrays of which an outcome has elements, as often as they stand
+    there."""
     match outcome:
         case Branch(condition, yes, no):
             yield from arrays_in([condition.left, condition.right, yes, no])
@@ -182,7 +200,8 @@ class Condition:
     right: Any
 
     def __bool__(self) -> bool:
-        """Return the answer of the way that is being gone; where there is none yet, stop at the fork."""
+        """Return the answer of the way that is being gone; where there is none yet, stop at the
+        fork."""
         answers = _ANSWERS.get()
         key = repr(self)
         if key not in answers:
@@ -224,8 +243,8 @@ def written(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
     kernel : numba dispatcher
         Of the kinds in ``pipelines.effects.kernel``.
     arguments : callable
-        Returns the kernel's arguments and, among them, the list that it writes to; called anew for each way
-        through the kernel.
+        Returns the kernel's arguments and, among them, the list that it writes to; called anew for
+        each way through the kernel.
 
     Returns
     -------
@@ -260,13 +279,20 @@ def written(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
 
 
 def _plain(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:
-    """Return an uncompiled function that calls uncompiled functions, and formulae where it would call math."""
+    """Return an uncompiled function that calls uncompiled functions, and formulae where it would
+    call math."""
     if function not in done:
         scope: dict[str, Any] = {}
-        plain = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, function.__closure__)
+        plain = FunctionType(
+            function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
+        )
         done[function] = plain
         known = function.__globals__
-        scope |= {name: _substitute(known[name], done) for name in function.__code__.co_names if name in known}
+        scope |= {
+            name: _substitute(known[name], done)
+            for name in function.__code__.co_names
+            if name in known
+        }
         scope |= {name: SUBSTITUTES[name] for name in ("abs", "max", "min") if name not in known}
     return done[function]
 
@@ -336,7 +362,9 @@ _COMPARED: dict[str, Callable[[float, float], bool]] = {
 
 
 def _compare(operator: str, left: Any, right: Any) -> Condition | bool:
-    one, other = (side.value if isinstance(side, Formula) else float(side) for side in (left, right))
+    one, other = (
+        side.value if isinstance(side, Formula) else float(side) for side in (left, right)
+    )
     if one is None or other is None:
         return Condition(operator, left, right)
     return _COMPARED[operator](one, other)

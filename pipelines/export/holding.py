@@ -8,14 +8,17 @@ from pipelines.model import Term
 
 
 def sound_friction(term: Term) -> tuple[float, float]:
-    """Return Coulomb and viscous friction of a term, 0 in place of a negative one: simulators refuse what drives."""
+    """Return Coulomb and viscous friction of a term, 0 in place of a negative one: simulators
+    refuse what drives."""
     coulomb, viscous = (max(float(value), 0.0) for value in term.values)
     return coulomb, viscous
 
 
 def held_friction(term: Term, whole: Holding) -> Holding:
     """Return ``whole`` where both halves of a friction can be held, else which of them is not."""
-    negative = [p.name for p, value in zip(term.effect.parameters, term.values, strict=True) if value < 0.0]
+    negative = [
+        p.name for p, value in zip(term.effect.parameters, term.values, strict=True) if value < 0.0
+    ]
     if not negative:
         return whole
     why = f"its {' and '.join(negative)} friction is negative, which would drive the joint"
@@ -27,7 +30,8 @@ Held = Mapping[str, Callable[[Term], Holding]]
 
 
 def looked_up(held: Held, shift: str, format_name: str) -> Callable[[Term], Holding]:
-    """Return what tells the holding of a term in a format of bodies and joints; encoders' shifts are ``shift``."""
+    """Return what tells the holding of a term in a format of bodies and joints; encoders' shifts
+    are ``shift``."""
 
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:

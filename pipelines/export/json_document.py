@@ -36,7 +36,10 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         "name": stem,
         "provenance": describe([table.path] if table.path else []),
         "run": exported.run,
-        "mechanism": {"name": exported.machine.mechanism.name, "title": exported.machine.mechanism.title},
+        "mechanism": {
+            "name": exported.machine.mechanism.name,
+            "title": exported.machine.mechanism.title,
+        },
         "method": table.metadata.get("method"),
         "joints": [
             {
@@ -74,7 +77,13 @@ def _effect(term: Term) -> dict[str, Any]:
         "meaning": told["meaning"],
         "source": told["source"],
         "values": [
-            {"name": p.name, "symbol": p.symbol, "value": float(value), "unit": p.unit, "meaning": p.meaning}
+            {
+                "name": p.name,
+                "symbol": p.symbol,
+                "value": float(value),
+                "unit": p.unit,
+                "meaning": p.meaning,
+            }
             for p, value in zip(effect.parameters, values, strict=True)
         ],
     }

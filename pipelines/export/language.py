@@ -52,14 +52,22 @@ class Language:
         return f"{self.names.get(operator, operator)}({', '.join(map(self.text, operands))})", ATOM
 
     def added(self, outcome: list | Branch, to: str) -> list[str]:
-        """Return the statements that add what a kernel computed to an array, leaving out what is nought."""
-        return self._statements(outcome, lambda i, value: self._addition(self.element(to, i), value))
+        """Return the statements that add what a kernel computed to an array, leaving out what is
+        nought."""
+        return self._statements(
+            outcome, lambda i, value: self._addition(self.element(to, i), value)
+        )
 
     def assigned(self, outcome: list | Branch, to: str, first: int = 0) -> list[str]:
-        """Return the statements that set an array, from its element ``first`` on, to what a kernel computed."""
-        return self._statements(outcome, lambda i, value: self._assignment(self.element(to, first + i), value))
+        """Return the statements that set an array, from its element ``first`` on, to what a kernel
+        computed."""
+        return self._statements(
+            outcome, lambda i, value: self._assignment(self.element(to, first + i), value)
+        )
 
-    def _statements(self, outcome: list | Branch, statement: Callable[[int, Any], list[str]]) -> list[str]:
+    def _statements(
+        self, outcome: list | Branch, statement: Callable[[int, Any], list[str]]
+    ) -> list[str]:
         if isinstance(outcome, Branch):
             ways = [self._statements(way, statement) for way in (outcome.yes, outcome.no)]
             return self.choice(self._question(outcome.condition), *ways) if any(ways) else []
@@ -80,7 +88,8 @@ class Language:
 
 
 def identifier(text: str) -> str:
-    """Return a name that every language takes: letters, digits and underscores of ASCII, a letter first."""
+    """Return a name that every language takes: letters, digits and underscores of ASCII, a letter
+    first."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")
     return name if name[:1].isalpha() else f"x{name}"
 

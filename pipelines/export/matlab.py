@@ -97,14 +97,18 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the function file."""
     made = equations(exported)
     joints = len(made.joints)
-    order = [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints, start=1)]
+    order = [
+        f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints, start=1)
+    ]
     return {
         ".m": FILE.format(
             name=function_name(stem, ".m", KEYWORDS),
             comment=comment([*exported.heading(MATLAB), "", *order]),
             joints=joints,
             memories=made.memories,
-            memory_of=one_line(", ".join(dict.fromkeys(made.memory_of)) or "no effect here has one"),
+            memory_of=one_line(
+                ", ".join(dict.fromkeys(made.memory_of)) or "no effect here has one"
+            ),
             sensor_shift=_column(made.sensor_shift),
             link_shift=_column(made.link_shift),
             functions="\n\n".join(_functions(made)),
@@ -123,18 +127,28 @@ def _column(values: Iterable[float]) -> str:
 
 def _functions(made: Equations) -> Iterable[str]:
     for group in GROUPS:
-        lines = [line for e in made.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
+        lines = [
+            line for e in made.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))
+        ]
         yield _function(f"tau = {group}(at, tau)", lines, made)
-    rates = [line for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))]
+    rates = [
+        line for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
+    ]
     yield _function("rate = memory_rate(at)", [f"rate = zeros({made.memories}, 1);", *rates], made)
-    readings = [line for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))]
+    readings = [
+        line for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
+    ]
     yield _function("tau = torque_reading(at, tau)", readings, made)
 
 
 def _function(head: str, lines: list[str], made: Equations) -> str:
     """Return a function that knows the constants it uses."""
     known = set(re.findall(r"\w+", "\n".join(lines)))
-    used = [f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}" for c in made.used if c.name in known]
+    used = [
+        f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}"
+        for c in made.used
+        if c.name in known
+    ]
     return "\n".join([f"function {head}", *used, *lines, "end"])
 
 

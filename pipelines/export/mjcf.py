@@ -1,7 +1,8 @@
 """MJCF: MuJoCo's own form of a model.
 
-A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is positive. A joint's
-``qpos`` is what its encoder gives, an actuator's ``ctrl`` what its torque channel would say.
+A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is
+positive. A joint's ``qpos`` is what its encoder gives, an actuator's ``ctrl`` what its torque
+channel would say.
 """
 
 from collections.abc import Mapping
@@ -26,18 +27,25 @@ TIMESTEP_S = 0.001
 
 def _friction(term: Term) -> Holding:
     return held_friction(
-        term, approximate("joint damping and frictionloss: exact while the joint moves, stuck joints creep a little")
+        term,
+        approximate(
+            "joint damping and frictionloss: exact while the joint moves, stuck joints creep a little"
+        ),
     )
 
 
 def _elasticity(term: Term) -> Holding:
-    return exact("a second joint, its stiffness and damping; the motor's inertia is the first one's armature")
+    return exact(
+        "a second joint, its stiffness and damping; the motor's inertia is the first one's armature"
+    )
 
 
 HELD: Held = {
     "rigid_body": lambda term: exact("bodies of nominal masses that have these X"),
     "friction": _friction,
-    "quadratic_drag": lambda term: exact("second coefficient of the joint's damping (read by MuJoCo 4.0)"),
+    "quadratic_drag": lambda term: exact(
+        "second coefficient of the joint's damping (read by MuJoCo 4.0)"
+    ),
     "rotor_inertia": lambda term: exact("joint armature"),
     "parallel_spring": lambda term: exact("joint stiffness and springref"),
     "mass_off_axis": lambda term: exact("place of the body's centre of mass"),
@@ -52,7 +60,9 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
-    ET.SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP_S), integrator="implicitfast")
+    ET.SubElement(
+        root, "option", gravity=gravity, timestep=number(TIMESTEP_S), integrator="implicitfast"
+    )
     world = ET.SubElement(root, "worldbody")
     names = unique(one_line(joint.name) for joint in exported.joints)
     twists = unique([f"{name}_twist" for name in names], names)
@@ -71,25 +81,31 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
     made = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
-    hinge = {"type": "hinge" if body.joint.kind == "revolute" else "slide", "axis": numbers(*body.axis)}
+    hinge = {
+        "type": "hinge" if body.joint.kind == "revolute" else "slide",
+        "axis": numbers(*body.axis),
+    }
     soft = _twist(body.joint, exported)
     at_link = {} if soft else _spring(body.joint, body.shift, exported)
     ET.SubElement(made, "joint", {"name": name} | hinge | _joint(body, exported) | at_link)
     if soft:
         ET.SubElement(made, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
-    # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a slide's centre is, its
-    # motion does not ask.
+    # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a
+    # slide's centre is, its motion does not ask.
     aside = OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
     centre = numbers(*(body.centre + aside))
     ET.SubElement(made, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
-    ET.SubElement(made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0")
+    ET.SubElement(
+        made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0"
+    )
     return made
 
 
 def _frame(body: Body) -> dict[str, str]:
-    """Return where the joint is, set back by the shift: at angle zero the link is where its encoder says so."""
+    """Return where the joint is, set back by the shift: at angle zero the link is where its encoder
+    says so."""
     carried = {"gravcomp": number(body.carried)} if body.carried else {}
     axis = np.array(body.axis)
     if body.joint.kind == "prismatic":
@@ -138,13 +154,19 @@ def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
     return {"stiffness": says, "damping": number(damping)}
 
 
-def _spring_across(springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported) -> None:
+def _spring_across(
+    springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported
+) -> None:
     """Add the spring of a link that hangs behind a soft joint: its angle is the sum of two."""
     if exported.of("joint_elasticity", joint.name) is None:
         return
-    says = _spring(joint, exported.shift()[[j.name for j in exported.joints].index(joint.name)], exported)
+    says = _spring(
+        joint, exported.shift()[[j.name for j in exported.joints].index(joint.name)], exported
+    )
     if says:
-        across = ET.SubElement(springs, "fixed", name=f"{names[0]}_spring", stiffness=says["stiffness"])
+        across = ET.SubElement(
+            springs, "fixed", name=f"{names[0]}_spring", stiffness=says["stiffness"]
+        )
         across.set("springlength", says["springref"])
         for part in names:
             ET.SubElement(across, "joint", joint=part, coef="1")
@@ -155,7 +177,8 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     if gain is None and offset is None:
         ET.SubElement(actuators, "motor", name=name, joint=name)
         return
-    # The channel says g T where the drive delivers T, or g T + o; asked for u, the drive delivers what makes it say u.
+    # The channel says g T where the drive delivers T, or g T + o; asked for u, the drive delivers
+    # what makes it say u.
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
     at_nought = -(offset.values[0] if offset else 0.0)
     if gain and offset and _comes_before(exported, gain, offset):
@@ -170,4 +193,10 @@ def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
     return next(term for term in exported.terms if term is first or term is second) is first
 
 
-MJCF = Format("mjcf", "MuJoCo model", ".xml", looked_up(HELD, "orientation of the joint's frame", "MJCF"), write)
+MJCF = Format(
+    "mjcf",
+    "MuJoCo model",
+    ".xml",
+    looked_up(HELD, "orientation of the joint's frame", "MJCF"),
+    write,
+)

@@ -1,6 +1,7 @@
 """The table of docs/export.md: what each format holds of each effect.
 
-``python -m pipelines.export.reference docs/export.md`` brings it up to date; a test says when it is not.
+``python -m pipelines.export.reference docs/export.md`` brings it up to date; a test says when it is
+not.
 """
 
 import re
@@ -29,7 +30,9 @@ def table() -> str:
         + " |"
         for effect in ours
     ]
-    return "\n".join([f"| effect | {' | '.join(COLUMNS)} |", "|---" * (1 + len(COLUMNS)) + "|", *rows])
+    return "\n".join(
+        [f"| effect | {' | '.join(COLUMNS)} |", "|---" * (1 + len(COLUMNS)) + "|", *rows]
+    )
 
 
 def _plausible(effect: type[Effect]) -> Term:
@@ -40,7 +43,11 @@ def _plausible(effect: type[Effect]) -> Term:
 
 def _cell(format: Format, term: Term) -> str:
     holding = format.holding(term)
-    return f"– ({holding.how})" if holding.degree is Degree.NOT else f"**{holding.degree}**: {holding.how}"
+    return (
+        f"– ({holding.how})"
+        if holding.degree is Degree.NOT
+        else f"**{holding.degree}**: {holding.how}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """URDF, as pinocchio, ROS and MATLAB's Robotics System Toolbox read it.
 
-A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is positive. A joint's
-position is what its encoder gives. URDF tells neither gravity nor rotors.
+A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is
+positive. A joint's position is what its encoder gives. URDF tells neither gravity nor rotors.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,9 @@ from pipelines.model import Term
 
 
 def _friction(term: Term) -> Holding:
-    return held_friction(term, exact("dynamics of the joint: damping and friction; not every reader heeds them"))
+    return held_friction(
+        term, exact("dynamics of the joint: damping and friction; not every reader heeds them")
+    )
 
 
 HELD: Held = {
@@ -59,7 +61,9 @@ def _link(root: ET.Element, name: str, body: Body) -> None:
     ET.SubElement(inertial, "inertia", ixx=same, iyy=same, izz=same, ixy=none, ixz=none, iyz=none)
 
 
-def _joint(root: ET.Element, name: str, parent: str, link: str, body: Body, exported: Exported) -> None:
+def _joint(
+    root: ET.Element, name: str, parent: str, link: str, body: Body, exported: Exported
+) -> None:
     joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
     # Set back by the shift: at angle zero the link is where its encoder says so.
     back, turns = -body.shift * np.array(body.axis), body.joint.kind == "revolute"

@@ -34,7 +34,9 @@ class Summary:
         self._valid += int(valid.sum())
 
         def stacked(quantity: str) -> NDArray:
-            return np.column_stack([piece[joint.column(quantity)].to_numpy() for joint in self._joints])[valid]
+            return np.column_stack(
+                [piece[joint.column(quantity)].to_numpy() for joint in self._joints]
+            )[valid]
 
         self._noise.add(stacked("angle_measured") - stacked("angle"))
         if {joint.column("velocity_measured") for joint in self._joints} <= set(piece.column_names):
@@ -47,12 +49,14 @@ class Summary:
 
     @property
     def noise(self) -> NDArray:
-        """Rms of measured less filtered angle, (J,) rad: the encoder's noise and what the filter took."""
+        """Rms of measured less filtered angle, (J,) rad: the encoder's noise and what the filter
+        took."""
         return self._noise.root
 
     @property
     def velocity_difference(self) -> NDArray | None:
-        """Rms of the drive's own velocity less the filtered one, (J,) rad/s; None where the drive gave none."""
+        """Rms of the drive's own velocity less the filtered one, (J,) rad/s; None where the drive
+        gave none."""
         return self._velocity.root if self._velocity.count.any() else None
 
 

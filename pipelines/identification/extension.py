@@ -1,7 +1,8 @@
 """What a model has beside rigid body and friction: chosen by name, or named by a diagnosis.
 
-Amplitudes, which torques are linear in, are fitted, in each run where each run has its own. Shapes, as a stiffness or
-an encoder's offset, are held at what the diagnosis found, and are as sure as it was.
+Amplitudes, which torques are linear in, are fitted, in each run where each run has its own. Shapes,
+as a stiffness or an encoder's offset, are held at what the diagnosis found, and are as sure as it
+was.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,11 +40,13 @@ class Extension:
     own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
     """By a run's file, the terms as they are there; None of what never came."""
     bodies: Mapping[str, NDArray] = field(default_factory=dict)
-    """By kind of run, and ``human``: the rigid bodies, (k,), that a diagnosis found beside them; empty without one."""
+    """By kind of run, and ``human``: the rigid bodies, (k,), that a diagnosis found beside them;
+    empty without one."""
     recordings: Mapping[str, str] = field(default_factory=dict)
     """By a run's file, the hash of its recording."""
     remarks: tuple[str, ...] = ()
-    """What was left out or guessed, and what was learnt from runs to validate on, a sentence each."""
+    """What was left out or guessed, and what was learnt from runs to validate on, a sentence
+    each."""
 
     @property
     def covariance(self) -> NDArray:
@@ -57,7 +60,9 @@ class Extension:
         more, remarks = [], list(self.remarks)
         for term in terms:
             if (term.effect.label, term.effect.run) in have:
-                remarks.append(f"{term.effect.label} is among the causes already, and is fitted as it is there")
+                remarks.append(
+                    f"{term.effect.label} is among the causes already, and is fitted as it is there"
+                )
             else:
                 more.append(term)
         added = sum(len(term.shape) for term in more)
@@ -79,7 +84,9 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     InputError
         Where there is none of this name or at this joint, or its shape would have to be known.
     """
-    effects = [effect_at(label, machine, _shapeless, "--effect", WHY) for label in dict.fromkeys(labels)]
+    effects = [
+        effect_at(label, machine, _shapeless, "--effect", WHY) for label in dict.fromkeys(labels)
+    ]
     return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
@@ -104,7 +111,8 @@ def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
 
 
 def _shapeless(effect: type[Effect]) -> bool:
-    """Tell whether amplitudes are all that is to be known of an effect, and are the same in every run."""
+    """Tell whether amplitudes are all that is to be known of an effect, and are the same in every
+    run."""
     told = all(p.default is not None for p in effect.shape)
     alike = not any(p.per_run for p in (*effect.linear, *effect.shape))
     return effect.name not in BASELINE and bool(effect.linear) and told and alike
@@ -140,19 +148,34 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     ]
     terms = tuple(term for term, _ in acting)
     own, hashes = {}, {}
-    for run, path in zip(runs, recordings, strict=True) if any(term.effect.per_run for term in terms) else ():
+    for run, path in (
+        zip(runs, recordings, strict=True) if any(term.effect.per_run for term in terms) else ()
+    ):
         this = hashes[run.file] = recording_behind(path)
         with about(table.path):
             own[run.file] = tuple(own_term(term, table, this) for term in terms)
-        remarks += _about(run, path, [term for term in terms if term.effect.acts(run.run)], table, this)
+        remarks += _about(
+            run, path, [term for term in terms if term.effect.acts(run.run)], table, this
+        )
     return Extension(
-        terms, _of_shapes(table, acting), _critical(table), own, _bodies(table), hashes, tuple(dict.fromkeys(remarks))
+        terms,
+        _of_shapes(table, acting),
+        _critical(table),
+        own,
+        _bodies(table),
+        hashes,
+        tuple(dict.fromkeys(remarks)),
     )
 
 
 def _refuse_another_machine(table: Table, run: Run) -> None:
     mechanism = table.metadata.get("mechanism") or run.machine.mechanism.name
-    theirs = [*(f"{one['name']} ({one['kind']})" for one in table.metadata.get("joints") or run.joint_metadata)]
+    theirs = [
+        *(
+            f"{one['name']} ({one['kind']})"
+            for one in table.metadata.get("joints") or run.joint_metadata
+        )
+    ]
     ours = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
     remedy = "give the parameters.parquet of a diagnosis of the same machine"
     if theirs != ours or mechanism != run.machine.mechanism.name:
@@ -163,11 +186,14 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
     geometry = table.metadata.get("geometry") or {}
     for name, length in run.machine.told(run.geometry).items():
         if not np.isclose(geometry.get(name, length), length):
-            raise InputError(f"{table.path}: has {name} {geometry[name]:g}, the runs have {length:g}; {remedy}")
+            raise InputError(
+                f"{table.path}: has {name} {geometry[name]:g}, the runs have {length:g}; {remedy}"
+            )
 
 
 def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: str) -> list[str]:
-    """Say what is guessed of a run's own values, and what was learnt from a run that is to judge."""
+    """Say what is guessed of a run's own values, and what was learnt from a run that is to
+    judge."""
     own = [term for term in terms if term.effect.per_run]
     guesses = [guess(term, table, sha256, path) for term in own]
     learnt = [term.effect.label for term, guessed in zip(own, guesses, strict=True) if not guessed]
@@ -181,7 +207,8 @@ def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: st
 
 
 def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDArray:
-    """Return the covariance of the shapes of some terms, (s, s), from that of the rows that tell of each."""
+    """Return the covariance of the shapes of some terms, (s, s), from that of the rows that tell of
+    each."""
     told = table.metadata.get("covariance")
     error = table.frame["std_error"].to_numpy(float)
     covariance = np.nan_to_num(np.diag(error**2) if told is None else np.array(told, dtype=float))
@@ -201,7 +228,11 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
 def _critical(table: Table) -> float:
     """Return the half-width of the table's intervals in standard errors."""
     frame = table.frame
-    width = ((frame["ci95_high"] - frame["value"]) / frame["std_error"]).replace([np.inf, 0.0], np.nan).median()
+    width = (
+        ((frame["ci95_high"] - frame["value"]) / frame["std_error"])
+        .replace([np.inf, 0.0], np.nan)
+        .median()
+    )
     return float(width) if np.isfinite(width) else 1.96
 
 

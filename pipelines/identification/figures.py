@@ -42,7 +42,9 @@ class _Drawn:
         for name in columns:
             self.squares[name] = self.squares.get(name, 0.0) + float(np.sum(scored[name] ** 2))
         chosen = frame.iloc[-self.passed % self.every :: self.every]
-        self.frame = pd.concat([self.frame, chosen], ignore_index=True) if len(self.frame) else chosen
+        self.frame = (
+            pd.concat([self.frame, chosen], ignore_index=True) if len(self.frame) else chosen
+        )
         self.passed += len(frame)
         while len(self.frame) > MOST:
             self.frame = self.frame.iloc[::2].reset_index(drop=True)
@@ -66,7 +68,9 @@ def draw(residuals: Rows, folder: Path) -> None:
 
 
 def _validation_runs(residuals: Rows) -> dict[str, _Drawn]:
-    columns = [joint.column(quantity) for joint in residuals.joints for quantity in ("residual", "torque")]
+    columns = [
+        joint.column(quantity) for joint in residuals.joints for quantity in ("residual", "torque")
+    ]
     runs: dict[str, _Drawn] = {}
     for piece in residuals.pieces():
         frame = piece.to_pandas()
@@ -79,12 +83,24 @@ def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
     """Draw measured and predicted torque over time, the difference on the same scale beneath."""
     run = drawn.frame
     figure, axes = plt.subplots(
-        2 * len(joints), 1, figsize=(9, 3.2 * len(joints)), sharex=True, height_ratios=[3, 1.3] * len(joints)
+        2 * len(joints),
+        1,
+        figsize=(9, 3.2 * len(joints)),
+        sharex=True,
+        height_ratios=[3, 1.3] * len(joints),
     )
     for j, joint in enumerate(joints):
         torque, left = axes[2 * j], axes[2 * j + 1]
-        torque.plot(run["time_s"], run[joint.column("torque")], color=MEASURED, lw=2.2, label="measured")
-        torque.plot(run["time_s"], run[joint.column("predicted")], color=PREDICTED, lw=0.9, label="predicted")
+        torque.plot(
+            run["time_s"], run[joint.column("torque")], color=MEASURED, lw=2.2, label="measured"
+        )
+        torque.plot(
+            run["time_s"],
+            run[joint.column("predicted")],
+            color=PREDICTED,
+            lw=0.9,
+            label="predicted",
+        )
         torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
         torque.set_title(f"{joint.name}: {_error(drawn, joint)}", loc="left", fontsize=9)
         _residual_over(left, run["time_s"], run, joint)
@@ -100,35 +116,54 @@ def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
 def _what_is_left(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
     """Draw the residual against time, angle and speed: noise has no shape in any of them."""
     run = drawn.frame
-    figure, axes = plt.subplots(len(joints), 3, figsize=(10, 2.7 * len(joints)), squeeze=False, sharey="row")
+    figure, axes = plt.subplots(
+        len(joints), 3, figsize=(10, 2.7 * len(joints)), squeeze=False, sharey="row"
+    )
     for row, joint in zip(axes, joints, strict=True):
         against = {"time, s": "time_s"}
-        against |= {f"{joint.name} {q}, {joint.unit(q)}": joint.column(q) for q in ("angle", "velocity")}
+        against |= {
+            f"{joint.name} {q}, {joint.unit(q)}": joint.column(q) for q in ("angle", "velocity")
+        }
         for axis, (label, column) in zip(row, against.items(), strict=True):
             _residual_over(axis, run[column], run, joint, dots=True)
             axis.set_xlabel(label)
         row[0].set_ylabel(f"{joint.name} residual, {joint.unit('torque')}")
         row[0].set_title(_error(drawn, joint), loc="left", fontsize=9)
-    figure.legend(*axes[0, -1].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4)
+    figure.legend(
+        *axes[0, -1].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4
+    )
     figure.suptitle(f"{title}: what the model leaves", x=0.02, ha="left", fontweight="bold")
     figure.tight_layout()
     return figure
 
 
-def _residual_over(axis: Axes, x: pd.Series, run: pd.DataFrame, joint: Joint, dots: bool = False) -> None:
+def _residual_over(
+    axis: Axes, x: pd.Series, run: pd.DataFrame, joint: Joint, dots: bool = False
+) -> None:
     residual, scored = run[joint.column("residual")].to_numpy(), run["scored"].to_numpy()
     if not dots:
         axis.plot(x, np.where(scored, residual, np.nan), color=LEFT, lw=0.7)
         return
-    axis.plot(x[~scored], residual[~scored], ".", ms=1.2, color=MEASURED, alpha=0.5, label="near a reversal")
+    axis.plot(
+        x[~scored],
+        residual[~scored],
+        ".",
+        ms=1.2,
+        color=MEASURED,
+        alpha=0.5,
+        label="near a reversal",
+    )
     axis.plot(x[scored], residual[scored], ".", ms=1.2, color=LEFT, alpha=0.6, label="scored")
     axis.axhline(0, color="black", lw=0.6)
     if not scored.any():
         return
-    bins = run.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[joint.column("residual")]
+    bins = run.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[
+        joint.column("residual")
+    ]
     mean = bins.mean().where(bins.count() >= FEWEST)
     axis.plot([b.mid for b in mean.index], mean, color=PREDICTED, lw=1.6, label="mean")
-    # A joint that sticks leaves errors ten times the rest, which would flatten what there is to see.
+    # A joint that sticks leaves errors ten times the rest, which would flatten what there is to
+    # see.
     height = 6 * residual[scored].std()
     if height > 0.0:
         axis.set_ylim(-height, height)

@@ -1,4 +1,5 @@
-"""The rows of ``parameters/1`` that an identification writes, and how each goes with what was fitted and held."""
+"""The rows of ``parameters/1`` that an identification writes, and how each goes with what was
+fitted and held."""
 
 from collections.abc import Iterator, Sequence
 
@@ -26,11 +27,14 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
         yield from _of_body(wearer, "human", "inertia")
     for term, slope in terms:
         if term.effect.name not in BASELINE:
-            yield from rows_of(term.effect, term.values, slope, "extension", positive=term.effect.shape)
+            yield from rows_of(
+                term.effect, term.values, slope, "extension", positive=term.effect.shape
+            )
 
 
 def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray]]:
-    """Yield each term, as the first run to train on that has it has it, and how its values change, (v, p + s)."""
+    """Yield each term, as the first run to train on that has it has it, and how its values change,
+    (v, p + s)."""
     layout = training.layout
     units = np.eye(layout.shapes(len(layout.terms) - 1).stop)
     for number, term in enumerate(training.model):
@@ -46,5 +50,7 @@ def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray
 def _of_body(bodies: Sequence[tuple[Term, NDArray]], run: str, step: str) -> list[Row]:
     """Return the rows of the sum of some rigid bodies."""
     effect = RigidBody(run=run, on=bodies[0][0].effect.on)
-    values, slopes = (np.sum(parts, axis=0) for parts in zip(*((t.values, s) for t, s in bodies), strict=True))
+    values, slopes = (
+        np.sum(parts, axis=0) for parts in zip(*((t.values, s) for t, s in bodies), strict=True)
+    )
     return rows_of(effect, values, slopes, step)

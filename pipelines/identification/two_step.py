@@ -1,10 +1,10 @@
 """The two-step fit, by whatever estimator.
 
-Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds both and fits the rigid body of the
-wearer; step 1's covariance is carried into step 2's intervals. What the model has beside them is fitted in step 1, or
-in step 2 where it acts with a human only. A fit of everything at once is computed beside it as a check. Least squares
-goes through each training run once to compress its rows, from which every fit follows, and twice for the covariance of
-what the fit left.
+Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds both and fits the
+rigid body of the wearer; step 1's covariance is carried into step 2's intervals. What the model has
+beside them is fitted in step 1, or in step 2 where it acts with a human only. A fit of everything
+at once is computed beside it as a check. Least squares goes through each training run once to
+compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +39,8 @@ SLOWLY = f"{IN_WORDS}, so that nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the
 STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
 ROUNDS, RESTS = 12, 1e-3
-"""In which loads follow the rigid bodies that they are of, and the relative change at which these are at rest."""
+"""In which loads follow the rigid bodies that they are of, and the relative change at which these
+are at rest."""
 RESTLESS = (
     f"the rigid bodies and the loads that they make did not come to agree in {ROUNDS} rounds, so these values are not "
     "to be trusted: some shape that is held, as a soft spring's, does not go with these runs"
@@ -72,7 +73,8 @@ class Identified:
     method: dict[str, Any]
     """How it was found, for the file's metadata."""
     remarks: list[str]
-    """What the method says of these data, and of a machine that would stand on its head, a sentence each."""
+    """What the method says of these data, and of a machine that would stand on its head, a sentence
+    each."""
     angle_noise: list[str]
     """A sentence where noise of the angles biases every fit; empty where it does not."""
 
@@ -82,9 +84,13 @@ class Identified:
 
     @property
     def models(self) -> dict[str, Model]:
-        """What was found, for each kind of run; what each run has for itself is as in the first trained on."""
+        """What was found, for each kind of run; what each run has for itself is as in the first
+        trained on."""
         first = {run.run: run for run in reversed(self.training.runs)}
-        return {kind: self.training.model_of(run, self.values).for_run(kind) for kind, run in first.items()}
+        return {
+            kind: self.training.model_of(run, self.values).for_run(kind)
+            for kind, run in first.items()
+        }
 
     @property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
@@ -110,7 +116,8 @@ def identify(
     *,
     reversals: bool = False,
 ) -> Identified:
-    """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the human's.
+    """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the
+    human's.
 
     Parameters
     ----------
@@ -119,7 +126,8 @@ def identify(
     estimator : Estimator, optional
         The method of both steps; weighted least squares unless given.
     extension : Extension, optional
-        What the model has beside rigid body and friction. Whole runs are then held in memory, for it may remember.
+        What the model has beside rigid body and friction. Whole runs are then held in memory, for
+        it may remember.
     reversals : bool
         Whether samples near reversals are fitted, too.
 
@@ -136,7 +144,10 @@ def identify(
     refuse_unread(extension.terms, [*runs.of("train"), *runs.of("validate")])
     training, at_rest = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
     judged = [training.loaded(run) for run in runs.of("validate")]
-    steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator).items()}
+    steps = {
+        kind: Step(one.problem, estimated(one.fit))
+        for kind, one in _in_steps(training, estimator).items()
+    }
     values = _values(steps)
     told = list(rows(training, values))
     covariance = _covariance(told, steps, extension, training)
@@ -164,14 +175,18 @@ def identify(
             *upside_down(table, runs.motions[0].machine),
             *extension.remarks,
             *[RESTLESS] * (not at_rest),
-            *[SLOWLY.format("fitted or scored" if estimator.masks else "scored")] * (training.cutoff_hz is not None),
+            *[SLOWLY.format("fitted or scored" if estimator.masks else "scored")]
+            * (training.cutoff_hz is not None),
         ],
         angle_noise=[BIASED] * (loud and training.cutoff_hz is None),
     )
 
 
-def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None) -> tuple[Training, bool]:
-    """Return what is fitted to what, with the loads that terms may go with, and whether those are at rest.
+def _training(
+    runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None
+) -> tuple[Training, bool]:
+    """Return what is fitted to what, with the loads that terms may go with, and whether those are
+    at rest.
 
     The plain model is fitted piece by piece, whatever is above the cut-off.
     """
@@ -195,30 +210,41 @@ def _whose(training: Training) -> list[str]:
     return [*training.kinds, *["human"] * ("with_human" in training.kinds)]
 
 
-def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> tuple[Training, bool]:
-    """Return the training with the loads of the rigid bodies that it finds, and whether it found them in the end.
+def _under_its_own_loads(
+    training: Training, bodies: Mapping[str, NDArray]
+) -> tuple[Training, bool]:
+    """Return the training with the loads of the rigid bodies that it finds, and whether it found
+    them in the end.
 
-    The first round's are of ``bodies``. Behind an elastic joint what is found overshoots, round after round, so each
-    step is as long as the last two tell (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
+    The first round's are of ``bodies``. Behind an elastic joint what is found overshoots, round
+    after round, so each step is as long as the last two tell (Aitken, 1926, Proc. Royal Society of
+    Edinburgh 46).
     """
     kinds = _whose(training)
     sizes = np.cumsum([len(bodies[kind]) for kind in kinds])[:-1]
     at, last = np.concatenate([bodies[kind] for kind in kinds]), None
     for _ in range(ROUNDS):
         now = dict(zip(kinds, np.split(at, sizes), strict=True))
-        training = training.with_bodies({kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds})
+        training = training.with_bodies(
+            {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
+        )
         found = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([found[kind] for kind in kinds]) - at
         if np.all(np.abs(step) < RESTS * np.abs(at)):
             return training, True
-        growth = 0.0 if last is None else float(step @ last[0] / (last[0] @ last[0])) / last[1] + 1.0 - 1.0 / last[1]
+        growth = (
+            0.0
+            if last is None
+            else float(step @ last[0] / (last[0] @ last[0])) / last[1] + 1.0 - 1.0 / last[1]
+        )
         length = 1.0 / (1.0 - np.clip(growth, -3.0, 0.5))
         last, at = (step, length), at + length * step
     return training, False
 
 
 def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
-    """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,) each."""
+    """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,)
+    each."""
     layout = training.layout
     found = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
     return found | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
@@ -239,7 +265,8 @@ class Step(Generic[Found]):
 
 
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
-    """Fit what is there in the empty exoskeleton, then, that being held, what comes with a human."""
+    """Fit what is there in the empty exoskeleton, then, that being held, what comes with a
+    human."""
     empty = training.layout.acting_in("exo_alone")
     values = np.zeros(len(empty))
     steps = {}
@@ -257,7 +284,9 @@ def _values(steps: Mapping[str, Step[Any]]) -> NDArray:
     return last.problem.completed(last.fit.values)
 
 
-def _method(estimator: Estimator, steps: Mapping[str, Step[Estimate]], training: Training) -> dict[str, Any]:
+def _method(
+    estimator: Estimator, steps: Mapping[str, Step[Estimate]], training: Training
+) -> dict[str, Any]:
     away = f"all but {mask_in_words(training.runs[0].machine)}"
     return {
         "name": f"two-step {estimator.title}",
@@ -270,10 +299,11 @@ def _method(estimator: Estimator, steps: Mapping[str, Step[Estimate]], training:
 
 
 def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]:
-    """Return how least-squares values answer to shapes that are held, (p, h), and the shapes' covariance, (h, h).
+    """Return how least-squares values answer to shapes that are held, (p, h), and the shapes'
+    covariance, (h, h).
 
-    ``covariance`` (s, s) is that of the terms' shapes, one after the other; of what each run has for itself, as its
-    first run has it. Other runs' are taken to be as sure, and for themselves.
+    ``covariance`` (s, s) is that of the terms' shapes, one after the other; of what each run has
+    for itself, as its first run has it. Other runs' are taken to be as sure, and for themselves.
     """
     error = np.sqrt(np.diag(covariance))
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
@@ -288,7 +318,9 @@ def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]
     return np.reshape(answers, (len(answers), training.layout.size)).T, every
 
 
-def _answer(training: Training, term: int, shape: int, error: float, files: Sequence[str]) -> NDArray:
+def _answer(
+    training: Training, term: int, shape: int, error: float, files: Sequence[str]
+) -> NDArray:
     """Return how least-squares values, (p,), change with a term's shape in some runs."""
     if error == 0.0 or not files:
         return np.zeros(training.layout.size)
@@ -303,12 +335,17 @@ def _answer(training: Training, term: int, shape: int, error: float, files: Sequ
 
 
 def _covariance(
-    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, training: Training
+    told: Sequence[Row],
+    steps: Mapping[str, Step[Estimate]],
+    extension: Extension,
+    training: Training,
 ) -> NDArray:
-    """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of the rest.
+    """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of
+    the rest.
 
-    A shape and the amplitudes beside it are estimated from what each explains beyond the others: given the shape,
-    the error of an amplitude hardly goes with that of the shape, and not at all in white noise.
+    A shape and the amplitudes beside it are estimated from what each explains beyond the others:
+    given the shape, the error of an amplitude hardly goes with that of the shape, and not at all in
+    white noise.
     """
     to_shapes, of_shapes = _answers(training, extension.covariance)
     p, h = to_shapes.shape
@@ -325,10 +362,13 @@ def _covariance(
     return slopes @ covariance[:size, :size] @ slopes.T
 
 
-def _critical(told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension) -> NDArray:
+def _critical(
+    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension
+) -> NDArray:
     """Return the half-width of each row's interval in standard errors.
 
-    What is fitted with a human is no surer than the less sure of both steps, what is held as sure as it was found.
+    What is fitted with a human is no surer than the less sure of both steps, what is held as sure
+    as it was found.
     """
     slopes = np.array([row.slope for row in told])
     critical, least = np.full(len(told), extension.critical), 0.0

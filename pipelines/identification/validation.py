@@ -53,18 +53,26 @@ ModelOf = Callable[[Run], Model | None]
 """Returns the model of a run, None where its kind has none."""
 
 
-def validate(motions: Sequence[Run], model_of: ModelOf, cutoff_hz: float | None = None) -> Validation:
-    """Score each run's model on it, by kind of run; runs without one are left out, and what is above a cut-off."""
+def validate(
+    motions: Sequence[Run], model_of: ModelOf, cutoff_hz: float | None = None
+) -> Validation:
+    """Score each run's model on it, by kind of run; runs without one are left out, and what is
+    above a cut-off."""
     joints = motions[0].joints
     sums: dict[str, _Sums] = {}
     for motion in motions:
         model = model_of(motion)
         if model is not None:
             before = sums.get(motion.run, _Sums.none(len(joints)))
-            of_run = (_Sums.of(r, residual_of(r, model.linear_values)) for r in regressions(motion, model, cutoff_hz))
+            of_run = (
+                _Sums.of(r, residual_of(r, model.linear_values))
+                for r in regressions(motion, model, cutoff_hz)
+            )
             sums[motion.run] = sum(of_run, before)
     pooled = sum(sums.values(), _Sums.none(len(joints)))
-    return Validation(joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()})
+    return Validation(
+        joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()}
+    )
 
 
 @dataclass(frozen=True)

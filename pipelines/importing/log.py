@@ -1,4 +1,5 @@
-"""A log whose columns have been read: its clock's runs, and the quantities that a map makes of it."""
+"""A log whose columns have been read: its clock's runs, and the quantities that a map makes of
+it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -54,13 +55,20 @@ class Log:
 
     @property
     def turns(self) -> dict[str, float]:
-        """What a turn of its counter is in SI, of each of the recording's columns that has a counter."""
-        found = {channel.target: turn_of_its_counter(channel.reading, channel.gain) for channel in self.channels}
+        """What a turn of its counter is in SI, of each of the recording's columns that has a
+        counter."""
+        found = {
+            channel.target: turn_of_its_counter(channel.reading, channel.gain)
+            for channel in self.channels
+        }
         return {target: turn for target, turn in found.items() if turn is not None}
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
-        """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no value."""
-        return {channel.target: self._where_enabled(channel, run, findings) for channel in self.channels}
+        """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no
+        value."""
+        return {
+            channel.target: self._where_enabled(channel, run, findings) for channel in self.channels
+        }
 
     def _where_enabled(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         values = self._quantity(channel, run, findings)
@@ -74,7 +82,11 @@ class Log:
         said = told[run.rows]
         off, blank = said == 0.0, np.isnan(said)
         if (off | blank).all():
-            what = "has no number in any row" if blank.all() else "says of no row that the drive was on"
+            what = (
+                "has no number in any row"
+                if blank.all()
+                else "says of no row that the drive was on"
+            )
             raise InputError(
                 f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number where it was on; "
                 "correct joint.enabled in the map, or leave it out"
@@ -108,7 +120,8 @@ class Log:
         return quantity(channel.reading, channel.gain, picked, channel.target, findings)
 
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
-        """Return a channel with a clock of its own at a run's instants, on straight lines between its own samples."""
+        """Return a channel with a clock of its own at a run's instants, on straight lines between
+        its own samples."""
         reading = channel.reading
         stamps = clock.stamps(self.columns[str(reading.time)], self.settings, findings)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
@@ -118,9 +131,15 @@ class Log:
             )
         values = quantity(reading, channel.gain, columns, channel.target, findings)
         known = np.isfinite(values)
-        own = clock.runs(clock.seconds(stamps[known], self.origin, self.settings, findings), stamps[known], findings)
+        own = clock.runs(
+            clock.seconds(stamps[known], self.origin, self.settings, findings),
+            stamps[known],
+            findings,
+        )
         if len(own) != 1:
-            raise InputError(f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the file")
+            raise InputError(
+                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the file"
+            )
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
         found = np.interp(at, time, samples, left=np.nan, right=np.nan)
@@ -131,7 +150,9 @@ class Log:
         found[gap[behind] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
         seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
-        findings.append(Finding(channel.target, seen, "interpolated on straight lines, not across its gaps"))
+        findings.append(
+            Finding(channel.target, seen, "interpolated on straight lines, not across its gaps")
+        )
         return found
 
 
@@ -177,8 +198,13 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
             gain = reading.gain(transmission.TARGETS[name][joint.kind])
-            required, enabled = name in ("angle", "torque"), joint.enabled if name == "torque" else None
-            yield Channel(joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required, enabled)
+            required, enabled = (
+                name in ("angle", "torque"),
+                joint.enabled if name == "torque" else None,
+            )
+            yield Channel(
+                joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required, enabled
+            )
     for i, force in enumerate(settings.force):
         yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)
 
@@ -197,5 +223,9 @@ def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]
 
 
 def _as_numbers(columns: Columns, clocks: set[str | None], findings: list[Finding]) -> Columns:
-    """Return the columns as float64; those of clocks are left, for they may be dates or need all their digits."""
-    return {name: values if name in clocks else numbers(values, name, findings) for name, values in columns.items()}
+    """Return the columns as float64; those of clocks are left, for they may be dates or need all
+    their digits."""
+    return {
+        name: values if name in clocks else numbers(values, name, findings)
+        for name, values in columns.items()
+    }

@@ -48,7 +48,12 @@ class Imported:
     def pieces(self) -> Iterator[pa.Table]:
         """Yield the rows in their order, some at a time."""
         for first in range(0, len(self), parquet.ROWS):
-            yield pa.table({name: values[first : first + parquet.ROWS] for name, values in self.columns.items()})
+            yield pa.table(
+                {
+                    name: values[first : first + parquet.ROWS]
+                    for name, values in self.columns.items()
+                }
+            )
 
     def write(self, folder: Path) -> None:
         """Write the recording into a folder."""
@@ -60,7 +65,9 @@ class Imported:
         return f"{self.name}.parquet"
 
 
-def recordings(path: Path, settings: ImportMap, map_path: Path, before: Beginnings) -> Iterator[Imported]:
+def recordings(
+    path: Path, settings: ImportMap, map_path: Path, before: Beginnings
+) -> Iterator[Imported]:
     """Yield the recordings that a map makes of a log; ``before`` tells where those before it began.
 
     Raises
@@ -71,18 +78,23 @@ def recordings(path: Path, settings: ImportMap, map_path: Path, before: Beginnin
     wanted = [recording for recording in settings.recording if recording.is_of(path)]
     if not wanted:
         patterns = ", ".join(recording.files for recording in settings.recording)
-        raise SettingsError(f"{map_path}: no [[recording]] is of {path.name}, only of {patterns}; add one")
+        raise SettingsError(
+            f"{map_path}: no [[recording]] is of {path.name}, only of {patterns}; add one"
+        )
     with about(path):
         log = read_log(open_source(path, settings.source), settings, map_path)
         provenance = describe(
-            inputs=[*_files(path), map_path], config=settings.model_dump(mode="json", exclude_none=True)
+            inputs=[*_files(path), map_path],
+            config=settings.model_dump(mode="json", exclude_none=True),
         )
         given = {"source": path.as_posix(), "map": map_path.as_posix()}
         _refuse_short(log)
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
-            yield from _recordings_of(run, log, settings, wanted, before, (path, suffix, provenance, given))
+            yield from _recordings_of(
+                run, log, settings, wanted, before, (path, suffix, provenance, given)
+            )
 
 
 def _files(path: Path) -> list[Path]:
@@ -91,7 +103,9 @@ def _files(path: Path) -> list[Path]:
 
 def _refuse_short(log: Log) -> None:
     if log.rows < FEWEST:
-        raise InputError(f"found {counted(log.rows, 'row')}, a recording needs at least {FEWEST}; log for longer")
+        raise InputError(
+            f"found {counted(log.rows, 'row')}, a recording needs at least {FEWEST}; log for longer"
+        )
     longest = max(map(len, log.runs), default=0)
     if longest < FEWEST:
         raise InputError(
@@ -108,7 +122,9 @@ def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list
     kept = long if restarts == "split" else [max(long, key=len)]
     told = ", ".join(f"{run.rows[0]}-{run.rows[-1]}" for run in kept)
     lost = sum(map(len, runs)) - sum(map(len, kept))
-    done = f"rows {told} kept, {lost} left out" + ("" if restarts == "split" else " (time.restarts)")
+    done = f"rows {told} kept, {lost} left out" + (
+        "" if restarts == "split" else " (time.restarts)"
+    )
     findings.append(Finding("time", f"{len(runs)} runs", done))
     return kept
 
@@ -150,7 +166,9 @@ def _recordings_of(
         yield Imported(recording.name_of(path) + suffix, own, metadata, cut, tuple(findings))
 
 
-def _account(path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]) -> dict[str, Any]:
+def _account(
+    path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]
+) -> dict[str, Any]:
     """Return what the recording tells of how it was made."""
     return {
         "source": path.name,
@@ -165,14 +183,18 @@ def _account(path: Path, log: Log, run: Run, sampling: Sampling, findings: Seque
     }
 
 
-def _whole_rows(columns: Mapping[str, NDArray], required: Sequence[str], findings: list[Finding]) -> NDArray:
+def _whole_rows(
+    columns: Mapping[str, NDArray], required: Sequence[str], findings: list[Finding]
+) -> NDArray:
     """Return which rows have every quantity that a recording must have."""
     known = {name: np.isfinite(values) for name, values in columns.items()}
     for name in required:
         if not known[name].any():
             texts = [str(finding) for finding in findings if finding.done == TAKEN_FOR_MISSING]
             seen = f" ({'; '.join(texts)})" if texts else ""
-            raise InputError(f"{name} has no value in any row{seen}; correct its column, range or time in the map")
+            raise InputError(
+                f"{name} has no value in any row{seen}; correct its column, range or time in the map"
+            )
     whole = np.all([known[name] for name in required], axis=0)
     if np.count_nonzero(whole) < FEWEST:
         shares = ", ".join(f"{name} in {np.mean(known[name]):.0%}" for name in required)
@@ -183,7 +205,9 @@ def _whole_rows(columns: Mapping[str, NDArray], required: Sequence[str], finding
     for name, present in known.items():
         missing = len(present) - int(np.count_nonzero(present))
         if missing and name in required:
-            findings.append(Finding(name, f"no value in {counted(missing, 'row')}", "rows left out"))
+            findings.append(
+                Finding(name, f"no value in {counted(missing, 'row')}", "rows left out")
+            )
         elif missing:
             findings.append(Finding(name, f"no value in {counted(missing, 'row')}", "left empty"))
     return whole
@@ -200,12 +224,16 @@ def _sampling_findings(sampling: Sampling) -> list[Finding]:
             f"irregular: {sampling.irregular:.0%} of the steps are more than 2 % off their median; "
             f"{shortest:.4g} to {longest:.4g} ms, median {median:.4g}"
         )
-        found.append(Finding("time", seen, "stamps kept as they are; exoid filter interpolates angles between them"))
+        found.append(
+            Finding(
+                "time",
+                seen,
+                "stamps kept as they are; exoid filter interpolates angles between them",
+            )
+        )
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
-        seen = (
-            f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest {longest_gap:.3g} s"
-        )
+        seen = f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest {longest_gap:.3g} s"
         found.append(Finding("time", seen, "told in `gaps`; nothing is filled in"))
     return found
 
@@ -217,12 +245,22 @@ def _period_findings(
     if all(recording.period_s is not None for recording in wanted):
         return []
     asked = [joint.joint.column("reference") for joint in settings.joint]
-    motion = asked if all(name in columns for name in asked) else [j.joint.column("angle") for j in settings.joint]
+    motion = (
+        asked
+        if all(name in columns for name in asked)
+        else [j.joint.column("angle") for j in settings.joint]
+    )
     period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in motion]))
     if period_s is None:
         return []
     to_do = f"period_s = {period_s:.6g} in [[recording]] lets diagnose measure the noise instead of guessing it"
-    return [Finding("time", f"the motion repeats every {period_s:.6g} s, of which the map tells nothing", to_do)]
+    return [
+        Finding(
+            "time",
+            f"the motion repeats every {period_s:.6g} s, of which the map tells nothing",
+            to_do,
+        )
+    ]
 
 
 def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
@@ -241,7 +279,10 @@ def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -
 
 def _refuse_absurd_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     for i, joint in enumerate(settings.joint):
-        torque, unit = columns[joint.joint.column("torque")], "N·m" if joint.kind == "revolute" else "N"
+        torque, unit = (
+            columns[joint.joint.column("torque")],
+            "N·m" if joint.kind == "revolute" else "N",
+        )
         absurd = np.flatnonzero((torque > LARGEST_TORQUE) | (torque < -LARGEST_TORQUE))
         if len(absurd):
             first = f"{torque[absurd[0]]:.4g} {unit} at {columns['time_s'][absurd[0]]:.6g} s"
@@ -279,7 +320,9 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
     return slice(int(first), int(last))
 
 
-def _refuse_overlap(time: NDArray, wanted: Sequence[RecordingSettings], spans: Sequence[slice]) -> None:
+def _refuse_overlap(
+    time: NDArray, wanted: Sequence[RecordingSettings], spans: Sequence[slice]
+) -> None:
     """Refuse to judge a fit on samples that it was made from."""
     for (one, first), (other, second) in combinations(zip(wanted, spans, strict=True), 2):
         both = slice(max(first.start, second.start), min(first.stop, second.stop))
@@ -291,7 +334,9 @@ def _refuse_overlap(time: NDArray, wanted: Sequence[RecordingSettings], spans: S
             )
 
 
-def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampling) -> dict[str, Any]:
+def _metadata(
+    settings: ImportMap, recording: RecordingSettings, sampling: Sampling
+) -> dict[str, Any]:
     known = {
         "rig": settings.rig, "subject": recording.subject, "session": recording.session,
         "period_s": recording.period_s, "geometry": settings.geometry.model_dump(exclude_none=True) or None,
@@ -306,8 +351,11 @@ def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampl
 
 
 def refuse_to_overwrite(path: Path) -> None:
-    """Refuse to put a recording where something else stands: another file, or a recording that was not imported."""
+    """Refuse to put a recording where something else stands: another file, or a recording that was
+    not imported."""
     RECORDING.refuse_place(path)
     told = told_by(path)
     if told.get("contract") == RECORDING.label and "imported" not in told:
-        raise ContractError(f"{path}: holds a recording that was not imported, not overwritten; choose another folder")
+        raise ContractError(
+            f"{path}: holds a recording that was not imported, not overwritten; choose another folder"
+        )

@@ -37,14 +37,18 @@ class FourierTrajectory:
         return np.inf
 
     def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
-        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J) each."""
+        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J)
+        each."""
         phase = np.exp(1j * np.outer(np.atleast_1d(time), self._frequencies))
         q, dq, ddq = ((phase @ amplitude.T).real for amplitude in self._amplitudes)
         return self.theta0 + q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Lowest and highest angle, velocity and acceleration of each joint over all time, (3, J, 2)."""
-        ranges = np.array([[_range(joint) for joint in amplitude] for amplitude in self._amplitudes])
+        """Lowest and highest angle, velocity and acceleration of each joint over all time, (3, J,
+        2)."""
+        ranges = np.array(
+            [[_range(joint) for joint in amplitude] for amplitude in self._amplitudes]
+        )
         ranges[0] += self.theta0[:, np.newaxis]
         return ranges
 
@@ -54,7 +58,8 @@ class FourierTrajectory:
 
     @cached_property
     def _amplitudes(self) -> NDArray:
-        """Complex amplitudes of q, dq and ddq, (3, J, n): a sin x + b cos x = Re (b - i a) e^(i x)."""
+        """Complex amplitudes of q, dq and ddq, (3, J, n): a sin x + b cos x = Re (b - i a) e^(i
+        x)."""
         angle = self.b - 1j * self.a
         return np.array([angle * (1j * self._frequencies) ** order for order in range(3)])
 

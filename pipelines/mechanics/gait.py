@@ -16,5 +16,8 @@ PHASE = np.array([[-0.2, 0.6, 0.0], [1.8, 2.6, 3.0]])
 
 
 def gait() -> FourierTrajectory:
-    """Return q = mean + sum over k of amplitude_k cos(k w t + phase_k), the reference case of docs/simulation.md."""
-    return FourierTrajectory(theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA)
+    """Return q = mean + sum over k of amplitude_k cos(k w t + phase_k), the reference case of
+    docs/simulation.md."""
+    return FourierTrajectory(
+        theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA
+    )

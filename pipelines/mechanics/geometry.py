@@ -29,5 +29,6 @@ class Geometry:
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def array(self) -> NDArray:
-        """Return what compiled kernels receive as ``geometry``, (2,): thigh length (m), gravity (m/s²)."""
+        """Return what compiled kernels receive as ``geometry``, (2,): thigh length (m), gravity
+        (m/s²)."""
         return np.array([self.thigh_length_m, self.gravity_m_s2])

@@ -1,4 +1,5 @@
-"""From a recording to a motion: zero-phase filtered angles, their derivatives, segments, and what to trust."""
+"""From a recording to a motion: zero-phase filtered angles, their derivatives, segments, and what
+to trust."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,16 +24,20 @@ from pipelines.signals.low_pass import derivative, low_pass, reach, shortest
 EDGE_PERIODS = 1.5
 """Periods of the cut-off frequency at each end of a segment where the filter lacks one side."""
 SPLINE_REACH = 40
-"""Samples away from which a cubic spline no longer feels a cut: its influence falls by 3.7 with each."""
+"""Samples away from which a cubic spline no longer feels a cut: its influence falls by 3.7 with
+each."""
 SLOWEST_HZ, FASTEST_HZ = 12.0, 1e6
-"""Rates at which a machine's motion can be looked at: what moves below 5 Hz is seen, and no clock was misread."""
+"""Rates at which a machine's motion can be looked at: what moves below 5 Hz is seen, and no clock
+was misread."""
 WINDOW = 2**16
-"""Rows that are filtered at a time; fewer than the filter reaches would cost more than they save."""
+"""Rows that are filtered at a time; fewer than the filter reaches would cost more than they
+save."""
 
 
 @dataclass(frozen=True)
 class FilteredRecording:
-    """A ``motion/1`` table that is computed, window by window, each time its rows are gone through."""
+    """A ``motion/1`` table that is computed, window by window, each time its rows are gone
+    through."""
 
     recording: Rows
     metadata: dict[str, Any]
@@ -53,7 +58,8 @@ class FilteredRecording:
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
         """Yield the motion in its order; all columns, or those that are named.
 
-        Each window reaches so far beyond what it is about that the result is that of filtering all at once.
+        Each window reaches so far beyond what it is about that the result is that of filtering all
+        at once.
         """
         rate_hz, order = self.metadata["sample_rate_hz"], self.metadata["filter"]["order"]
         margin = reach(rate_hz, self.cutoff.hz, order) + SPLINE_REACH
@@ -67,8 +73,11 @@ class FilteredRecording:
         q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
         segment, valid = np.zeros(len(time), dtype=np.int64), np.zeros(len(time), dtype=bool)
         edge = _edge(rate_hz, self.cutoff.hz)
-        # Of a stretch that only the margin holds there may be too little to filter, and nothing of it is kept.
-        for s in self.stretches.overlapping(window.first + window.core.start, window.first + window.core.stop):
+        # Of a stretch that only the margin holds there may be too little to filter, and nothing of
+        # it is kept.
+        for s in self.stretches.overlapping(
+            window.first + window.core.start, window.first + window.core.stop
+        ):
             here = _rows_of(s, self.stretches, window)
             segment[here] = s
             if self.stretches.samples[s] < shortest(rate_hz, self.cutoff.hz):
@@ -88,25 +97,36 @@ class FilteredRecording:
 def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
     """Make a ``motion/1`` table of a ``recording/1`` table.
 
-    Angles are filtered and differentiated; torque, forces and the rest stay as measured; no sample is dropped.
+    Angles are filtered and differentiated; torque, forces and the rest stay as measured; no sample
+    is dropped.
     """
     rate_hz = float(recording.metadata["sample_rate_hz"])
     with about(recording.path):
         _refuse_strange_rate(rate_hz, "imported" in recording.metadata)
-        stretches = find_stretches((piece["time_s"].to_numpy() for piece in recording.pieces(["time_s"])), rate_hz)
+        stretches = find_stretches(
+            (piece["time_s"].to_numpy() for piece in recording.pieces(["time_s"])), rate_hz
+        )
         cutoff = _cutoff(recording, stretches, rate_hz, settings)
         _refuse_stretches_that_are_all_edge(stretches, rate_hz, cutoff)
     how = {
         "kind": "butterworth_zero_phase", "order": settings.order, "cutoff_hz": cutoff.hz, "why": cutoff.reason,
     }  # fmt: skip
     block = BlockAverage.lasting(settings.block_s, rate_hz)
-    metadata = {**recording.metadata, "filter": how, "regression_filter": block.as_metadata(rate_hz)}
+    metadata = {
+        **recording.metadata,
+        "filter": how,
+        "regression_filter": block.as_metadata(rate_hz),
+    }
     return FilteredRecording(recording, metadata, cutoff, stretches)
 
 
 def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
     if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-        where = "time.unit in the map, and import again" if imported else "sample_rate_hz in the rig file"
+        where = (
+            "time.unit in the map, and import again"
+            if imported
+            else "sample_rate_hz in the rig file"
+        )
         raise InputError(
             f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g} MHz, for a "
             f"joint's motion to be seen; correct {where}, or record it anew"
@@ -119,7 +139,9 @@ def motion_table(recording: Table, settings: FilterSettings) -> Table:
     return Table(pa.concat_tables(motion.pieces()).to_pandas(), motion.metadata, recording.path)
 
 
-def _cutoff(recording: Rows, stretches: Stretches, rate_hz: float, settings: FilterSettings) -> Cutoff:
+def _cutoff(
+    recording: Rows, stretches: Stretches, rate_hz: float, settings: FilterSettings
+) -> Cutoff:
     if settings.cutoff_hz == "auto":
         samples = int(stretches.samples[stretches.longest])
         if samples < 2 * shortest(rate_hz, rate_hz / 8):
@@ -128,7 +150,8 @@ def _cutoff(recording: Rows, stretches: Stretches, rate_hz: float, settings: Fil
                 "record longer runs, or set filter.cutoff_hz"
             )
         if not stretches.uniform[stretches.longest]:
-            # A uniform grid has more or fewer places than there are samples; never less than half as many.
+            # A uniform grid has more or fewer places than there are samples; never less than half
+            # as many.
             samples //= 2
         names = tuple(joint.name for joint in recording.joints)
         return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
@@ -140,7 +163,9 @@ def _cutoff(recording: Rows, stretches: Stretches, rate_hz: float, settings: Fil
     return Cutoff(settings.cutoff_hz, "set by hand")
 
 
-def _refuse_stretches_that_are_all_edge(stretches: Stretches, rate_hz: float, cutoff: Cutoff) -> None:
+def _refuse_stretches_that_are_all_edge(
+    stretches: Stretches, rate_hz: float, cutoff: Cutoff
+) -> None:
     edge = _edge(rate_hz, cutoff.hz)
     longest = int(stretches.samples[stretches.longest])
     if longest <= 2 * edge or longest < shortest(rate_hz, cutoff.hz):
@@ -176,15 +201,26 @@ def _on_grid(recording: Rows, stretches: Stretches, rate_hz: float) -> Iterator[
 def _rows_of(s: int, stretches: Stretches, window: Window) -> slice:
     """Return where in a window's rows a stretch is."""
     rows = window.rows.num_rows
-    return slice(*(int(np.clip(row - window.first, 0, rows)) for row in (stretches.start[s], stretches.stop[s])))
+    return slice(
+        *(
+            int(np.clip(row - window.first, 0, rows))
+            for row in (stretches.start[s], stretches.stop[s])
+        )
+    )
 
 
 def _time_and_angle(rows: pa.Table, joints: Sequence[Joint]) -> tuple[NDArray, NDArray]:
-    return rows["time_s"].to_numpy(), np.column_stack([rows[joint.column("angle")].to_numpy() for joint in joints])
+    return rows["time_s"].to_numpy(), np.column_stack(
+        [rows[joint.column("angle")].to_numpy() for joint in joints]
+    )
 
 
 def _motion_columns(
-    rows: pa.Table, joints: Sequence[Joint], states: Sequence[NDArray], segment: NDArray, valid: NDArray
+    rows: pa.Table,
+    joints: Sequence[Joint],
+    states: Sequence[NDArray],
+    segment: NDArray,
+    valid: NDArray,
 ) -> pa.Table:
     """Put what was computed beside what was recorded, in the order of ``motion/1``."""
     columns: dict[str, Any] = {"time_s": rows["time_s"]}
@@ -208,20 +244,28 @@ class _Grid:
         self._uniform = stretches.uniform[number]
         self._rate_hz = rate_hz
 
-    def filtered(self, time: NDArray, angle: NDArray, cutoff_hz: float, order: int) -> list[NDArray]:
+    def filtered(
+        self, time: NDArray, angle: NDArray, cutoff_hz: float, order: int
+    ) -> list[NDArray]:
         """Return angle, velocity and acceleration at the samples' own times (n,)."""
         grid, uniform = self._sampled(time, angle)
         smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
-        states = [smooth, derivative(smooth, self._rate_hz, 1), derivative(smooth, self._rate_hz, 2)]
+        states = [
+            smooth,
+            derivative(smooth, self._rate_hz, 1),
+            derivative(smooth, self._rate_hz, 2),
+        ]
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
-        """Return the angles at those uniform times that lie in ``begin_s`` to ``end_s``, that not included."""
+        """Return the angles at those uniform times that lie in ``begin_s`` to ``end_s``, that not
+        included."""
         grid, uniform = self._sampled(time, angle)
         return uniform[(grid >= begin_s) & (grid < end_s)]
 
     def _sampled(self, time: NDArray, angle: NDArray) -> tuple[NDArray, NDArray]:
-        """Return uniform times and the angles there; the samples themselves where they are uniform already."""
+        """Return uniform times and the angles there; the samples themselves where they are uniform
+        already."""
         if self._uniform:
             return time, angle
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))

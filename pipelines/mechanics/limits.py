@@ -60,7 +60,13 @@ def margins(trajectory: Trajectory, bounds: JointBounds) -> list[Margin]:
     """Return each joint's margin in angle, velocity and acceleration, between samples too."""
     allowed, reached = bounds_array(bounds), trajectory.extrema()
     return [
-        Margin(joint.name, quantity, joint.unit(quantity), *allowed[i, j].tolist(), *reached[i, j].tolist())
+        Margin(
+            joint.name,
+            quantity,
+            joint.unit(quantity),
+            *allowed[i, j].tolist(),
+            *reached[i, j].tolist(),
+        )
         for j, joint in enumerate(trajectory.joints)
         for i, quantity in enumerate(QUANTITIES)
     ]

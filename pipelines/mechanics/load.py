@@ -1,4 +1,5 @@
-"""What a rigid body asks of its joints along a motion, and how that changes where it moves a little otherwise."""
+"""What a rigid body asks of its joints along a motion, and how that changes where it moves a little
+otherwise."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,7 +30,8 @@ class CoordinateLoad(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadColumns:
-    """A body's load along a motion (n, J), per unit of each of its p inertial parameters; each is computed once."""
+    """A body's load along a motion (n, J), per unit of each of its p inertial parameters; each is
+    computed once."""
 
     mechanism: Mechanism
     q: NDArray
@@ -44,11 +46,13 @@ class LoadColumns:
 
     def torque_of(self, X: NDArray) -> NDArray:
         """Return the torque of a body with inertial parameters ``X`` (p,), (n, J)."""
-        flat = self.torque.reshape(-1, len(X))  # numpy multiplies a matrix twenty times as fast as a stack of them
+        # Numpy multiplies a matrix twenty times as fast as a stack of them.
+        flat = self.torque.reshape(-1, len(X))
         return (flat @ X).reshape(self.q.shape)
 
     def projected(self, direction: NDArray) -> NDArray:
-        """Return torque and slopes, (4, n, p), of one coordinate that turns the joints by ``direction`` (n, J)."""
+        """Return torque and slopes, (4, n, p), of one coordinate that turns the joints by
+        ``direction`` (n, J)."""
         key = direction.tobytes()
         if key not in self._projected:
             step = STEP * direction
@@ -58,7 +62,9 @@ class LoadColumns:
                 (self._torque(self.q, self.dq + step, self.ddq) - self.torque) / STEP,
                 (self._torque(self.q + step, self.dq, self.ddq) - self.torque) / STEP,
             )
-            self._projected[key] = np.array([np.einsum("nj,njp->np", direction, torque) for torque in torques])
+            self._projected[key] = np.array(
+                [np.einsum("nj,njp->np", direction, torque) for torque in torques]
+            )
         return self._projected[key]
 
     @cached_property

@@ -26,7 +26,9 @@ def _collected() -> tuple[Mechanism, ...]:
     """
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
-    found = dict.fromkeys(made for module in modules for made in vars(module).values() if isinstance(made, Mechanism))
+    found = dict.fromkeys(
+        made for module in modules for made in vars(module).values() if isinstance(made, Mechanism)
+    )
     for one, other in combinations(found, 2):
         gravity = (one.has_gravity, other.has_gravity)
         if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
@@ -76,7 +78,8 @@ class Machine:
         return self.scales[self.names.index(name)] if self.scales else Scale()
 
     def lasting(self, seconds: float) -> float:
-        """Return how long this machine needs for what an exoskeleton does in so many seconds, no longer than that, s.
+        """Return how long this machine needs for what an exoskeleton does in so many seconds, no
+        longer than that, s.
 
         A pendulum that swings up goes five times as fast: a second of it tells as much.
         """
@@ -84,17 +87,20 @@ class Machine:
         return seconds * min(1.0, slowest)
 
     def told(self, geometry: Geometry) -> dict[str, float]:
-        """Return what a file says of the machine's geometry: no length where none is in its equations."""
+        """Return what a file says of the machine's geometry: no length where none is in its
+        equations."""
         said = geometry.metadata()
         return said if self.mechanism.has_length else {"gravity_m_s2": said["gravity_m_s2"]}
 
     def place(self, name: str) -> str:
-        """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""
+        """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is
+        called."""
         return self.mechanism.places[self.names.index(name)]
 
     @property
     def is_exoskeleton(self) -> bool:
-        """Whether it is the leg that ranges and thresholds were found on: its joints say so by their names."""
+        """Whether it is the leg that ranges and thresholds were found on: its joints say so by
+        their names."""
         return self.joints == HIP_AND_KNEE
 
 

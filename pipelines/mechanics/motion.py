@@ -21,10 +21,12 @@ from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
-"""Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does at 1 Hz."""
+"""Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does
+at 1 Hz."""
 
 MOST_UNREAD_S = 0.1
-"""Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth of its way there."""
+"""Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth
+of its way there."""
 
 SHORTEST_PERIOD = 4
 """Samples in a period, at least."""
@@ -75,11 +77,13 @@ class Motion:
     limb_load: NDArray | None = None
     """(n, J) N·m of the machine on the wearer's limb, where a fit has estimated it."""
     body: NDArray | None = None
-    """(p,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated them."""
+    """(p,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated
+    them."""
     limb_body: NDArray | None = None
     """(p,) the same of the wearer's limb alone."""
     scales: tuple[Scale, ...] = ()
-    """Of each joint beside an exoskeleton's (``mechanics/scale.py``); empty for an exoskeleton's."""
+    """Of each joint beside an exoskeleton's (``mechanics/scale.py``); empty for an
+    exoskeleton's."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -98,7 +102,8 @@ class Motion:
         return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
 
     def pieces(self, margin: int) -> Iterator["Piece"]:
-        """Yield the run in pieces of which each knows ``margin`` samples to both sides: here one, for all is there."""
+        """Yield the run in pieces of which each knows ``margin`` samples to both sides: here one,
+        for all is there."""
         yield Piece(self, slice(0, len(self)), 0)
 
     def whole(self) -> "Motion":
@@ -117,7 +122,8 @@ class Motion:
 
     @cached_property
     def felt(self) -> NDArray | None:
-        """Cuff forces at every sample, (n, 4, 3) N, for sensors are often read less often than drives.
+        """Cuff forces at every sample, (n, 4, 3) N, for sensors are often read less often than
+        drives.
 
         NaN where readings are too far apart to know; None where there are none.
         """
@@ -131,11 +137,14 @@ class Motion:
 
     @cached_property
     def motor_temperature(self) -> NDArray:
-        """Temperature of each joint's motor at every sample, (n, J) °C, in straight lines between readings.
+        """Temperature of each joint's motor at every sample, (n, J) °C, in straight lines between
+        readings.
 
         NaN at a joint whose motor's was never read.
         """
-        read = np.full(self.q.shape, np.nan) if self.temperature is None else self.temperature.copy()
+        read = (
+            np.full(self.q.shape, np.nan) if self.temperature is None else self.temperature.copy()
+        )
         for column in read.T:
             known = np.isfinite(column)
             if known.any() and not known.all():
@@ -144,11 +153,13 @@ class Motion:
 
     @property
     def on_segments(self) -> NDArray | None:
-        """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there are none."""
+        """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there
+        are none."""
         return None if self.felt is None else self.felt.reshape(-1, 2, 2, 3).sum(axis=2)
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
-        """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not known.
+        """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not
+        known.
 
         None where it was not measured.
         """
@@ -161,15 +172,18 @@ class Motion:
     def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:
         """Torque passed on to the links, its first and its second derivative, (n, J) each.
 
-        The estimate where there is one; else the measured torque, which also holds the drive's own friction.
+        The estimate where there is one; else the measured torque, which also holds the drive's own
+        friction.
         """
         return self._smoothed(self.torque if self.load is None else self.load)
 
     @cached_property
     def on_limb(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Torque of the machine on the wearer's limb, its first and its second derivative, (n, J) each.
+        """Torque of the machine on the wearer's limb, its first and its second derivative, (n, J)
+        each.
 
-        The estimate where there is one; else from the cuff forces; else what is passed on to the links.
+        The estimate where there is one; else from the cuff forces; else what is passed on to the
+        links.
         """
         if self.limb_load is not None:
             return self._smoothed(self.limb_load)
@@ -180,7 +194,8 @@ class Motion:
 
     @cached_property
     def link_swing(self) -> Load | None:
-        """What hangs behind the drive trains as a load that can swing; None where no fit has estimated it."""
+        """What hangs behind the drive trains as a load that can swing; None where no fit has
+        estimated it."""
         return None if self.body is None else Load(self.load_columns, self.body)
 
     @cached_property
@@ -190,7 +205,8 @@ class Motion:
 
     @cached_property
     def columns_known(self) -> dict[Hashable, NDArray]:
-        """Torques (n, J, k) along this motion that were computed, by what makes them; none depends on the loads."""
+        """Torques (n, J, k) along this motion that were computed, by what makes them; none depends
+        on the loads."""
         return {}
 
     @cached_property
@@ -215,7 +231,8 @@ class Motion:
         return smooth, rate, curvature
 
     def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
-        """Return the run with the loads of rigid bodies, (p,) each: all behind the drive trains, and the limb alone.
+        """Return the run with the loads of rigid bodies, (p,) each: all behind the drive trains,
+        and the limb alone.
 
         The measured torques would not do: their noise would stand on both sides of a regression.
         """
@@ -226,7 +243,8 @@ class Motion:
         return made
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
-        """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""
+        """Return the same run with other kinematics, (n, J) each, as a corrected measurement
+        has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
         kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
@@ -249,13 +267,16 @@ def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Ge
 
     Without one, gravity acts on revolute joints, and a prismatic joint is level.
     """
-    known = {k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__}
+    known = {
+        k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__
+    }
     slides = all(joint.kind == "prismatic" for joint in joints_of(metadata))
     return replace(default or (Geometry(gravity_m_s2=0.0) if slides else Geometry()), **known)
 
 
 def _period(table: Table) -> float | None:
-    """Return the period of a recording's motion, s; None where it is unknown or far longer than the recording.
+    """Return the period of a recording's motion, s; None where it is unknown or far longer than the
+    recording.
 
     Raises
     ------
@@ -276,7 +297,8 @@ def _period(table: Table) -> float | None:
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:
     """Take a ``motion/1`` table apart into arrays.
 
-    The recording's own geometry wins over ``default_geometry`` (exoid.toml's), which wins over the paper's.
+    The recording's own geometry wins over ``default_geometry`` (exoid.toml's), which wins over the
+    paper's.
     """
     frame, metadata = table.frame, table.metadata
     joints = joints_of(metadata)
@@ -285,7 +307,11 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         return np.array(frame[[joint.column(quantity) for joint in joints]], dtype=float, order="C")
 
     def if_there(quantity: str) -> NDArray | None:
-        return per_joint(quantity) if {joint.column(quantity) for joint in joints} <= set(frame.columns) else None
+        return (
+            per_joint(quantity)
+            if {joint.column(quantity) for joint in joints} <= set(frame.columns)
+            else None
+        )
 
     force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
     has_forces = set(force_columns) <= set(frame.columns)

@@ -1,4 +1,5 @@
-"""Runs that are fitted together are of one machine: the same joints, the same lengths, the same gravity."""
+"""Runs that are fitted together are of one machine: the same joints, the same lengths, the same
+gravity."""
 
 from collections.abc import Sequence
 

@@ -23,7 +23,8 @@ from pipelines.validation.suggestion import suggestion
 
 
 def geometry_from(experiment: Experiment) -> Geometry | None:
-    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives none.
+    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives
+    none.
 
     Raises
     ------
@@ -45,7 +46,9 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
             f"mechanism.name: found {settings.name!r}, expected a mechanism's name, or a file for a new one "
             f"(docs/mechanisms.md); {suggestion(settings.name, names)}"
         )
-    its = dict.fromkeys(mechanism.kinds for mechanism in MECHANISMS if mechanism.name == settings.name)
+    its = dict.fromkeys(
+        mechanism.kinds for mechanism in MECHANISMS if mechanism.name == settings.name
+    )
     if settings.kinds not in its:
         others = dict.fromkeys(mechanism.name for mechanism in mechanisms_of(settings.all_joints))
         raise SettingsError(
@@ -65,7 +68,9 @@ def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -
             )
 
 
-def read_motion(path: Path, settings: FilterSettings | None = None, default_geometry: Geometry | None = None) -> Motion:
+def read_motion(
+    path: Path, settings: FilterSettings | None = None, default_geometry: Geometry | None = None
+) -> Motion:
     """Return the motion in a ``motion/1`` or ``recording/1`` file."""
     if contract_of(path) is RECORDING:
         table = motion_table(RECORDING.read(path), settings or FilterSettings())
@@ -75,22 +80,29 @@ def read_motion(path: Path, settings: FilterSettings | None = None, default_geom
 
 
 def read_motions(
-    paths: Sequence[Path], settings: FilterSettings | None = None, default_geometry: Geometry | None = None
+    paths: Sequence[Path],
+    settings: FilterSettings | None = None,
+    default_geometry: Geometry | None = None,
 ) -> list[Motion]:
-    """Return the motions in several files; the same data twice is refused, whatever the names, and so are data
-    of one log that would both train and validate.
+    """Return the motions in several files; the same data twice is refused, whatever the names, and
+    so are data of one log that would both train and validate.
 
     Files of one name in several folders are told apart by their paths.
     """
     _refuse_twins(paths)
     motions = [read_motion(path, settings, default_geometry) for path in paths]
-    named = [replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)]
+    named = [
+        replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)
+    ]
     refuse_seen(named)
     return on_one_scale(named)
 
 
-def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry | None) -> list[StoredRun]:
-    """Return the runs in several files as ``read_motions`` does, but read, and filtered, piece by piece."""
+def read_runs(
+    paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry | None
+) -> list[StoredRun]:
+    """Return the runs in several files as ``read_motions`` does, but read, and filtered, piece by
+    piece."""
     _refuse_twins(paths)
     runs = [
         StoredRun(_motion_rows(path, settings), default_geometry, name)
@@ -101,14 +113,19 @@ def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry:
 
 
 def _motion_rows(path: Path, settings: FilterSettings) -> Rows:
-    return filtered(RECORDING.scan(path), settings) if contract_of(path) is RECORDING else MOTION.scan(path)
+    return (
+        filtered(RECORDING.scan(path), settings)
+        if contract_of(path) is RECORDING
+        else MOTION.scan(path)
+    )
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():
-            contract_of(path)  # empty or damaged files are alike, too, and that is not what is wrong with them
+            # Empty or damaged files are alike, too, and that is not what is wrong with them.
+            contract_of(path)
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")

@@ -122,7 +122,13 @@ class StoredRun:
         """What a fit needs: temperatures too, where they were read."""
         quantities = [joint.column(quantity) for quantity in FITTED for joint in self.rows.joints]
         read = [joint.column("temperature") for joint in self.rows.joints]
-        return ["time_s", *quantities, "segment", "valid", *(c for c in read if c in self._first.column_names)]
+        return [
+            "time_s",
+            *quantities,
+            "segment",
+            "valid",
+            *(c for c in read if c in self._first.column_names),
+        ]
 
     def _motion(self, rows: Any) -> Motion:
         table = Table(rows.to_pandas(), self.rows.metadata, Path(self.file))

@@ -32,7 +32,8 @@ class SampledTrajectory:
         return np.inf if self.period_s else float(self.time[-1] - self.time[0])
 
     def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
-        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J) each."""
+        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J)
+        each."""
         time = np.atleast_1d(np.asarray(time, dtype=float))
         if self.period_s:
             time = np.mod(time, self.period_s)
@@ -41,7 +42,12 @@ class SampledTrajectory:
 
     def extrema(self) -> NDArray:
         """Lowest and highest angle, velocity and acceleration of each joint, (3, J, 2)."""
-        return np.array([[_range(spline, joint) for joint in range(len(self.joints))] for spline in self._splines])
+        return np.array(
+            [
+                [_range(spline, joint) for joint in range(len(self.joints))]
+                for spline in self._splines
+            ]
+        )
 
     @cached_property
     def _splines(self) -> tuple[PPoly, PPoly, PPoly]:
@@ -49,7 +55,11 @@ class SampledTrajectory:
         if self.period_s and time[-1] < self.period_s - 1e-9:
             time = np.append(time, self.period_s)
             q, dq, ddq = (np.vstack([x, x[:1]]) for x in (q, dq, ddq))
-        return CubicHermiteSpline(time, q, dq), CubicHermiteSpline(time, dq, ddq), CubicSpline(time, ddq)
+        return (
+            CubicHermiteSpline(time, q, dq),
+            CubicHermiteSpline(time, dq, ddq),
+            CubicSpline(time, ddq),
+        )
 
 
 def _range(spline: PPoly, joint: int) -> tuple[float, float]:

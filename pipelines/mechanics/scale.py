@@ -1,8 +1,9 @@
 """How large a machine is beside the exoskeleton's leg on which ranges and thresholds were found.
 
-"Slow" or "a strong spring" mean something else at a servo of half a newton metre and at a ball screw that pushes a
-hundred kilograms. So what is usual of an exoskeleton is multiplied by how much more torque, speed and travel the
-machine's own runs have; the leg itself, whose joints are called hip and knee, is left as it is.
+"Slow" or "a strong spring" mean something else at a servo of half a newton metre and at a ball
+screw that pushes a hundred kilograms. So what is usual of an exoskeleton is multiplied by how much
+more torque, speed and travel the machine's own runs have; the leg itself, whose joints are called
+hip and knee, is left as it is.
 """
 
 from collections.abc import Sequence
@@ -45,19 +46,24 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
     for run in runs:
         for piece in run.pieces(0):
             good = piece.motion.valid & np.isfinite(piece.motion.torque).all(axis=1)
-            q, speed, torque = (x[good] for x in (piece.motion.q, piece.motion.dq, piece.motion.torque))
+            q, speed, torque = (
+                x[good] for x in (piece.motion.q, piece.motion.dq, piece.motion.torque)
+            )
             squares += [np.sum(torque**2, axis=0), np.sum(speed**2, axis=0)]
             count += len(q)
             low = np.minimum(low, q.min(axis=0, initial=np.inf))
             high = np.maximum(high, q.max(axis=0, initial=-np.inf))
     torque, speed = np.sqrt(squares / max(count, 1))
-    # A joint that stands still, or a channel that is dead, has no scale; what refuses such runs says so.
+    # A joint that stands still, or a channel that is dead, has no scale; what refuses such runs
+    # says so.
     return tuple(
         Scale(
             torque=float(torque[j]) / TORQUE_NM if torque[j] > 0 else 1.0,
             speed=float(speed[j]) / SPEED_RAD_S if speed[j] > 0 else 1.0,
             # Angles are what they are whatever the machine: a sine of them is in its equations.
-            travel=float(high[j] - low[j]) / TRAVEL_RAD if joint.kind == "prismatic" and high[j] > low[j] else 1.0,
+            travel=float(high[j] - low[j]) / TRAVEL_RAD
+            if joint.kind == "prismatic" and high[j] > low[j]
+            else 1.0,
         )
         for j, joint in enumerate(runs[0].machine.joints)
     )

@@ -1,4 +1,5 @@
-"""Torques that say nothing: one number in every row, as of a drive that was off or a channel that is another's."""
+"""Torques that say nothing: one number in every row, as of a drive that was off or a channel that
+is another's."""
 
 from collections.abc import Sequence
 
@@ -9,7 +10,8 @@ from pipelines.mechanics.run import Run
 
 
 def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
-    """Return what is wrong with runs in which the torque (N·m or N) of a joint is one ``value`` all along."""
+    """Return what is wrong with runs in which the torque (N·m or N) of a joint is one ``value`` all
+    along."""
     return InputError(
         f"{', '.join(run.file for run in runs)}: the {'torque' if joint.kind == 'revolute' else 'force'} of "
         f"{the(joint.name)} is {value:.4g} {joint.unit('torque')} in every row, expected what a drive exerts; check "

@@ -19,7 +19,8 @@ def edge(rate_hz: float, cutoff_hz: float) -> int:
 
 
 def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
-    """Tell which samples a filter lacks one side of, or spoils by what is bad beside them, (n,) bool.
+    """Tell which samples a filter lacks one side of, or spoils by what is bad beside them, (n,)
+    bool.
 
     All of a stretch that is too short for it.
     """

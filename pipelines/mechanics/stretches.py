@@ -1,4 +1,5 @@
-"""The unbroken stretches of a recording: where its gaps are, and whether its samples keep to a uniform grid."""
+"""The unbroken stretches of a recording: where its gaps are, and whether its samples keep to a
+uniform grid."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ from pipelines.errors import InputError
 GAP = 1.5
 """Sample periods between two samples that make a gap, unless it is bridged."""
 BRIDGED_S = 0.022
-"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here and there, or a
-clock that stamps one late, would otherwise leave no stretch long enough to be filtered."""
+"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here
+and there, or a clock that stamps one late, would otherwise leave no stretch long enough to be
+filtered."""
 JITTER = 0.02
 """Share of a sample period a sample may stray from the uniform grid before it is interpolated."""
 
@@ -28,7 +30,8 @@ class Stretches:
     origin_s: NDArray
     """Time of the first sample."""
     uniform: NDArray
-    """True where every sample is at its place on a grid of the nominal rate, which begins with the first one."""
+    """True where every sample is at its place on a grid of the nominal rate, which begins with the
+    first one."""
 
     def __len__(self) -> int:
         """Return the number of stretches."""
@@ -45,12 +48,17 @@ class Stretches:
         return int(np.argmax(self.samples))
 
     def overlapping(self, first: int, last: int) -> range:
-        """Return the numbers of those that have a row in ``first`` to ``last``, ``last`` not included."""
-        return range(int(np.searchsorted(self.stop, first, "right")), int(np.searchsorted(self.start, last, "left")))
+        """Return the numbers of those that have a row in ``first`` to ``last``, ``last`` not
+        included."""
+        return range(
+            int(np.searchsorted(self.stop, first, "right")),
+            int(np.searchsorted(self.start, last, "left")),
+        )
 
 
 def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
-    """Find the stretches of a recording whose times, (n,) s and strictly increasing, come piece by piece.
+    """Find the stretches of a recording whose times, (n,) s and strictly increasing, come piece by
+    piece.
 
     Raises
     ------
@@ -75,7 +83,13 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
         starts.extend(start_of[1:])
         origins.extend(origin_of[1:])
         strayed.extend(away[:-1])
-        row, start, origin, stray, before = row + len(time), start_of[-1], origin_of[-1], away[-1], time[-1]
+        row, start, origin, stray, before = (
+            row + len(time),
+            start_of[-1],
+            origin_of[-1],
+            away[-1],
+            time[-1],
+        )
     _refuse_another_rate(steps, rate_hz)
     return Stretches(
         start=np.array(starts, dtype=np.int64),

@@ -1,4 +1,5 @@
-"""Excitations from files: Fourier coefficients as TOML or in a table's metadata, or bare samples."""
+"""Excitations from files: Fourier coefficients as TOML or in a table's metadata, or bare
+samples."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -26,11 +27,14 @@ Row = tuple[float, ...]
 
 
 class CoefficientFile(Settings):
-    """An excitation as TOML: rows of ``a`` and ``b`` are hip and knee, columns the harmonics from the first."""
+    """An excitation as TOML: rows of ``a`` and ``b`` are hip and knee, columns the harmonics from
+    the first."""
 
     unit: Literal["deg", "rad"] = Field(description="Unit of a and b.")
     omega_rad_s: float = Field(gt=0.0, description="Angular frequency of the first harmonic.")
-    theta0_rad: tuple[float, float] = Field(description="Mean angle of hip and knee, in radians whatever the unit.")
+    theta0_rad: tuple[float, float] = Field(
+        description="Mean angle of hip and knee, in radians whatever the unit."
+    )
     a: tuple[Row, Row] = Field(description="Sine coefficients.")
     b: tuple[Row, Row] = Field(description="Cosine coefficients.")
 
@@ -39,9 +43,13 @@ class CoefficientFile(Settings):
         lengths = {len(row) for row in (*self.a, *self.b)}
         if len(lengths) > 1 or 0 in lengths:
             counts = ", ".join(
-                f"{name}[{joint}] {len(row)}" for name in "ab" for joint, row in enumerate(getattr(self, name))
+                f"{name}[{joint}] {len(row)}"
+                for name in "ab"
+                for joint, row in enumerate(getattr(self, name))
             )
-            raise ValueError(f"found rows of different length or empty ({counts}), expected as many harmonics in each")
+            raise ValueError(
+                f"found rows of different length or empty ({counts}), expected as many harmonics in each"
+            )
         return self
 
     @model_validator(mode="after")
@@ -81,7 +89,8 @@ def _from_toml(path: Path) -> FourierTrajectory:
 
 
 def trajectory_from_table(table: Table) -> Trajectory:
-    """Return the excitation in a ``trajectory/1`` table: its coefficients' where it has them, else its samples'.
+    """Return the excitation in a ``trajectory/1`` table: its coefficients' where it has them, else
+    its samples'.
 
     Bare samples repeat where the metadata name ``omega_rad_s``, and run once where they do not.
     """
@@ -119,8 +128,11 @@ def _sampled(table: Table) -> SampledTrajectory:
 
 
 def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
-    """Refuse a table whose coefficients and samples are different motions: nobody knows which one is meant."""
-    if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (len(table.joints),):
+    """Refuse a table whose coefficients and samples are different motions: nobody knows which one
+    is meant."""
+    if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (
+        len(table.joints),
+    ):
         raise ContractError(
             f"{table.path}: metadata a, b, theta0_rad: found {trajectory.a.shape[0]} rows and "
             f"{trajectory.theta0.size} mean angles, expected one for each of the {len(table.joints)} joints"

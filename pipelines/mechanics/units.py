@@ -1,6 +1,8 @@
-"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a prismatic joint.
+"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a
+prismatic joint.
 
-And how a quantity of a unit grows with the machine: of twice the torque, a spring is twice as stiff.
+And how a quantity of a unit grows with the machine: of twice the torque, a spring is twice as
+stiff.
 """
 
 from typing import NamedTuple
@@ -53,9 +55,12 @@ class Scale(NamedTuple):
         if unit not in UNITS:
             return 1.0
         power = UNITS[unit]
-        return float(self.torque**power.torque * self.travel**power.travel * self.speed**power.speed)
+        return float(
+            self.torque**power.torque * self.travel**power.travel * self.speed**power.speed
+        )
 
 
 def unit_at(kind: Kind, unit: str) -> str:
-    """Return the unit that a quantity in ``unit`` at a revolute joint has at a joint of this kind."""
+    """Return the unit that a quantity in ``unit`` at a revolute joint has at a joint of this
+    kind."""
     return UNITS[unit].prismatic if kind == "prismatic" and unit in UNITS else unit

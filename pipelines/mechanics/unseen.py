@@ -7,11 +7,13 @@ from pipelines.errors import InputError
 from pipelines.mechanics.run import Run
 
 IN_ORDER = 20
-"""Rows that may seem to be in two spans that touch: an import puts in order as many that arrived out of order."""
+"""Rows that may seem to be in two spans that touch: an import puts in order as many that arrived
+out of order."""
 
 
 def refuse_seen(runs: Sequence[Run]) -> None:
-    """Refuse runs of which one trains and another validates, and that were imported from the same rows of a log.
+    """Refuse runs of which one trains and another validates, and that were imported from the same
+    rows of a log.
 
     Raises
     ------

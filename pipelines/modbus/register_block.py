@@ -1,4 +1,5 @@
-"""Modbus registers and what they mean: one block of a device's register map, read and written as SI values."""
+"""Modbus registers and what they mean: one block of a device's register map, read and written as SI
+values."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -26,7 +27,9 @@ class Block:
         self._places = [place for r in registers.values() for place in self._bytes(r)]
         self._pick = itemgetter(*self._places)
         self._words_format = struct.Struct(f">{self.count}H")
-        self._values_format = struct.Struct(">" + "".join(_FORMAT[r.type] for r in registers.values()))
+        self._values_format = struct.Struct(
+            ">" + "".join(_FORMAT[r.type] for r in registers.values())
+        )
         self._scales = [r.si for r in registers.values()]
         self._ranges = [r.counts for r in registers.values()]
 
@@ -44,9 +47,12 @@ class Block:
         }
 
     def encode(self, values: Mapping[str, float]) -> list[int]:
-        """Return ``count`` words that hold SI values; what does not fit saturates, as it does in a device."""
+        """Return ``count`` words that hold SI values; what does not fit saturates, as it does in a
+        device."""
         raw = []
-        for name, (scale, offset), limits in zip(self.names, self._scales, self._ranges, strict=True):
+        for name, (scale, offset), limits in zip(
+            self.names, self._scales, self._ranges, strict=True
+        ):
             value = (values[name] - offset) / scale
             raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
         packed = bytearray(2 * self.count)
@@ -55,7 +61,8 @@ class Block:
         return list(self._words_format.unpack(packed))
 
     def span(self, name: str) -> float:
-        """Return after which difference an unsigned counter begins anew, in SI units; 0 for one that does not."""
+        """Return after which difference an unsigned counter begins anew, in SI units; 0 for one
+        that does not."""
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0

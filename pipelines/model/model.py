@@ -198,8 +198,9 @@ class Model:
 def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     """Return an effect's columns along a motion, (n, J, k).
 
-    Friction, and what else depends on the motion alone, is the same in each of the thousand fits of one motion, so it
-    is computed once. Rigid bodies mostly move otherwise than the motors, in each fit anew.
+    Friction, and what else depends on the motion alone, is the same in each of the thousand fits of
+    one motion, so it is computed once. Rigid bodies mostly move otherwise than the motors, in each
+    fit anew.
     """
     if effect.shape or effect.reads_load or effect.inertial:
         return effect.columns(motion, shape)
@@ -232,12 +233,20 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     """
     effect = effect.told_by(values)
     known = {parameter.name: parameter for parameter in effect.parameters}
-    missing = [name for name, parameter in known.items() if name not in values and parameter.default is None]
+    missing = [
+        name
+        for name, parameter in known.items()
+        if name not in values and parameter.default is None
+    ]
     if missing or not set(values) <= set(known):
-        meant = [near for name in values if name not in known and (near := closest(name, list(known)))]
+        meant = [
+            near for name in values if name not in known and (near := closest(name, list(known)))
+        ]
         raise InputError(
             f"{effect.label} has values {', '.join(values) or 'none'}, expected {', '.join(known)}; "
             + (f"did you mean {', '.join(meant)}?" if meant else "correct them")
         )
-    physical = np.array([values.get(name, parameter.default) for name, parameter in known.items()], dtype=float)
+    physical = np.array(
+        [values.get(name, parameter.default) for name, parameter in known.items()], dtype=float
+    )
     return Term(effect, effect.values_from(physical))

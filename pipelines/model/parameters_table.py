@@ -25,7 +25,9 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     if not (is_body & (frame["run"] == run)).any():
         known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
-    terms = [term for term, _ in terms_beside_bodies(frame, machine) if term.effect.run in (None, run)]
+    terms = [
+        term for term, _ in terms_beside_bodies(frame, machine) if term.effect.run in (None, run)
+    ]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
         # Machine and limb move apart: each needs its own.
@@ -38,7 +40,8 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
 
 
 def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
-    """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the rows that tell it.
+    """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the
+    rows that tell it.
 
     Raises
     ------
@@ -79,7 +82,8 @@ def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
 
 
 def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
-    """Say why no real machine has the rigid bodies of a ``parameters/1`` table; empty when one may."""
+    """Say why no real machine has the rigid bodies of a ``parameters/1`` table; empty when one
+    may."""
     bodies = parameters[parameters["effect"] == RigidBody.name]
     return [
         f"{run}: {reason}"
@@ -89,15 +93,23 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
 
 
 def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
-    """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence each.
+    """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence
+    each.
 
-    Empty where gravity does not act: nothing is above then. Angles count from hanging straight down. A link may be
-    overbalanced, or stand; where none is, the zero or a sign is wrong, or what is taken for gravity is a spring.
+    Empty where gravity does not act: nothing is above then. Angles count from hanging straight
+    down. A link may be overbalanced, or stand; where none is, the zero or a sign is wrong, or what
+    is taken for gravity is a spring.
     """
     if not machine.mechanism.has_gravity:
         return []
-    moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == FIRST_MOMENT}
-    of_bodies = parameters[(parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)]
+    moments = {
+        parameter.name
+        for parameter in machine.mechanism.parameters
+        if parameter.unit == FIRST_MOMENT
+    }
+    of_bodies = parameters[
+        (parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)
+    ]
     return [
         f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) has "
         "mass above the axis where the angle is zero, which is to be hanging straight down: unless the link is "

@@ -1,4 +1,5 @@
-"""Which values one run has of a cause that every run has its own of: an encoder's zero, an onset, a phase."""
+"""Which values one run has of a cause that every run has its own of: an encoder's zero, an onset, a
+phase."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,20 +10,26 @@ from pipelines.contracts.table import Table
 from pipelines.model import Model, Term, term_from
 
 
-def with_own_values(model: Model, table: Table, recording: Path | None) -> tuple[Model, tuple[str, ...]]:
+def with_own_values(
+    model: Model, table: Table, recording: Path | None
+) -> tuple[Model, tuple[str, ...]]:
     """Return a model with the values of the run that it is of, and what had to be guessed of them.
 
-    A run that the diagnosis has seen gets what ``parameters/1`` tells of it; what never came there is left out. Any
-    other, and a loop that is of no recording, keeps the values in the table's rows, the first training run's: nobody
-    knows its own, and those of one run are as good a guess as another's.
+    A run that the diagnosis has seen gets what ``parameters/1`` tells of it; what never came there
+    is left out. Any other, and a loop that is of no recording, keeps the values in the table's
+    rows, the first training run's: nobody knows its own, and those of one run are as good a guess
+    as another's.
     """
     this = recording_behind(recording) if recording else None
     found = [(own_term(term, table, this), guess(term, table, this, recording)) for term in model]
-    return Model(tuple(term for term, _ in found if term)), tuple(sentence for _, sentence in found if sentence)
+    return Model(tuple(term for term, _ in found if term)), tuple(
+        sentence for _, sentence in found if sentence
+    )
 
 
 def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
-    """Return a term as the recording of a hash has it; as it is where the table tells none, None if it never came."""
+    """Return a term as the recording of a hash has it; as it is where the table tells none, None if
+    it never came."""
     told = _told(term, table, sha256)
     if told is None:
         return term
@@ -30,7 +37,8 @@ def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
 
 
 def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) -> str | None:
-    """Say what ``own_term`` had to take in the place of a recording's own values; None where it had not."""
+    """Say what ``own_term`` had to take in the place of a recording's own values; None where it had
+    not."""
     own = [p.name for p in term.effect.parameters if p.per_run]
     if not own or _told(term, table, sha256) is not None:
         return None
@@ -51,4 +59,6 @@ def _told(term: Term, table: Table, sha256: str | None) -> dict[str, float | Non
 def _with(term: Term, values: Mapping[str, float | None]) -> Term:
     """Return a term with other values of some parameters."""
     names = [p.name for p in term.effect.parameters]
-    return term_from(term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | dict(values))
+    return term_from(
+        term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | dict(values)
+    )

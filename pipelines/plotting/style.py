@@ -16,7 +16,8 @@ from pipelines.contracts.atomic import whole_file
 GREY, ORANGE, BLUE = "#7a869a", "#c2410c", "#1d4ed8"
 """What is wanted or measured; what a model gives; what is left between the two."""
 NOISE, WANDERS, CAUSES = "#d5dae1", "#93b4f5", (ORANGE, "#f59e0b", "#7c2d12")
-"""Of an error budget: the noise floor, what does not repeat, and each cause; what is left else is blue."""
+"""Of an error budget: the noise floor, what does not repeat, and each cause; what is left else is
+blue."""
 
 STYLE: dict[Any, Any] = {
     "font.size": 9,
@@ -31,7 +32,8 @@ STYLE: dict[Any, Any] = {
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> None:
     """Write a figure as ``stem``.png and ``stem``.pdf, or the one of them, and close it."""
-    # Measured once for both: bbox_inches="tight" would lay out and measure every text anew for each.
+    # Measured once for both: bbox_inches="tight" would lay out and measure every text anew for
+    # each.
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
     for kind in kinds:
         with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:

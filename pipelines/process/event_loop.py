@@ -11,7 +11,8 @@ MOST_FILES = 512
 
 
 def exact_event_loop() -> asyncio.AbstractEventLoop:
-    """Return an event loop that wakes its sleepers when they are due; the usual one waits for whole milliseconds.
+    """Return an event loop that wakes its sleepers when they are due; the usual one waits for whole
+    milliseconds.
 
     On Windows, and in a process with very many open files, it is the usual one all the same.
     """

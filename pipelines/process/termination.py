@@ -10,20 +10,30 @@ ENDING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT
 
 
 def known(words: Mapping[str, str]) -> dict[signal.Signals, str]:
-    """Return those of some signals that this system has (Windows: two), and what a user calls them."""
-    return {signal.Signals[name]: word for name, word in words.items() if name in signal.Signals.__members__}
+    """Return those of some signals that this system has (Windows: two), and what a user calls
+    them."""
+    return {
+        signal.Signals[name]: word
+        for name, word in words.items()
+        if name in signal.Signals.__members__
+    }
 
 
 def not_ignored(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
-    """Return the signals that nohup or a shell's background does not have ignored: those stay so."""
+    """Return the signals that nohup or a shell's background does not have ignored: those stay
+    so."""
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 @contextmanager
-def heard(numbers: Iterable[signal.Signals], hear: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Let ``hear`` be told of signals for as long as a block lasts, and whoever was before it afterwards."""
+def heard(
+    numbers: Iterable[signal.Signals], hear: Callable[[int, FrameType | None], None]
+) -> Iterator[None]:
+    """Let ``hear`` be told of signals for as long as a block lasts, and whoever was before it
+    afterwards."""
     before = {}
-    with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
+    # Outside a process's main thread nobody can catch signals, and nobody is sent them.
+    with suppress(ValueError):
         for number in numbers:
             before[number] = signal.signal(number, hear)
     try:

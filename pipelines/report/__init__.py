@@ -1,1 +1,2 @@
-"""The report: one page that shows what the other stages found; it computes nothing of its own but running means."""
+"""The report: one page that shows what the other stages found; it computes nothing of its own but
+running means."""

@@ -34,12 +34,13 @@ class Change:
 
     @property
     def half(self) -> float | None:
-        """Half the 95 % interval of the difference of independent estimates; None where one of them has none.
+        """Half the 95 % interval of the difference of independent estimates; None where one of them
+        has none.
 
         Nor is there one of values that are each run's own: two first runs need not have the same.
 
-        Errors of independent sessions add in squares, and so do the intervals' halves: each is its standard error
-        times the critical value that its session's scatter asks for.
+        Errors of independent sessions add in squares, and so do the intervals' halves: each is its
+        standard error times the critical value that its session's scatter asks for.
         """
         own = self.first.each_run or self.second.each_run
         if own or self.first.half is None or self.second.half is None:
@@ -94,7 +95,8 @@ class Compared:
 
 
 def titles_of(first: Session, second: Session) -> tuple[str, str]:
-    """Return what the sessions are called: their folders, as far up as it takes to tell them apart."""
+    """Return what the sessions are called: their folders, as far up as it takes to tell them
+    apart."""
     paths = [session.folders[0].resolve() for session in (first, second)]
     names = [path.name for path in paths]
     for path_a, path_b in zip(*(path.parents for path in paths), strict=False):
@@ -127,7 +129,8 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
         "models": models,
         "settings": settings_apart(first, second),
         "beside_floor": _beside_floor(pair),
-        # A parameter that both models have is counted once, in the one that is told last and knows most.
+        # A parameter that both models have is counted once, in the one that is told last and knows
+        # most.
         "beyond": models[-1].beyond if models else 0,
         "judged": models[-1].judged if models else 0,
         "causes": _causes(pair),
@@ -136,7 +139,9 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
     told["headline"] = _what_changed(pair, told["beyond"], told["judged"])
     text = render("compare.html", (), (), told, (*first.artifacts, *second.artifacts))
     lines = tuple(row.words for row in told["beside_floor"])
-    return Compared(text, told["beyond"], told["judged"], told["headline"], lines, tuple(told["settings"]))
+    return Compared(
+        text, told["beyond"], told["judged"], told["headline"], lines, tuple(told["settings"])
+    )
 
 
 def _what_changed(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
@@ -158,7 +163,9 @@ def _verdict_changed(pair: tuple[Session, Session]) -> str:
     first, second = (status(session.verdict)["words"] for session in pair)
     if first != second:
         return f"the verdict went from {first} to {second}"
-    one, other = ({cause_label(cause) for cause in (session.verdict or {})["causes"]} for session in pair)
+    one, other = (
+        {cause_label(cause) for cause in (session.verdict or {})["causes"]} for session in pair
+    )
     return "" if one == other else "other causes are named"
 
 
@@ -204,7 +211,8 @@ def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
 
 
 def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
-    """Refuse sessions whose machines differ in their joints' names or kinds, or in how these are put together."""
+    """Refuse sessions whose machines differ in their joints' names or kinds, or in how these are
+    put together."""
     for what, told in (("", _joints_in_words), ("mechanism ", _mechanism)):
         one, other = (told(session) for session in pair)
         if one and other and one != other:
@@ -225,7 +233,8 @@ def _mechanism(session: Session) -> str | None:
 
 
 def refuse_different_units(models: Iterable[ModelChanges]) -> None:
-    """Refuse a parameter that has one unit here and another there: a difference would mean nothing."""
+    """Refuse a parameter that has one unit here and another there: a difference would mean
+    nothing."""
     for model in models:
         for change in model.changes:
             if change.first.unit != change.second.unit:
@@ -246,7 +255,9 @@ def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
             yield _model(title, first, one, second, other)
 
 
-def _model(title: str, first: Session, one: Artifact, second: Session, other: Artifact) -> ModelChanges:
+def _model(
+    title: str, first: Session, one: Artifact, second: Session, other: Artifact
+) -> ModelChanges:
     a, b = estimates(first.table(one)), estimates(second.table(other))
     keys = ({e.key for e in a}, {e.key for e in b})
     return ModelChanges(
@@ -264,7 +275,9 @@ def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
     """Return the parameters that a session has alone, those of the causes that it names as such."""
     named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
     return tuple(
-        f"{e.words} of {any_label_in_words(label)}, which it names" if (label := _label(e)) in named else e.words
+        f"{e.words} of {any_label_in_words(label)}, which it names"
+        if (label := _label(e)) in named
+        else e.words
         for e in alone
     )
 
@@ -275,11 +288,19 @@ def _label(estimate: Estimate) -> str:
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
     """Return every cause that either verdict names, with what each says of it."""
-    named = [{cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])} for session in pair]
+    named = [
+        {cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])}
+        for session in pair
+    ]
     return [
         {
-            "words": " / ".join(dict.fromkeys(cause_in_words(causes[label]) for causes in named if label in causes)),
-            "cells": [_cause_cell(session, causes.get(label)) for session, causes in zip(pair, named, strict=True)],
+            "words": " / ".join(
+                dict.fromkeys(cause_in_words(causes[label]) for causes in named if label in causes)
+            ),
+            "cells": [
+                _cause_cell(session, causes.get(label))
+                for session, causes in zip(pair, named, strict=True)
+            ],
         }
         for label in dict.fromkeys(label for causes in named for label in causes)
     ]
@@ -303,4 +324,7 @@ def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[BesideFloor]]
     """Return for each error, without causes and with them, a pair of bars for each joint."""
     rows = _beside_floor(pair)
     models = dict.fromkeys(row.model for row in rows)
-    return [(model[:1].upper() + model[1:], [row for row in rows if row.model == model]) for model in models]
+    return [
+        (model[:1].upper() + model[1:], [row for row in rows if row.model == model])
+        for model in models
+    ]

@@ -26,10 +26,14 @@ def figures(session: Session) -> Drawings:
     if session.verdict:
         found["error"] = partial(falls_figure, falls(session.verdict))
         found["error-budget"] = partial(budget_figure, budget(session.verdict))
-    return found | {chart.key: partial(chart_figure, chart) for chart in charts(session, values=None).all}
+    return found | {
+        chart.key: partial(chart_figure, chart) for chart in charts(session, values=None).all
+    }
 
 
-def draw(drawn: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]) -> None:
+def draw(
+    drawn: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]
+) -> None:
     """Write figures as PDF and PNG into a folder; ``report`` hears how many are done."""
     with plt.rc_context(STYLE | {"savefig.dpi": DPI}):
         for number, name in enumerate(names):

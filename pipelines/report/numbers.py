@@ -18,7 +18,8 @@ def digits(value: float | None) -> str:
 
 
 def beside(value: float, half: float | None) -> str:
-    """Return a number to two digits of half its interval; as ``digits`` does where that has no width."""
+    """Return a number to two digits of half its interval; as ``digits`` does where that has no
+    width."""
     if not half or not isfinite(half):
         return digits(value)
     return _written(value, _decimals(half, OF_HALF))

@@ -1,4 +1,5 @@
-"""One HTML file that needs nothing else: style, scripts and data are in it, and no text of a file can be a script."""
+"""One HTML file that needs nothing else: style, scripts and data are in it, and no text of a file
+can be a script."""
 
 import base64
 import hashlib
@@ -27,7 +28,8 @@ from pipelines.workflow.graph import SWEEP
 LARGEST_BYTES = 5_000_000
 """Of a page."""
 VALUES = 600_000
-"""Numbers in all charts of a page: four bytes each, four thirds of that as text, and room for the words."""
+"""Numbers in all charts of a page: four bytes each, four thirds of that as text, and room for the
+words."""
 
 ASSETS = files("pipelines.report").joinpath("assets")
 
@@ -95,7 +97,8 @@ def _environment() -> jinja2.Environment:
 
 
 def _digest(text: str) -> str:
-    """Return how a content security policy names an inline script or style: what is not named does not run."""
+    """Return how a content security policy names an inline script or style: what is not named does
+    not run."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
@@ -122,7 +125,12 @@ def _chart(chart: Chart) -> dict[str, Any]:
                 "band": panel.band,
                 "reach": panel.reach,
                 "series": [
-                    {"label": s.label, "role": s.role, "mark": s.mark, "values": coded(s.values, np.float32)}
+                    {
+                        "label": s.label,
+                        "role": s.role,
+                        "mark": s.mark,
+                        "values": coded(s.values, np.float32),
+                    }
                     for s in panel.series
                 ],
             }
@@ -142,7 +150,9 @@ def _animation(one: Animation) -> dict[str, Any]:
 
 def coded(values: NDArray, dtype: type[np.floating]) -> str:
     """Return numbers, (n,) or (n, k), as base64 of their little-endian bytes, row by row."""
-    return base64.b64encode(np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()).decode()
+    return base64.b64encode(
+        np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()
+    ).decode()
 
 
 def indented(settings: Mapping[str, Any]) -> str:

@@ -62,7 +62,13 @@ HEADLINES = {
     "unknown_cause": "Something is missing that no listed cause explains",
     "nothing_missing": "Nothing is missing that these data could show",
 }
-TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn", "absorbed": "", "rejected": ""}
+TONES = {
+    "named": "good",
+    "indistinguishable": "warn",
+    "unlisted": "warn",
+    "absorbed": "",
+    "rejected": "",
+}
 
 
 @dataclass(frozen=True)
@@ -77,11 +83,17 @@ class Charts:
     @property
     def all(self) -> tuple[Chart, ...]:
         """All of them, in the page's order."""
-        return (*((self.hero,) if self.hero else ()), *self.measured, *self.residuals, *self.control)
+        return (
+            *((self.hero,) if self.hero else ()),
+            *self.measured,
+            *self.residuals,
+            *self.control,
+        )
 
 
 def charts(session: Session, values: int | None = VALUES) -> Charts:
-    """Return the charts of a session, together of so many numbers at most; None for all there are."""
+    """Return the charts of a session, together of so many numbers at most; None for all there
+    are."""
     groups = [
         [*torque_charts(session), *angle_charts(session)],
         list(residual_charts(session)),
@@ -107,7 +119,10 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
     ``output`` is where it will be written, for the command line that repeats it.
     """
     values = VALUES
-    while len((page := _page(session, title, output, values)).encode()) > LARGEST_BYTES and values > FEWEST_VALUES:
+    while (
+        len((page := _page(session, title, output, values)).encode()) > LARGEST_BYTES
+        and values > FEWEST_VALUES
+    ):
         values //= 2
     return page
 
@@ -200,7 +215,8 @@ def headline(session: Session) -> str:
 
 
 def _with_causes(verdict: dict[str, Any]) -> str:
-    """Say which model the bars with the causes are of: of causes that are tied, the likeliest is in it."""
+    """Say which model the bars with the causes are of: of causes that are tied, the likeliest is in
+    it."""
     which = "likeliest" if any(map(ties_of, verdict["causes"])) else "named"
     return f"with the {which} cause{'s' * (len(verdict['causes']) > 1)}"
 
@@ -315,8 +331,11 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     rows = session.candidates.frame.sort_values("rank").to_dict("records")
     labels = {label for row in rows for label in row["causes"]}
     named = next((row for row in rows if row["verdict"] == "named"), None)
-    # What another set's zeros would be, one for all runs or each run's own, the table does not tell.
-    told = dict.fromkeys(("named", "indistinguishable"), told_in_words(session.verdict or {"causes": []}))
+    # What another set's zeros would be, one for all runs or each run's own, the table does not
+    # tell.
+    told = dict.fromkeys(
+        ("named", "indistinguishable"), told_in_words(session.verdict or {"causes": []})
+    )
     return [
         {
             "rank": row["rank"],
@@ -341,14 +360,16 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
 
 
 def _beyond(row: dict[Any, Any], named: dict[Any, Any] | None) -> list[str] | None:
-    """Return what a set holds beside all that is named; None where it does not hold all of that, or nothing more."""
+    """Return what a set holds beside all that is named; None where it does not hold all of that, or
+    nothing more."""
     if named is None or not set(named["causes"]) < set(row["causes"]):
         return None
     return [label for label in row["causes"] if label not in set(named["causes"])]
 
 
 def _reason(reason: str, more: Sequence[str]) -> str:
-    """Return why a set is not named, without its probability, which has a column, and whose reason it is."""
+    """Return why a set is not named, without its probability, which has a column, and whose reason
+    it is."""
     first, _, others = reason.partition("; ")
     told = others if first.startswith("its probability is ") else reason
     return told.removeprefix(f"{' and '.join(sorted(more))} ")
@@ -368,7 +389,8 @@ def _gain(session: Session, less: dict[Any, Any], more: dict[Any, Any]) -> str:
 
 
 def _taken(row: dict[Any, Any]) -> str:
-    """Return what a set takes of the baseline's error with its interval, which one short run cannot have."""
+    """Return what a set takes of the baseline's error with its interval, which one short run cannot
+    have."""
     if not np.isfinite(row["gain_nm"]):
         return "–"
     low, high = row["gain_low_nm"], row["gain_high_nm"]
@@ -382,7 +404,9 @@ def _control(verdict: dict[str, Any]) -> dict[str, Any] | None:
         {
             "key": key,
             "words": words,
-            "error": {joint: 1e3 * value for joint, value in told[key]["tracking_rmse_rad"].items()},
+            "error": {
+                joint: 1e3 * value for joint, value in told[key]["tracking_rmse_rad"].items()
+            },
             "torque": told[key]["peak_torque_nm"],
         }
         for key, words in (("without", "rigid body and friction"), ("with", "with the causes"))

@@ -1,4 +1,5 @@
-"""A session as its folders hold it: every file of exoid's, known by its contract and not by its name."""
+"""A session as its folders hold it: every file of exoid's, known by its contract and not by its
+name."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -50,7 +51,8 @@ class Artifact:
 
     @property
     def besides(self) -> str:
-        """What a model of ``exoid identify`` has beside rigid body and friction, in words; nothing of a baseline."""
+        """What a model of ``exoid identify`` has beside rigid body and friction, in words; nothing
+        of a baseline."""
         return ", ".join([*(["the named causes, refitted"] if self.causes else []), *self.effects])
 
     @property
@@ -85,9 +87,12 @@ class Session:
         return [one for one in self.artifacts if one.kind == kind]
 
     def found(self, name: str, digest: str) -> Path | None:
-        """Return the file of these bytes, whoever made it; None where the folders hold none of them under that name."""
+        """Return the file of these bytes, whoever made it; None where the folders hold none of them
+        under that name."""
         ours = (one.path for one in self.artifacts if one.sha256 == digest)
-        return next(ours, None) or next((p for p in self._others if p.name == name and sha256(p) == digest), None)
+        return next(ours, None) or next(
+            (p for p in self._others if p.name == name and sha256(p) == digest), None
+        )
 
     @cached_property
     def _others(self) -> list[Path]:
@@ -106,13 +111,25 @@ class Session:
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """The machine's joints, as the file that says most says them."""
-        order = ("parameters", "residuals", "motion", "recording", "trajectory", "simulation", "verdict")
-        told = sorted((one for one in self.artifacts if one.kind in order), key=lambda one: order.index(one.kind))
+        order = (
+            "parameters",
+            "residuals",
+            "motion",
+            "recording",
+            "trajectory",
+            "simulation",
+            "verdict",
+        )
+        told = sorted(
+            (one for one in self.artifacts if one.kind in order),
+            key=lambda one: order.index(one.kind),
+        )
         return joints_of(told[0].metadata) if told else ()
 
     @cached_property
     def verdict_file(self) -> Artifact | None:
-        """The diagnosis's file: the only one, or that in ``diagnosed/``, where `make` has it; two would contradict.
+        """The diagnosis's file: the only one, or that in ``diagnosed/``, where `make` has it; two
+        would contradict.
 
         Raises
         ------
@@ -120,7 +137,11 @@ class Session:
             Where there are several, and none in ``diagnosed/``.
         """
         found = self.of_kind("verdict")
-        usual = [one for one in found if one.path.parent in [folder / "diagnosed" for folder in self.folders]]
+        usual = [
+            one
+            for one in found
+            if one.path.parent in [folder / "diagnosed" for folder in self.folders]
+        ]
         found = usual or found
         if len(found) > 1:
             names = ", ".join(self.shown(one.path) for one in found)
@@ -138,7 +159,9 @@ class Session:
     @property
     def has_damaged_verdict(self) -> bool:
         """Whether there is a verdict that cannot be read, and no other."""
-        return not self.verdict_file and any(path.name == "verdict.json" for path in self.unreadable)
+        return not self.verdict_file and any(
+            path.name == "verdict.json" for path in self.unreadable
+        )
 
     @cached_property
     def extended(self) -> Artifact | None:
@@ -147,7 +170,8 @@ class Session:
 
     @cached_property
     def identified(self) -> list[Artifact]:
-        """The other models, as ``exoid identify`` writes them: the baselines, then those that have more."""
+        """The other models, as ``exoid identify`` writes them: the baselines, then those that have
+        more."""
         others = [one for one in self.of_kind("parameters") if one is not self.extended]
         return sorted(others, key=lambda one: bool(one.besides))
 
@@ -158,7 +182,8 @@ class Session:
 
     @cached_property
     def residuals(self) -> Table | None:
-        """What is left before and after; of the identification alone where no diagnosis was made."""
+        """What is left before and after; of the identification alone where no diagnosis was
+        made."""
         found = self._beside_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
         return self.table(found) if found else None
 
@@ -179,7 +204,8 @@ class Session:
         return [one for one in self.of_kind("simulation") if model and one.is_made_of(model)]
 
     def simulations_by_model(self, what: str) -> dict[str, list[Artifact]]:
-        """Return the simulations of a kind on the ``baseline`` and on the ``extended`` model (see ``simulated``)."""
+        """Return the simulations of a kind on the ``baseline`` and on the ``extended`` model (see
+        ``simulated``)."""
         baseline = [one for model in self.baselines for one in self.simulations(model)]
         extended = self.simulations(self.extended)
         return {
@@ -200,7 +226,8 @@ class Session:
 
 
 def simulated(artifact: Artifact) -> str:
-    """Say what a ``simulation/1`` file holds: ``loop`` (adaptive control), ``windows`` or ``drives`` (replays)."""
+    """Say what a ``simulation/1`` file holds: ``loop`` (adaptive control), ``windows`` or
+    ``drives`` (replays)."""
     if "windows" in artifact.metadata:
         return "windows"
     return "drives" if "closed_loop_rmse_rad" in artifact.metadata else "loop"
@@ -225,7 +252,9 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
             if found:
                 artifacts.setdefault(path.resolve(), found)
     if config is None:
-        config = next((path for folder in folders if (path := folder / "exoid.toml").is_file()), None)
+        config = next(
+            (path for folder in folders if (path := folder / "exoid.toml").is_file()), None
+        )
     if not artifacts:
         told = f" ({next(iter(unreadable.values()))})" if unreadable else ""
         where = ", ".join(map(str, folders))
@@ -259,7 +288,9 @@ def _document(path: Path) -> Artifact | None:
     try:
         content = verdicts.parsed(path)
     except ContractError:
-        if path.name == "verdict.json" or OURS.search(path.read_text(encoding="utf-8", errors="replace")):
+        if path.name == "verdict.json" or OURS.search(
+            path.read_text(encoding="utf-8", errors="replace")
+        ):
             raise
         return None  # somebody else's
     contract = content.get("contract") if isinstance(content, dict) else None

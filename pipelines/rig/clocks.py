@@ -1,4 +1,5 @@
-"""A virtual device's own clock: it samples the machine at instants of its own, which drift against other devices'."""
+"""A virtual device's own clock: it samples the machine at instants of its own, which drift against
+other devices'."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -16,7 +17,8 @@ KEPT = 16
 
 
 class OwnClock:
-    """Samples of the plant turned into those of a device whose clock gains ``ppm`` and began at ``offset_s``."""
+    """Samples of the plant turned into those of a device whose clock gains ``ppm`` and began at
+    ``offset_s``."""
 
     def __init__(self, ppm: float, offset_s: float, rate_hz: float, plant_rate_hz: float) -> None:
         self._rate = rate_hz
@@ -27,7 +29,8 @@ class OwnClock:
         self._seen: list[Samples] = []
 
     def sampled(self, chunk: Samples) -> Samples:
-        """Return what the device can tell since the last time, given what the plant did since then; maybe nothing."""
+        """Return what the device can tell since the last time, given what the plant did since then;
+        maybe nothing."""
         self._seen.append(chunk)
         latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
@@ -48,7 +51,9 @@ def _between(seen: Samples, at: NDArray) -> Samples:
     x = at - base
     weights = np.stack(cubic_weights(x))
     places = np.minimum(base + np.arange(-1, 3)[:, np.newaxis], len(seen.time) - 1)
-    return Samples(**{f.name: _weighted(getattr(seen, f.name), places, weights) for f in fields(Samples)})
+    return Samples(
+        **{f.name: _weighted(getattr(seen, f.name), places, weights) for f in fields(Samples)}
+    )
 
 
 def _weighted(values: NDArray, places: NDArray, weights: NDArray) -> NDArray:
@@ -62,4 +67,6 @@ def _last(samples: Samples, count: int) -> Samples:
 
 
 def _joined(chunks: Sequence[Samples]) -> Samples:
-    return Samples(**{f.name: np.concatenate([getattr(c, f.name) for c in chunks]) for f in fields(Samples)})
+    return Samples(
+        **{f.name: np.concatenate([getattr(c, f.name) for c in chunks]) for f in fields(Samples)}
+    )

@@ -7,10 +7,12 @@ from pipelines.settings.plant import PlantSettings
 
 
 def cuff_forces(human_torque: NDArray, q: NDArray, plant: PlantSettings) -> NDArray:
-    """Return what the four sensors feel without error, (n, 4, 3) N: thigh front, back, shank front, back; x, y, z.
+    """Return what the four sensors feel without error, (n, 4, 3) N: thigh front, back, shank front,
+    back; x, y, z.
 
-    The inverse of ``mechanics.mechanisms.leg.cuff_torque``, made unique by how the limb hangs in its cuffs: along its
-    axis it carries a share of its weight, across it front and back cuff press, never pull.
+    The inverse of ``mechanics.mechanisms.leg.cuff_torque``, made unique by how the limb hangs in
+    its cuffs: along its axis it carries a share of its weight, across it front and back cuff press,
+    never pull.
 
     Parameters
     ----------

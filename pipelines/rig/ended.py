@@ -1,4 +1,5 @@
-"""Signals that end a virtual rig: noted, not raised, as an exception may fall into compiled code, which swallows it."""
+"""Signals that end a virtual rig: noted, not raised, as an exception may fall into compiled code,
+which swallows it."""
 
 import asyncio
 from collections.abc import Iterator
@@ -10,7 +11,8 @@ from pipelines.process.termination import ENDING, heard, known, not_ignored
 
 @contextmanager
 def ended_by_signals(until: asyncio.Event) -> Iterator[list[int]]:
-    """Set an event of the running loop at each signal that asks for an end; yields those that came."""
+    """Set an event of the running loop at each signal that asks for an end; yields those that
+    came."""
     loop, came = asyncio.get_running_loop(), list[int]()
 
     def hear(number: int, frame: FrameType | None) -> None:

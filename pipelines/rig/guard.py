@@ -26,7 +26,8 @@ class Handler(ServerRequestHandler):
     """The rig's end of one connection."""
 
     def pause_writing(self) -> None:
-        """Hang up on a client that asks and does not fetch: its answers would pile up without end."""
+        """Hang up on a client that asks and does not fetch: its answers would pile up without
+        end."""
         self.transport.abort()  # type: ignore[attr-defined]  # pymodbus declares the base of all transports
 
     def resume_writing(self) -> None:
@@ -47,7 +48,10 @@ class Handler(ServerRequestHandler):
         elif not self.server.ignore_missing_devices:
             self.server_send(
                 ExceptionResponse(
-                    request.function_code, ExcCodes.GATEWAY_NO_RESPONSE, request.dev_id, request.transaction_id
+                    request.function_code,
+                    ExcCodes.GATEWAY_NO_RESPONSE,
+                    request.dev_id,
+                    request.transaction_id,
                 ),
                 self.last_addr,
             )

@@ -9,7 +9,8 @@ from contextlib import contextmanager, suppress
 
 @contextmanager
 def null_modem() -> Iterator[tuple[str, str]]:
-    """Join two serial ports for as long as the block lasts, within a running event loop; yields their paths."""
+    """Join two serial ports for as long as the block lasts, within a running event loop; yields
+    their paths."""
     loop = asyncio.get_running_loop()
     pairs = [os.openpty(), os.openpty()]
     for (near, _), (far, _) in (pairs, pairs[::-1]):

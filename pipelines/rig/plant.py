@@ -1,4 +1,5 @@
-"""The machine behind the virtual rig: a leg under its drives' position loops, and what its sensors say of it."""
+"""The machine behind the virtual rig: a leg under its drives' position loops, and what its sensors
+say of it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -145,11 +146,15 @@ class Plant:
         if settings.ripple_correlation_s > 0:
             memory = np.exp(-1.0 / (self.sample_rate_hz * settings.ripple_correlation_s))
         white = self._noise.standard_normal((n, len(JOINTS))) * settings.ripple_nm
-        return _first_order(np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple)
+        return _first_order(
+            np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple
+        )
 
     def _felt(self, human_torque: NDArray, truth: NDArray) -> NDArray:
         forces = cuff_forces(human_torque, truth[:, Q], self.settings)
-        return forces + self._zeros + self._noise.normal(0.0, self.settings.cuff.noise_n, forces.shape)
+        return (
+            forces + self._zeros + self._noise.normal(0.0, self.settings.cuff.noise_n, forces.shape)
+        )
 
     def _noise_alone(self, n: int) -> NDArray:
         return self._zeros + self._unfelt.normal(0.0, self.settings.cuff.noise_n, (n, 4, 3))
@@ -184,7 +189,10 @@ def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term])
         (
             Term(RigidBody(), exo),
             Term(RigidBody(run="with_human"), human),
-            *(Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in frictions),
+            *(
+                Term(Friction(joint), np.array([coulomb, viscous]))
+                for joint, coulomb, viscous in frictions
+            ),
             *(term_of(effect, f"plant.effects[{i}]") for i, effect in enumerate(settings.effects)),
             *effects,
         )
@@ -193,7 +201,8 @@ def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term])
 
 @njit(cache=True)
 def _first_order(wanted, share, state):
-    """Let ``state`` (J,) follow ``wanted`` (n, J), closing ``share`` of the distance at each sample."""
+    """Let ``state`` (J,) follow ``wanted`` (n, J), closing ``share`` of the distance at each
+    sample."""
     out = np.empty_like(wanted)
     for k in range(len(wanted)):
         state += share * (wanted[k] - state)
@@ -205,15 +214,20 @@ def _first_order(wanted, share, state):
 def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human, warming):
     """Carry the loop on along set-points (n, J).
 
-    ``warming`` is the temperature of the room (°C), the final rise per squared torque, and the rise's time constant.
+    ``warming`` is the temperature of the room (°C), the final rise per squared torque, and the
+    rise's time constant.
 
-    Returns measured angle, speed and torque (n, J), the motors' temperature (n, J), truth (n, 4, J), and the torque
-    that the terms marked in ``of_human`` take of the drives' (n, J).
+    Returns measured angle, speed and torque (n, J), the motors' temperature (n, J), truth (n, 4,
+    J), and the torque that the terms marked in ``of_human`` take of the drives' (n, J).
     """
     ambient, heating, time_constant = warming
     n, joints = reference.shape
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
-    truth, human, temperature = np.empty((n, 4, joints)), np.zeros((n, joints)), np.empty((n, joints))
+    truth, human, temperature = (
+        np.empty((n, 4, joints)),
+        np.zeros((n, joints)),
+        np.empty((n, joints)),
+    )
     for k in range(n):
         t = (first + k) * period
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])

@@ -1,4 +1,5 @@
-"""A ``recording/1`` made without devices: the plant moved by arrays, for tests and identification campaigns."""
+"""A ``recording/1`` made without devices: the plant moved by arrays, for tests and identification
+campaigns."""
 
 from typing import Any
 
@@ -20,8 +21,8 @@ def record(
 ) -> tuple[pd.DataFrame, dict[str, Any]]:
     """Return frame and metadata of a run of ``duration_s`` along a trajectory.
 
-    The same physics and the same channels as over Modbus. The leg goes from rest into the motion first; the
-    recording begins where the motion repeats.
+    The same physics and the same channels as over Modbus. The leg goes from rest into the motion
+    first; the recording begins where the motion repeats.
     """
     rate = plant.sample_rate_hz
     lead, count = round(LEAD_S * rate), round(duration_s * rate)
@@ -38,13 +39,16 @@ def record(
         columns[f"{joint}_temperature_c"] = measured.temperature[:, j]
     if plant.has_human:
         for c, cuff in enumerate(CUFFS):
-            columns |= {f"{cuff}_force_{axis}_n": measured.forces[:, c, i] for i, axis in enumerate("xyz")}
+            columns |= {
+                f"{cuff}_force_{axis}_n": measured.forces[:, c, i] for i, axis in enumerate("xyz")
+            }
     columns["sequence"] = measured.sequence
     return pd.DataFrame(columns), _metadata(plant, trajectory, purpose)
 
 
 def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) -> NDArray:
-    """Return set-points (n, J) from rest into the motion: a share of it that grows smoothly from 0 to 1."""
+    """Return set-points (n, J) from rest into the motion: a share of it that grows smoothly from 0
+    to 1."""
     ahead = (np.arange(-samples, 0) + 0.5) / rate
     share = smooth_share((ahead + LEAD_S) / (0.75 * LEAD_S))[:, np.newaxis]
     period = trajectory.period_s

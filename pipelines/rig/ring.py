@@ -1,4 +1,5 @@
-"""A drive's own record of its latest samples, as the virtual rig serves it: a ring for FC03, or a queue for FC24."""
+"""A drive's own record of its latest samples, as the virtual rig serves it: a ring for FC03, or a
+queue for FC24."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -40,7 +41,9 @@ class Ring:
     def append(self, sequence: int, values: Mapping[str, float]) -> None:
         """Add a sample; the oldest makes room."""
         words = [0] * self._words
-        words[self._block.address : self._block.address + self._block.count] = self._block.encode(values)
+        words[self._block.address : self._block.address + self._block.count] = self._block.encode(
+            values
+        )
         if self.fifo is not None:
             self._queue.append(words)
             return
@@ -49,10 +52,13 @@ class Ring:
         self.last = sequence
 
     def show(self, registers: list[int], first: int, address: int, count: int) -> None:
-        """Put that part of the ring into a device's ``registers`` which a request for ``count`` of them will see."""
+        """Put that part of the ring into a device's ``registers`` which a request for ``count`` of
+        them will see."""
         low, high = max(address, self.address), min(address + count, self.address + len(self.held))
         if low < high:
-            registers[low - first : high - first] = self.held[low - self.address : high - self.address]
+            registers[low - first : high - first] = self.held[
+                low - self.address : high - self.address
+            ]
         if self.newest:
             start = self.newest.address - first
             told = self.newest.encode({"newest": self.last % self.newest.span("newest")})
@@ -65,7 +71,8 @@ class Ring:
 
 
 def fifo_request(queues: Mapping[int, Callable[[int], list[int] | None]]) -> type[ModbusPDU]:
-    """Return an FC24 request that devices answer: of each unit id a function from address to words, None for no queue.
+    """Return an FC24 request that devices answer: of each unit id a function from address to words,
+    None for no queue.
 
     pymodbus' own request answers with four constants.
     """

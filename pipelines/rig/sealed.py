@@ -1,7 +1,8 @@
-"""A sealed file: what a virtual rig hides. Only the rig's own process opens it; nothing of it is ever recorded.
+"""A sealed file: what a virtual rig hides. Only the rig's own process opens it; nothing of it is
+ever recorded.
 
-It lists possibilities, each an effect with a range for every value; the file's seed chooses among them.
-So a person who reads the file knows what might be hidden, and still has to find what is.
+It lists possibilities, each an effect with a range for every value; the file's seed chooses among
+them. So a person who reads the file knows what might be hidden, and still has to find what is.
 """
 
 from pathlib import Path
@@ -20,7 +21,9 @@ class Possibility(Settings):
     """An effect that may be hidden."""
 
     effect: str = Field(description="Its name.")
-    joints: tuple[Literal["hip", "knee"], ...] = Field((), description="Where it may act; none for the whole leg.")
+    joints: tuple[Literal["hip", "knee"], ...] = Field(
+        (), description="Where it may act; none for the whole leg."
+    )
     values: dict[str, tuple[float, float]] = Field(description="Range of each of its values.")
     either_sign: bool = Field(False, description="Whether all values may be turned negative.")
 
@@ -35,7 +38,9 @@ class SealedFile(Settings):
     @model_validator(mode="after")
     def _there_are_enough(self) -> Self:
         if self.hidden > len(self.possibility):
-            raise ValueError(f"hidden: found {self.hidden}, expected at most the {len(self.possibility)} possibilities")
+            raise ValueError(
+                f"hidden: found {self.hidden}, expected at most the {len(self.possibility)} possibilities"
+            )
         return self
 
 
@@ -48,7 +53,12 @@ def hidden_effects(path: Path) -> tuple[Term, ...]:
 
 
 def _drawn(possibility: Possibility, draw: np.random.Generator, source: str) -> Term:
-    joint = possibility.joints[draw.integers(len(possibility.joints))] if possibility.joints else None
+    joint = (
+        possibility.joints[draw.integers(len(possibility.joints))] if possibility.joints else None
+    )
     sign = draw.choice([-1.0, 1.0]) if possibility.either_sign else 1.0
-    values = {name: float(sign * draw.uniform(low, high)) for name, (low, high) in possibility.values.items()}
+    values = {
+        name: float(sign * draw.uniform(low, high))
+        for name, (low, high) in possibility.values.items()
+    }
     return term_of(PlantEffect(effect=possibility.effect, joint=joint, values=values), source)

@@ -1,8 +1,10 @@
-"""The virtual rig on the wire: drives and force sensors as Modbus devices, all latched at one instant.
+"""The virtual rig on the wire: drives and force sensors as Modbus devices, all latched at one
+instant.
 
-In lockstep a cycle (a sample, or those that a ring takes from one set-point to the next) lasts until every drive has
-been exchanged once (FC23: set-point in, sample out), so a run depends on seeds and set-points alone. In real time
-samples come on the rig's own clock, or on a clock of each drive's own.
+In lockstep a cycle (a sample, or those that a ring takes from one set-point to the next) lasts
+until every drive has been exchanged once (FC23: set-point in, sample out), so a run depends on
+seeds and set-points alone. In real time samples come on the rig's own clock, or on a clock of each
+drive's own.
 """
 
 import asyncio
@@ -53,7 +55,9 @@ READ_WRITE = 23
 """Function code of the exchange that lockstep counts."""
 
 
-def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None) -> Plant:
+def build_plant(
+    rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None
+) -> Plant:
     """Return the plant of a rig file, with what it hides; ``sample_rate_hz`` is that of set-points.
 
     Raises
@@ -62,20 +66,27 @@ def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_ra
         Where it has no ``[plant]``.
     """
     if rig.plant is None:
-        raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
+        raise SettingsError(
+            f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md"
+        )
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
     cycle_hz = sample_rate_hz or rig.plant.sample_rate_hz
     with about(path):
         device_hz = cycle_hz * rig.samples_per_cycle(cycle_hz)
         # What a device samples between the plant's samples is interpolated: those must lie closely.
-        finer = max(1, round(rig.plant.drive_rate_hz / device_hz)) if any(rig.plant.clock_ppm) else 1
+        finer = (
+            max(1, round(rig.plant.drive_rate_hz / device_hz)) if any(rig.plant.clock_ppm) else 1
+        )
         return Plant(rig.plant, run, seed, hidden, device_hz * finer)
 
 
 class Device:
-    """Registers of one device; they are written when they are read, from the sample that is latched then."""
+    """Registers of one device; they are written when they are read, from the sample that is latched
+    then."""
 
-    def __init__(self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]) -> None:
+    def __init__(
+        self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]
+    ) -> None:
         self.rig = rig
         self.unit = unit
         self.identity = tuple(identity)
@@ -94,7 +105,10 @@ class Device:
         # One SimData for each stretch of addresses: what lies between does not exist.
         stretches = groupby(enumerate(sorted(held)), lambda numbered: numbered[1] - numbered[0])
         addresses = [[address for _, address in stretch] for _, stretch in stretches]
-        data = [SimData(a[0], values=[held[i] for i in a], datatype=DataType.REGISTERS) for a in addresses]
+        data = [
+            SimData(a[0], values=[held[i] for i in a], datatype=DataType.REGISTERS)
+            for a in addresses
+        ]
         return SimDevice(self.unit, simdata=data, action=self._serve)
 
     def spans(self) -> tuple[range, ...]:
@@ -102,7 +116,13 @@ class Device:
         return tuple(range(block.address, block.address + block.count) for block in self.blocks)
 
     async def _serve(
-        self, function: int, first: int, address: int, count: int, registers: list[int], written: list | None
+        self,
+        function: int,
+        first: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        written: list | None,
     ) -> ExcCodes | None:
         self.registers, self.first = registers, first
         if written is not None and not self.takes(address, count):
@@ -129,7 +149,8 @@ class Device:
         raise NotImplementedError
 
     def show_records(self, address: int, count: int) -> None:
-        """Put into the registers what is asked for of a record of earlier samples; nothing where there is none."""
+        """Put into the registers what is asked for of a record of earlier samples; nothing where
+        there is none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:
         start = block.address - self.first
@@ -139,8 +160,13 @@ class Device:
 class Drive(Device):
     """A drive: follows its set-point while it is enabled."""
 
-    def __init__(self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, servo: Servo) -> None:
-        self.read, self.write = Block(registers_of(registers.read)), Block(registers_of(registers.write))
+    def __init__(
+        self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, servo: Servo
+    ) -> None:
+        self.read, self.write = (
+            Block(registers_of(registers.read)),
+            Block(registers_of(registers.write)),
+        )
         self.ring = Ring(registers.ring) if registers.ring else None
         super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
         self.joint = JOINTS.index(settings.joint)
@@ -157,7 +183,10 @@ class Drive(Device):
 
     def takes(self, address: int, count: int) -> bool:
         """Tell whether registers may be written; those that only tell something may not."""
-        return self.write.address <= address and address + count <= self.write.address + self.write.count
+        return (
+            self.write.address <= address
+            and address + count <= self.write.address + self.write.count
+        )
 
     def hear(self) -> None:
         """Let the servo take what was written since it was last heard."""
@@ -196,7 +225,8 @@ class Drive(Device):
             self.ring.show(self.registers, self.first, address, count)
 
     def queue(self, address: int) -> list[int] | None:
-        """Return the oldest records of the queue at an address, which lets them go; None where there is no queue."""
+        """Return the oldest records of the queue at an address, which lets them go; None where
+        there is no queue."""
         if self.ring is None or self.ring.fifo != address:
             return None
         self.rig.catch_up()
@@ -212,7 +242,8 @@ class Drive(Device):
             "velocity": sample.velocity[0, j],
             "current": sample.torque[0, j] / self.torque_per_ampere,
             "temperature": sample.temperature[0, j],
-            # The drive's state as it is now: a control word is answered at once, not at the next sample.
+            # The drive's state as it is now: a control word is answered at once, not at the next
+            # sample.
             "status": float(self.servo.status),
             "reference": sample.reference[0, j],
         }
@@ -243,7 +274,8 @@ class VirtualRig:
     """All devices of a rig and the plant behind them."""
 
     def __init__(self, rig: RigSettings, plant: Plant, sample_rate_hz: float | None = None) -> None:
-        """Begin at rest; ``sample_rate_hz`` is that of set-points, where not the plant's settings'."""
+        """Begin at rest; ``sample_rate_hz`` is that of set-points, where not the plant's
+        settings'."""
         self.plant = plant
         self.lockstep = rig.clock == "lockstep"
         cycle_hz = sample_rate_hz or plant.settings.sample_rate_hz
@@ -261,11 +293,14 @@ class VirtualRig:
         """Give the drives the clocks that the settings ask for."""
         settings = self.plant.settings
         if any((*settings.clock_ppm, *settings.clock_offset_s)):
-            for drive, ppm, offset in zip(self.drives, settings.clock_ppm, settings.clock_offset_s, strict=True):
+            for drive, ppm, offset in zip(
+                self.drives, settings.clock_ppm, settings.clock_offset_s, strict=True
+            ):
                 drive.clock = OwnClock(ppm, offset, rate_hz, self.plant.sample_rate_hz)
 
     def exchanged(self, drive: Device) -> None:
-        """Note that a drive has been exchanged; after the last one the plant goes on, once its reply is sent."""
+        """Note that a drive has been exchanged; after the last one the plant goes on, once its
+        reply is sent."""
         self._waiting.discard(drive)
         if self.lockstep and not self._waiting:
             asyncio.get_running_loop().call_soon(self.catch_up)
@@ -285,20 +320,35 @@ class VirtualRig:
         """Latch samples on the rig's own clock, for ever."""
         loop = asyncio.get_running_loop()
         while True:
-            due = self._began + (self.sample.sequence[0] + self.samples_per_cycle) / self.plant.sample_rate_hz
+            due = (
+                self._began
+                + (self.sample.sequence[0] + self.samples_per_cycle) / self.plant.sample_rate_hz
+            )
             await asyncio.sleep(max(0.0, due - loop.time()))
             self.catch_up()
 
     def _servo(self, rig: RigSettings, drive: DriveSettings, rest: float) -> Servo:
         registers, deceleration = rig.map.drive[drive.map], rig.safety.deceleration_rad_s2
         rate, heartbeat_s = self.plant.sample_rate_hz, self.plant.settings.heartbeat_s
-        return Servo(registers, rest, drive.angle_rad, rate, deceleration, heartbeat_s, self.samples_per_cycle)
+        return Servo(
+            registers,
+            rest,
+            drive.angle_rad,
+            rate,
+            deceleration,
+            heartbeat_s,
+            self.samples_per_cycle,
+        )
 
     def _advance(self, angle: NDArray, count: int = 1) -> None:
-        """Go on by some samples, during which the drives are told nothing new, from measured angles (J,) rad."""
+        """Go on by some samples, during which the drives are told nothing new, from measured angles
+        (J,) rad."""
         for drive in self.drives:
             drive.hear()
-        told = [[drive.servo.next(float(angle[drive.joint])) for drive in self.drives] for _ in range(count)]
+        told = [
+            [drive.servo.next(float(angle[drive.joint])) for drive in self.drives]
+            for _ in range(count)
+        ]
         for enabled, following in groupby(told, lambda drives: [follows for _, follows in drives]):
             references = np.array([[reference for reference, _ in drives] for drives in following])
             samples = self.plant.run(references, np.array(enabled))
@@ -324,9 +374,11 @@ async def serve(
     rig : RigSettings
     plant : Plant
     port : int or None
-        One TCP port for all devices, 0 for a free one of each line; None for what the rig file names.
+        One TCP port for all devices, 0 for a free one of each line; None for what the rig file
+        names.
     announce : callable
-        Called with the place of each server once it listens, and the name of its line, None for devices without.
+        Called with the place of each server once it listens, and the name of its line, None for
+        devices without.
     until : asyncio.Event
     bind : str
         Address on which TCP ports listen.
@@ -341,7 +393,9 @@ async def serve(
     virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
     queues: dict[str | int, dict[int, Callable]] = defaultdict(dict)
-    for settings, device in zip((*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True):
+    for settings, device in zip(
+        (*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True
+    ):
         alone = settings.port if port is None else port
         key = alone if settings.line is None else settings.line
         on_line[key].append(device.as_served())
@@ -361,7 +415,11 @@ async def serve(
     try:
         async with AsyncExitStack() as servers:
             for key, devices in on_line.items():
-                name, line = (key, rig.line[key]) if isinstance(key, str) else (None, TcpLine.model_construct(port=key))
+                name, line = (
+                    (key, rig.line[key])
+                    if isinstance(key, str)
+                    else (None, TcpLine.model_construct(port=key))
+                )
                 served = listening(_placed(line, bind, port), devices, [fifo_request(queues[key])])
                 announce(await servers.enter_async_context(served), name)
             await until.wait()
@@ -388,14 +446,18 @@ def serve_file(
     until_input_ends: bool,
     bind: str = "127.0.0.1",
 ) -> None:
-    """Serve the rig in a file until Ctrl-C, another signal or, if asked, until standard input is closed.
+    """Serve the rig in a file until Ctrl-C, another signal or, if asked, until standard input is
+    closed.
 
-    The last ties the rig to the process that started it: an operating system closes the pipe whatever
-    becomes of that process.
+    The last ties the rig to the process that started it: an operating system closes the pipe
+    whatever becomes of that process.
     """
     rig = load_rig(path)
-    # A first sample compiles the plant, which may take seconds: not once a client waits for a reply.
-    build_plant(rig, path, run, seed, sample_rate_hz).run(np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool))
+    # A first sample compiles the plant, which may take seconds: not once a client waits for a
+    # reply.
+    build_plant(rig, path, run, seed, sample_rate_hz).run(
+        np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool)
+    )
     plant = build_plant(rig, path, run, seed, sample_rate_hz)
 
     async def until_stopped() -> list[int]:
@@ -413,12 +475,14 @@ def serve_file(
         return came
 
     if rig.clock == "real_time":
-        gc.freeze()  # else looking through all that was imported would cost several samples now and then
+        # Else looking through all that was imported would cost several samples now and then.
+        gc.freeze()
         with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         came = runner.run(until_stopped())
     for number in came:
-        if number != signal.SIGINT:  # Ctrl-C is how it is meant to end; who else asked for it is told so
+        # Ctrl-C is how it is meant to end; who else asked for it is told so.
+        if number != signal.SIGINT:
             signal.raise_signal(number)

@@ -1,13 +1,16 @@
-"""What a virtual drive makes of control words, set-points and silence: when its motor follows, and where to."""
+"""What a virtual drive makes of control words, set-points and silence: when its motor follows, and
+where to."""
 
 from math import ceil, floor, isfinite
 
 from pipelines.settings.rig import DriveMap
 
 EXTRAPOLATED = 5
-"""Cycles over which a drive goes on at its set-points' speed when none comes; then it slows down."""
+"""Cycles over which a drive goes on at its set-points' speed when none comes; then it slows
+down."""
 EARLY, LATE = 0.25, 0.5
-"""Shares of a cycle by which a set-point is clearly that one and not another, though it comes early or late."""
+"""Shares of a cycle by which a set-point is clearly that one and not another, though it comes early
+or late."""
 CATCH = 0.02
 """Share of how early or late a set-point comes that the drive's own cycles follow."""
 
@@ -36,10 +39,12 @@ class Servo:
         deceleration_rad_s2 : float
             How it slows down when nothing is told any more.
         heartbeat_s : float or None
-            How long it may be told nothing before it disables itself; None for a drive without such a watchdog.
+            How long it may be told nothing before it disables itself; None for a drive without such
+            a watchdog.
         samples_per_cycle : int
-            Samples from one set-point to the next, a cycle. It goes to each in a straight line, to be there a cycle
-            after it was at the one before: set-points that come a little early or late move it no less evenly.
+            Samples from one set-point to the next, a cycle. It goes to each in a straight line, to
+            be there a cycle after it was at the one before: set-points that come a little early or
+            late move it no less evenly.
         """
         self.fault = False
         """Latched until a fault reset, and no drive with a fault is enabled."""
@@ -52,7 +57,8 @@ class Servo:
         self._last, self._step, self._unheard = rest, 0.0, 0
         self._pace = 0.0
         self._from, self._way = rest, float(samples_per_cycle)
-        """Where it was when the set-point came, and samples from then to when it is to be reached."""
+        """Where it was when the set-point came, and samples from then to when it is to be
+        reached."""
 
     @property
     def enabled(self) -> bool:
@@ -62,7 +68,8 @@ class Servo:
     @property
     def status(self) -> int:
         """The status word; a bit that the map gives no meaning stays 0."""
-        # A bit that means a fault does not say that the drive is merely disabled, though it is 0 while it is enabled.
+        # A bit that means a fault does not say that the drive is merely disabled, though it is 0
+        # while it is enabled.
         is_enabled, mask = self._map.enabled_value, self._map.enabled_mask & ~self._map.fault_mask
         word = is_enabled if self.enabled else is_enabled ^ mask
         # The lowest bit that means a fault: which of them it is, the map does not tell.
@@ -85,7 +92,8 @@ class Servo:
         self._told, self._control = told, control
 
     def _cycles_to(self, told: float) -> int:
-        """Return how many set-points a new one (rad) is after the last one; 0 where it corrects that.
+        """Return how many set-points a new one (rad) is after the last one; 0 where it corrects
+        that.
 
         The time tells; what is very late could be another one, and is what goes on at their speed.
         """
@@ -93,18 +101,26 @@ class Servo:
         if (clear := floor(waited + EARLY)) != floor(waited - LATE):
             return clear
         return min(
-            max(floor(waited), 0), ceil(waited), key=lambda n: abs(told - self._told - n * self._cycle * self._pace)
+            max(floor(waited), 0),
+            ceil(waited),
+            key=lambda n: abs(told - self._told - n * self._cycle * self._pace),
         )
 
     def next(self, angle: float) -> tuple[float, bool]:
         """Return the set-point (rad) for the next sample and whether the motor follows it.
 
-        While it does not, the set-point is the measured ``angle`` (rad), so that enabling begins without a jump.
+        While it does not, the set-point is the measured ``angle`` (rad), so that enabling begins
+        without a jump.
         """
         reference = self._reference() if self.enabled else angle
         self._step, self._last = reference - self._last, reference
         self._unheard += 1
-        if self.enabled and self._patience is not None and self._unheard > self._patience and self._step == 0.0:
+        if (
+            self.enabled
+            and self._patience is not None
+            and self._unheard > self._patience
+            and self._step == 0.0
+        ):
             self.fault = True
         return reference, self.enabled
 

@@ -15,19 +15,23 @@ from pipelines.validation.toml import read_toml
 
 
 class Settings(BaseModel):
-    """One table of a settings file. Every field has a description; a unit stands at the end of its name."""
+    """One table of a settings file. Every field has a description; a unit stands at the end of its
+    name."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def changed(self, **values: Any) -> Self:
-        """Return the settings with some values replaced, as command-line options do; None leaves one as it is.
+        """Return the settings with some values replaced, as command-line options do; None leaves
+        one as it is.
 
         Raises
         ------
         SettingsError
             Where the result is not valid.
         """
-        content = self.model_dump() | {name: value for name, value in values.items() if value is not None}
+        content = self.model_dump() | {
+            name: value for name, value in values.items() if value is not None
+        }
         try:
             return type(self).model_validate(content)
         except ValidationError as error:
@@ -38,14 +42,18 @@ Model = TypeVar("Model", bound=Settings)
 
 
 def load_toml(path: Path | str, model: type[Model]) -> Model:
-    """Return the settings in a TOML file, or raise a SettingsError that names file, key and remedy."""
+    """Return the settings in a TOML file, or raise a SettingsError that names file, key and
+    remedy."""
     path = Path(path)
     content = _content(path)
     try:
-        # As JSON, because there strict means what a TOML file means: "5" is no number, [1, 2] is a pair.
+        # As JSON, because there strict means what a TOML file means: "5" is no number, [1, 2] is a
+        # pair.
         return model.model_validate_json(json.dumps(content, default=str), strict=True)
     except ValidationError as error:
-        raise SettingsError(f"{path}: {explain(error, content, lambda key: _keys_at(model, key))}") from error
+        raise SettingsError(
+            f"{path}: {explain(error, content, lambda key: _keys_at(model, key))}"
+        ) from error
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -60,7 +68,9 @@ def _content(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{path}: is not valid TOML: {error}; mend that line") from error
     except UnicodeDecodeError as error:
-        raise SettingsError(f"{path}: is not UTF-8 text, expected a TOML file; save it as UTF-8") from error
+        raise SettingsError(
+            f"{path}: is not UTF-8 text, expected a TOML file; save it as UTF-8"
+        ) from error
 
 
 def _keys_at(model: type[BaseModel], path: str) -> list[str]:

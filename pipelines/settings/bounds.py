@@ -1,4 +1,5 @@
-"""What no rig that a person may be strapped into needs: limits so wide that nothing would be watched any more."""
+"""What no rig that a person may be strapped into needs: limits so wide that nothing would be
+watched any more."""
 
 from collections.abc import Iterator
 from math import pi
@@ -49,7 +50,11 @@ def _above(key: str, found: float, most: float) -> Iterator[str]:
 
 def _slow_stop(drive: "DriveSettings", safety: "SafetySettings", run: str) -> Iterator[str]:
     """Complain of a stop that takes too long, or leads beyond all angles that the joint has."""
-    speed, slowing, room = drive.speed_rad_s, safety.deceleration_rad_s2, drive.angle_rad[1] - drive.angle_rad[0]
+    speed, slowing, room = (
+        drive.speed_rad_s,
+        safety.deceleration_rad_s2,
+        drive.angle_rad[1] - drive.angle_rad[0],
+    )
     needed = max(speed / STOP_S, speed**2 / 2.0 / room)
     if slowing < needed:
         yield (

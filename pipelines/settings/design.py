@@ -13,13 +13,17 @@ class Bounds(Settings):
 
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
     velocity_rad_s: float = Field(1.6449, gt=0.0, description="Highest speed, either way.")
-    acceleration_rad_s2: float = Field(5.1677, gt=0.0, description="Highest acceleration, either way.")
+    acceleration_rad_s2: float = Field(
+        5.1677, gt=0.0, description="Highest acceleration, either way."
+    )
 
     @model_validator(mode="after")
     def _low_is_below_high(self) -> Self:
         low, high = self.angle_rad
         if low >= high:
-            raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+            raise ValueError(
+                f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them"
+            )
         if max(abs(low), abs(high)) > 2 * math.pi:
             raise ValueError(
                 f"angle_rad: found [{low}, {high}], expected radians, at most one turn; it looks like degrees, "
@@ -32,16 +36,23 @@ class JointBounds(Settings):
     """The bounds of each joint; the paper's Table 2 unless said otherwise."""
 
     hip: Bounds = Field(Bounds(angle_rad=(0.0872, 1.2217)), description="Hip, forward positive.")
-    knee: Bounds = Field(Bounds(angle_rad=(-1.6232, -0.2269)), description="Knee, flexion negative.")
+    knee: Bounds = Field(
+        Bounds(angle_rad=(-1.6232, -0.2269)), description="Knee, flexion negative."
+    )
 
 
 class NoiseSettings(Settings):
-    """What the expected standard errors are computed for: the rig's torque noise and the record's length."""
+    """What the expected standard errors are computed for: the rig's torque noise and the record's
+    length."""
 
     hip_nm: float = Field(0.6, gt=0.0, description="Standard deviation of the hip's torque noise.")
-    knee_nm: float = Field(0.4, gt=0.0, description="Standard deviation of the knee's torque noise.")
+    knee_nm: float = Field(
+        0.4, gt=0.0, description="Standard deviation of the knee's torque noise."
+    )
     correlation_s: float = Field(
-        0.02, ge=0.0, description="Time after which the noise's correlation has fallen to 1/e; 0 for white noise."
+        0.02,
+        ge=0.0,
+        description="Time after which the noise's correlation has fallen to 1/e; 0 for white noise.",
     )
     duration_s: float = Field(40.0, gt=0.0, description="Length of the record that will be fitted.")
 
@@ -49,7 +60,9 @@ class NoiseSettings(Settings):
 class DesignSettings(Settings):
     """The excitation, a Fourier series, and the particle swarm that searches it."""
 
-    base_frequency_hz: float = Field(0.1, gt=0.0, description="Frequency of the first harmonic; its period repeats.")
+    base_frequency_hz: float = Field(
+        0.1, gt=0.0, description="Frequency of the first harmonic; its period repeats."
+    )
     harmonics: int = Field(5, ge=1, le=20, description="How many harmonics each joint has.")
     theta0_rad: Literal["free"] | tuple[float, float] = Field(
         "free", description='Mean angle of hip and knee, or "free" to search it too.'
@@ -60,15 +73,25 @@ class DesignSettings(Settings):
         "raw (the paper's) or with its columns scaled to unit norm.",
     )
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
-    bounds: JointBounds = Field(JointBounds(), description="Angle, speed and acceleration, kept between samples too.")
-    topology: Literal["ring", "global"] = Field("ring", description="Whose best each particle of the swarm follows.")
+    bounds: JointBounds = Field(
+        JointBounds(), description="Angle, speed and acceleration, kept between samples too."
+    )
+    topology: Literal["ring", "global"] = Field(
+        "ring", description="Whose best each particle of the swarm follows."
+    )
     particles: int = Field(128, ge=4, description="Size of the swarm.")
-    iterations: int = Field(800, ge=1, description="Most moves of the swarm; it stops earlier where nothing is gained.")
+    iterations: int = Field(
+        800, ge=1, description="Most moves of the swarm; it stops earlier where nothing is gained."
+    )
     seconds: float = Field(
-        60.0, gt=0.0, description="Longest search, wall time; a search it cuts short depends on the machine's speed."
+        60.0,
+        gt=0.0,
+        description="Longest search, wall time; a search it cuts short depends on the machine's speed.",
     )
     seed: int = Field(1, ge=0, description="Seed of the search; equal seeds give equal designs.")
-    sample_rate_hz: float = Field(200.0, gt=0.0, description="Rows a second in the file, samples a second of a record.")
+    sample_rate_hz: float = Field(
+        200.0, gt=0.0, description="Rows a second in the file, samples a second of a record."
+    )
     noise: NoiseSettings = Field(NoiseSettings(), description="For the standard errors to expect.")
 
     @model_validator(mode="after")
@@ -89,5 +112,7 @@ class DesignSettings(Settings):
     @model_validator(mode="after")
     def _something_moves(self) -> Self:
         if self.rest_to_rest and self.harmonics < 2:
-            raise ValueError("rest_to_rest: one harmonic is never at rest; set harmonics to 2 or more")
+            raise ValueError(
+                "rest_to_rest: one harmonic is never at rest; set harmonics to 2 or more"
+            )
         return self

@@ -30,10 +30,14 @@ def _four_runs() -> tuple[RunSettings, ...]:
 class Experiment(Settings):
     """All settings of one experiment; every key has a default."""
 
-    mechanism: MechanismSettings = Field(MechanismSettings(), description="The machine's joints and geometry.")
+    mechanism: MechanismSettings = Field(
+        MechanismSettings(), description="The machine's joints and geometry."
+    )
     design: DesignSettings = Field(DesignSettings(), description="The excitation.")
     acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
-    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="The runs, in order.")
+    run: tuple[RunSettings, ...] = Field(
+        default_factory=_four_runs, description="The runs, in order."
+    )
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")
@@ -54,7 +58,8 @@ class Experiment(Settings):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Return the experiment in a file; names of files in it are taken from that file's folder."""
+        """Return the experiment in a file; names of files in it are taken from that file's
+        folder."""
         experiment = load_toml(path, cls)
         experiment._path = Path(path)
         return experiment
@@ -75,25 +80,33 @@ class Experiment(Settings):
     def sections_about(self, a_leg: bool, *names: str) -> dict[str, Any]:
         """Return some sections as a result about a machine, ``a_leg`` or another, records them.
 
-        The defaults of [mechanism] are the leg's: of another machine it is null where nobody wrote it, for then what
-        counts is what the recordings say of themselves.
+        The defaults of [mechanism] are the leg's: of another machine it is null where nobody wrote
+        it, for then what counts is what the recordings say of themselves.
         """
         unsaid = {} if a_leg or self.mechanism.model_fields_set else {"mechanism": None}
-        return self.sections(*names) | {name: value for name, value in unsaid.items() if name in names}
+        return self.sections(*names) | {
+            name: value for name, value in unsaid.items() if name in names
+        }
 
     def refuse_missing_files(self) -> None:
         """Refuse to name a file that is not there."""
         named = {"acquire.rig": self.acquire.rig}
-        named |= {f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory}
+        named |= {
+            f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory
+        }
         for key, name in named.items():
             if not self.file(name).is_file():
                 raise SettingsError(
                     f"{self._path}: {key}: {self.file(name)}: no such file; "
-                    + (similar_file(self.file(name)) or "name one relative to the experiment's file")
+                    + (
+                        similar_file(self.file(name))
+                        or "name one relative to the experiment's file"
+                    )
                 )
 
     def refuse_what_cannot_run(self) -> None:
-        """Refuse what only other files or other sections show: a file that is not there, a cut-off above Nyquist's."""
+        """Refuse what only other files or other sections show: a file that is not there, a cut-off
+        above Nyquist's."""
         self.refuse_missing_files()
         cutoff_hz, rate_hz = self.filter.cutoff_hz, self.acquire.sample_rate_hz
         if cutoff_hz != "auto" and cutoff_hz >= rate_hz / 2:

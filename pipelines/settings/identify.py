@@ -19,7 +19,9 @@ Method = Literal[
 class IdentifySettings(Settings):
     """The two-step fit: friction from exo_alone runs, then inertia with the human."""
 
-    figures: bool = Field(True, description="Draw the figures, beside the parameters, as PNG and PDF.")
+    figures: bool = Field(
+        True, description="Draw the figures, beside the parameters, as PNG and PDF."
+    )
     method: Method = Field(
         "weighted_least_squares",
         description="Estimator of both steps; docs/estimators.md says which to use when. Instrumental variables need "

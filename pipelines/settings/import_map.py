@@ -1,4 +1,5 @@
-"""A map: what the columns of a log from elsewhere are, so that ``exoid import`` can make recordings of it."""
+"""A map: what the columns of a log from elsewhere are, so that ``exoid import`` can make recordings
+of it."""
 
 import re
 from collections import Counter
@@ -29,14 +30,21 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 class SourceSettings(Settings):
     """How the log is to be read; what is left out is found by looking at the file."""
 
-    delimiter: str | None = Field(None, description="The one character between the fields of a text file.")
+    delimiter: str | None = Field(
+        None, description="The one character between the fields of a text file."
+    )
     decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
-    comment: str | None = Field(None, min_length=1, max_length=1, description="What a line to be skipped starts with.")
+    comment: str | None = Field(
+        None, min_length=1, max_length=1, description="What a line to be skipped starts with."
+    )
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
-    columns: tuple[str, ...] | None = Field(None, description="Names of the columns, of a text file without a header.")
+    columns: tuple[str, ...] | None = Field(
+        None, description="Names of the columns, of a text file without a header."
+    )
     encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
     table: str | None = Field(
-        None, description="Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic (ROS)."
+        None,
+        description="Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic (ROS).",
     )
 
     @field_validator("delimiter")
@@ -56,19 +64,24 @@ class TimeSettings(Settings):
     column: str | None = Field(None, description="The column with the time stamps.")
     unit: str = Field("s", description="s, ms, us, ns, min, or iso8601 for dates written out.")
     wraps_at: float | None = Field(
-        None, gt=0.0, description="Reading at which the clock starts anew at 0, such as 4294967296 (32 bits)."
+        None,
+        gt=0.0,
+        description="Reading at which the clock starts anew at 0, such as 4294967296 (32 bits).",
     )
     rate_hz: float | None = Field(
         None, gt=0.0, description="In place of a column: rows a second, where no clock was logged."
     )
     restarts: Literal["longest", "split"] = Field(
-        "longest", description="Where the clock starts over: keep the longest run, or make a recording of each."
+        "longest",
+        description="Where the clock starts over: keep the longest run, or make a recording of each.",
     )
 
     @model_validator(mode="after")
     def _is_one_clock(self) -> Self:
         if (self.column is None) == (self.rate_hz is None):
-            raise ValueError("expected either column or rate_hz (rows a second, where no clock was logged)")
+            raise ValueError(
+                "expected either column or rate_hz (rows a second, where no clock was logged)"
+            )
         _refuse_other_units(self.unit, ["time"])
         return self
 
@@ -78,16 +91,23 @@ class ReadingSettings(Settings):
 
     column: str | None = Field(None, description="Name of the column.")
     expression: str | None = Field(
-        None, description='In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".'
+        None,
+        description='In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".',
     )
     unit: str = Field(description="Unit of the readings, after `scale`.")
-    scale: float = Field(1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths.")
+    scale: float = Field(
+        1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths."
+    )
     sign: Literal[1, -1] = Field(1, description="-1 where the log counts the other way.")
     zero: float = Field(
-        0.0, ge=-LARGEST, le=LARGEST, description="What the log says where the joint is at zero, in `unit`."
+        0.0,
+        ge=-LARGEST,
+        le=LARGEST,
+        description="What the log says where the joint is at zero, in `unit`.",
     )
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
-        None, description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1."
+        None,
+        description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1.",
     )
     wraps_at: float | None = Field(
         None,
@@ -103,10 +123,12 @@ class ReadingSettings(Settings):
         description="About what raw reading each log begins at, turns counted, where that is not near `zero`.",
     )
     range: tuple[float, float] | None = Field(
-        None, description="Lowest and highest raw reading to believe; rows with others are left out."
+        None,
+        description="Lowest and highest raw reading to believe; rows with others are left out.",
     )
     time: str | None = Field(
-        None, description="Column with this channel's own time stamps, where it was sampled at other instants."
+        None,
+        description="Column with this channel's own time stamps, where it was sampled at other instants.",
     )
 
     @model_validator(mode="after")
@@ -114,7 +136,9 @@ class ReadingSettings(Settings):
         if (self.column is None) == (self.expression is None):
             raise ValueError("expected either column or expression, one of them")
         if not 1.0 / LARGEST <= abs(self.scale) <= LARGEST:
-            raise ValueError(f"scale: found {self.scale:g}, expected {1.0 / LARGEST:g} to {LARGEST:g} in size")
+            raise ValueError(
+                f"scale: found {self.scale:g}, expected {1.0 / LARGEST:g} to {LARGEST:g} in size"
+            )
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
         if self.begins_at is not None and self.wraps_at is None:
@@ -125,8 +149,12 @@ class ReadingSettings(Settings):
 class ForceSettings(ReadingSettings):
     """One axis of a cuff force sensor."""
 
-    at: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Which cuff.")
-    axis: Literal["x", "y", "z"] = Field(description="x along the segment (distal), y forward, z lateral.")
+    at: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(
+        description="Which cuff."
+    )
+    axis: Literal["x", "y", "z"] = Field(
+        description="x along the segment (distal), y forward, z lateral."
+    )
 
     @field_validator("unit")
     @classmethod
@@ -152,24 +180,34 @@ class JointReadingSettings(ReadingSettings):
     counts_per_turn: float | None = Field(
         None, gt=0.0, le=LARGEST, description="Encoder counts in a turn of what it sits on."
     )
-    counts_per_m: float | None = Field(None, gt=0.0, le=LARGEST, description="Counts in a metre of a linear encoder.")
+    counts_per_m: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="Counts in a metre of a linear encoder."
+    )
     lead_m: float | None = Field(
         None, gt=0.0, le=LARGEST, description="Travel of a prismatic joint for a turn of its screw."
     )
     torque_constant_nm_a: float | None = Field(
         None, gt=0.0, le=LARGEST, description="The motor's torque for its current."
     )
-    force_constant_n_a: float | None = Field(None, gt=0.0, le=LARGEST, description="The same of a linear motor.")
+    force_constant_n_a: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="The same of a linear motor."
+    )
     gain_nm_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Torque for a voltage.")
     gain_n_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Force for a voltage.")
-    rated_torque_nm: float | None = Field(None, gt=0.0, le=LARGEST, description="What 100 % or 1000 permille are.")
-    rated_force_n: float | None = Field(None, gt=0.0, le=LARGEST, description="The same of a linear motor.")
+    rated_torque_nm: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="What 100 % or 1000 permille are."
+    )
+    rated_force_n: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="The same of a linear motor."
+    )
 
     def gain(self, target: str) -> float:
         """Return what a reading in SI is multiplied by to be what it is at the joint."""
         unit = unit_named(self.unit)
         assert unit is not None, "was looked at with the joint"
-        given = {key: value for key in transmission.KEYS if (value := getattr(self, key)) is not None}
+        given = {
+            key: value for key in transmission.KEYS if (value := getattr(self, key)) is not None
+        }
         return transmission.gain(unit.dimension, target, given, self.gear_ratio)
 
 
@@ -184,12 +222,20 @@ class JointSettings(Settings):
         None,
         description="Column that is 0 (false) while the drive is off; rows whose torque so says nothing are left out.",
     )
-    angle: JointReadingSettings = Field(description="Measured angle, or position of a prismatic joint.")
-    torque: JointReadingSettings = Field(description="What the drive delivers at the joint: torque, or force.")
+    angle: JointReadingSettings = Field(
+        description="Measured angle, or position of a prismatic joint."
+    )
+    torque: JointReadingSettings = Field(
+        description="What the drive delivers at the joint: torque, or force."
+    )
     reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
-    velocity: JointReadingSettings | None = Field(None, description="The drive's own velocity estimate.")
+    velocity: JointReadingSettings | None = Field(
+        None, description="The drive's own velocity estimate."
+    )
     current: JointReadingSettings | None = Field(None, description="Motor current.")
-    temperature: JointReadingSettings | None = Field(None, description="Temperature of drive or motor.")
+    temperature: JointReadingSettings | None = Field(
+        None, description="Temperature of drive or motor."
+    )
 
     @model_validator(mode="after")
     def _units_lead_to_the_joint(self) -> Self:
@@ -223,15 +269,24 @@ class RecordingSettings(Settings):
         description="Its name; {file} is the source's, without its ending, and {folder} that of the folder it lies in.",
     )
     files: str = Field(
-        "*", description='Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".'
+        "*",
+        description='Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".',
     )
-    purpose: Literal["train", "validate"] = Field(description="To be fitted to, or to be judged on.")
+    purpose: Literal["train", "validate"] = Field(
+        description="To be fitted to, or to be judged on."
+    )
     run: Literal["exo_alone", "with_human"] = Field(
         "exo_alone", description="exo_alone is any machine with nobody in it."
     )
-    span_s: tuple[float, float] | None = Field(None, description="Seconds of the run to take, from its start.")
-    span: tuple[Fraction, Fraction] | None = Field(None, description="The same as a share of the run, 0 to 1.")
-    period_s: float | None = Field(None, gt=0.0, description="Period of the excitation, where it repeats.")
+    span_s: tuple[float, float] | None = Field(
+        None, description="Seconds of the run to take, from its start."
+    )
+    span: tuple[Fraction, Fraction] | None = Field(
+        None, description="The same as a share of the run, 0 to 1."
+    )
+    period_s: float | None = Field(
+        None, gt=0.0, description="Period of the excitation, where it repeats."
+    )
     subject: str | None = Field(None, description="Who was in the machine.")
     session: str | None = Field(None, description="Of which session it is.")
 
@@ -244,7 +299,9 @@ class RecordingSettings(Settings):
                 '/ \\ : * ? " < > |; -o names the folder'
             )
         if strange := set(re.findall(r"\{(.*?)\}", name)) - NAMED_AFTER:
-            raise ValueError(f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or {{purpose}}")
+            raise ValueError(
+                f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or {{purpose}}"
+            )
         return name
 
     @model_validator(mode="after")
@@ -258,8 +315,13 @@ class RecordingSettings(Settings):
         return self
 
     def is_of(self, file: Path) -> bool:
-        """Tell whether it is to be made of a file: a pattern with folders is that of the end of its path."""
-        return file.absolute().match(self.files) if "/" in self.files else fnmatch(file.name, self.files)
+        """Tell whether it is to be made of a file: a pattern with folders is that of the end of its
+        path."""
+        return (
+            file.absolute().match(self.files)
+            if "/" in self.files
+            else fnmatch(file.name, self.files)
+        )
 
     def name_of(self, file: Path) -> str:
         """Return the name of the recording that is made of a file."""
@@ -294,7 +356,9 @@ class ImportMap(Settings):
                 raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
         for target, times in Counter(force.target for force in self.force).items():
             if times > 1:
-                raise ValueError(f"force: found {target} twice, expected each axis of a cuff once; remove one")
+                raise ValueError(
+                    f"force: found {target} twice, expected each axis of a cuff once; remove one"
+                )
         owners: dict[str, str] = {}
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:

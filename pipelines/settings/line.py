@@ -1,4 +1,5 @@
-"""A line: the connection that one device or several share, by TCP, RTU on a serial port, RTU over TCP or TLS."""
+"""A line: the connection that one device or several share, by TCP, RTU on a serial port, RTU over
+TCP or TLS."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +11,8 @@ from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
 
 FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
-"""Above this rate the silence between two RTU frames is a fixed time, no longer 3.5 characters ("Modbus over serial
-line specification and implementation guide" V1.02, 2.5.1.1)."""
+"""Above this rate the silence between two RTU frames is a fixed time, no longer 3.5 characters
+("Modbus over serial line specification and implementation guide" V1.02, 2.5.1.1)."""
 
 
 class Line(Settings):
@@ -33,9 +34,15 @@ class Line(Settings):
 class NetworkLine(Line):
     """A line to a host."""
 
-    host: str = Field("127.0.0.1", description="Name or address; an embedded rig is always on this machine.")
-    port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one.")
-    silence_s: float = Field(0.0, ge=0.0, description="Quiet time before each request, for a gateway that needs it.")
+    host: str = Field(
+        "127.0.0.1", description="Name or address; an embedded rig is always on this machine."
+    )
+    port: int = Field(
+        502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
+    )
+    silence_s: float = Field(
+        0.0, ge=0.0, description="Quiet time before each request, for a gateway that needs it."
+    )
 
     @property
     def place(self) -> str:
@@ -53,7 +60,8 @@ class NetworkLine(Line):
         return self.silence_s
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time that a request and its reply take, s; what a network takes is not known."""
+        """Return the least time that a request and its reply take, s; what a network takes is not
+        known."""
         return self.quiet_s
 
 
@@ -74,9 +82,15 @@ class TlsLine(NetworkLine):
     """Modbus TCP Security: the same frames, encrypted, between peers that show certificates."""
 
     transport: Literal["tls"]
-    port: int = Field(802, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one.")
-    ca: Path | None = Field(None, description="Certificates that the device's is checked with; else the system's.")
-    certificate: Path | None = Field(None, description="What exoid shows a device that asks who it is.")
+    port: int = Field(
+        802, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
+    )
+    ca: Path | None = Field(
+        None, description="Certificates that the device's is checked with; else the system's."
+    )
+    certificate: Path | None = Field(
+        None, description="What exoid shows a device that asks who it is."
+    )
     key: Path | None = Field(None, description="The key to it, without a passphrase.")
     rig_certificate: Path | None = Field(None, description="What a virtual rig shows.")
     rig_key: Path | None = Field(None, description="The key to that.")
@@ -96,7 +110,8 @@ class TlsLine(NetworkLine):
 
 
 def refuse_passphrase(key: Path | None) -> Callable[[], str]:
-    """Return what refuses a key that wants a passphrase: whoever asked for one would hold up a moving leg."""
+    """Return what refuses a key that wants a passphrase: whoever asked for one would hold up a
+    moving leg."""
 
     def refuse() -> str:
         raise SettingsError(
@@ -112,12 +127,18 @@ class RtuLine(Line):
 
     tells_replies_apart = False
     transport: Literal["rtu"]
-    serial_port: str = Field(min_length=1, description="Path of the port, best one below /dev/serial/by-id.")
+    serial_port: str = Field(
+        min_length=1, description="Path of the port, best one below /dev/serial/by-id."
+    )
     baud_rate: int = Field(19200, ge=300, description="Bits a second.")
     parity: Literal["even", "odd", "none"] = Field("even", description="Parity bit.")
-    stop_bits: Literal[1, 2] = Field(1, description="Stop bits; 2 where there is no parity, as the standard has it.")
+    stop_bits: Literal[1, 2] = Field(
+        1, description="Stop bits; 2 where there is no parity, as the standard has it."
+    )
     silence_s: float | None = Field(
-        None, ge=0.0, description="Quiet time before each frame; else the standard's, 3.5 characters or 1.75 ms."
+        None,
+        ge=0.0,
+        description="Quiet time before each frame; else the standard's, 3.5 characters or 1.75 ms.",
     )
 
     @property
@@ -143,8 +164,11 @@ class RtuLine(Line):
         return 3.5 * self.character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time that a request and its reply take, ``characters`` long together, s."""
+        """Return the least time that a request and its reply take, ``characters`` long together,
+        s."""
         return characters * self.character_s + 2 * self.quiet_s
 
 
-LineSettings = Annotated[TcpLine | RtuLine | RtuOverTcpLine | TlsLine, Field(discriminator="transport")]
+LineSettings = Annotated[
+    TcpLine | RtuLine | RtuOverTcpLine | TlsLine, Field(discriminator="transport")
+]

@@ -1,6 +1,7 @@
 """The page docs/import-map.md, written from the map's settings themselves.
 
-``python -m pipelines.settings.map_reference > docs/import-map.md`` brings it up to date; a test says when it is not.
+``python -m pipelines.settings.map_reference > docs/import-map.md`` brings it up to date; a test
+says when it is not.
 """
 
 from pydantic import BaseModel
@@ -39,7 +40,9 @@ def _units() -> str:
         for dimension in dimensions
     ]
     also = ", ".join(f"`{alias}` for `{name}`" for alias, name in ALIASES.items())
-    return "## Units\n\n| of | written |\n|---|---|\n" + "\n".join(rows) + f"\n\nAlso known: {also}."
+    return (
+        "## Units\n\n| of | written |\n|---|---|\n" + "\n".join(rows) + f"\n\nAlso known: {also}."
+    )
 
 
 def _drive_trains() -> str:
@@ -47,7 +50,9 @@ def _drive_trains() -> str:
     dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
     rows = [
         f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} | {_geared(target)} |"
-        for target in dict.fromkeys(target for kinds in TARGETS.values() for target in kinds.values())
+        for target in dict.fromkeys(
+            target for kinds in TARGETS.values() for target in kinds.values()
+        )
         for source in dimensions
         for way in paths(source, target)
         if way

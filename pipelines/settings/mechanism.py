@@ -1,4 +1,5 @@
-"""``[mechanism]``: which mechanism the machine is, and its geometry where a recording does not say its own."""
+"""``[mechanism]``: which mechanism the machine is, and its geometry where a recording does not say
+its own."""
 
 from typing import Self
 
@@ -17,7 +18,9 @@ USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
 class JointSettings(Settings):
     """One joint."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$", description="As columns of files begin with it.")
+    name: str = Field(
+        pattern=r"^[a-z][a-z0-9_]*$", description="As columns of files begin with it."
+    )
     kind: Kind = Field("revolute", description='"revolute" or "prismatic".')
 
 
@@ -50,7 +53,8 @@ class MechanismSettings(Settings):
 
     @model_validator(mode="after")
     def _joints_are_given(self) -> Self:
-        """Whether they make the mechanism is for those to say who know all there are (``mechanics/read.py``)."""
+        """Whether they make the mechanism is for those to say who know all there are
+        (``mechanics/read.py``)."""
         if not self.joints and self.name not in USUAL_JOINTS:
             raise ValueError(
                 f"name: found {self.name!r} without joints, which only {' and '.join(USUAL_JOINTS)} may leave out; "
@@ -77,7 +81,9 @@ class MechanismSettings(Settings):
     @property
     def all_joints(self) -> tuple[Joint, ...]:
         """Those that are given, else the usual ones."""
-        return tuple(Joint(joint.name, joint.kind) for joint in self.joints) or USUAL_JOINTS[self.name]
+        return (
+            tuple(Joint(joint.name, joint.kind) for joint in self.joints) or USUAL_JOINTS[self.name]
+        )
 
     @property
     def kinds(self) -> tuple[Kind, ...]:

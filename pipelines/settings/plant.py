@@ -1,4 +1,5 @@
-"""``[plant]`` of a virtual rig: machine, person, and what disturbs the measurement. Pairs are hip, knee."""
+"""``[plant]`` of a virtual rig: machine, person, and what disturbs the measurement. Pairs are hip,
+knee."""
 
 from typing import Literal
 
@@ -15,19 +16,29 @@ class PlantEffect(Settings):
     """An effect that the plant has."""
 
     effect: str = Field(description="Its name, as `exoid effects` lists it.")
-    joint: Literal["hip", "knee"] | None = Field(None, description="The joint it acts at; none for the whole leg.")
+    joint: Literal["hip", "knee"] | None = Field(
+        None, description="The joint it acts at; none for the whole leg."
+    )
     values: dict[str, float] = Field(description="Its parameters by name.")
 
 
 class CuffSettings(Settings):
     """How the leg hangs in its cuffs, and how well that is measured."""
 
-    carried_share: float = Field(0.2, ge=0.0, le=1.0, description="Share of the limb's weight carried along it.")
+    carried_share: float = Field(
+        0.2, ge=0.0, le=1.0, description="Share of the limb's weight carried along it."
+    )
     thigh_weight_n: float = Field(90.0, ge=0.0, description="Weight of the person's thigh.")
-    shank_weight_n: float = Field(50.0, ge=0.0, description="Weight of the person's shank and foot.")
-    preload_n: float = Field(15.0, ge=0.0, description="Force with which front and back squeeze the limb.")
+    shank_weight_n: float = Field(
+        50.0, ge=0.0, description="Weight of the person's shank and foot."
+    )
+    preload_n: float = Field(
+        15.0, ge=0.0, description="Force with which front and back squeeze the limb."
+    )
     noise_n: float = Field(0.5, ge=0.0, description="RMS of each axis' noise.")
-    zero_n: float = Field(0.0, ge=0.0, description="Standard deviation of the axes' zero errors, constant for a rig.")
+    zero_n: float = Field(
+        0.0, ge=0.0, description="Standard deviation of the axes' zero errors, constant for a rig."
+    )
 
 
 class TemperatureSettings(Settings):
@@ -41,40 +52,69 @@ class TemperatureSettings(Settings):
 class PlantSettings(Settings):
     """The machine behind a virtual rig's registers."""
 
-    exo_inertial: Four = Field((1.0, 0.22, 0.55, 2.3), description="X1..X4 of the empty exoskeleton.")
-    human_inertial: Four = Field((1.6, 0.41, 1.23, 3.4), description="X1..X4 of the person's own leg.")
+    exo_inertial: Four = Field(
+        (1.0, 0.22, 0.55, 2.3), description="X1..X4 of the empty exoskeleton."
+    )
+    human_inertial: Four = Field(
+        (1.6, 0.41, 1.23, 3.4), description="X1..X4 of the person's own leg."
+    )
     coulomb_nm: Pair = Field((2.66, 4.72), description="Coulomb friction.")
     viscous_nm_s_rad: Pair = Field((4.15, 7.36), description="Viscous friction.")
     effects: tuple[PlantEffect, ...] = Field((), description="What else the plant has, openly.")
     sealed: str | None = Field(
-        None, description="File with effects that only the rig reads, relative to this one; see docs/rig.md."
+        None,
+        description="File with effects that only the rig reads, relative to this one; see docs/rig.md.",
     )
-    thigh_length_m: float = Field(0.38952, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis.")
-    gravity_m_s2: float = Field(9.8, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
+    thigh_length_m: float = Field(
+        0.38952, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis."
+    )
+    gravity_m_s2: float = Field(
+        9.8, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity."
+    )
     thigh_cuff_distance_m: float = Field(0.25, gt=0.0, description="Hip axis to thigh cuff.")
     shank_cuff_distance_m: float = Field(0.22, gt=0.0, description="Knee axis to shank cuff.")
     rest_rad: Pair = Field((0.0, 0.0), description="Where the leg hangs before a run.")
-    sample_rate_hz: float = Field(200.0, gt=0.0, description="Samples a second that the devices latch.")
-    heartbeat_s: float | None = Field(
-        None, gt=0.0, description="How long a drive may be told nothing before it slows down and disables itself."
+    sample_rate_hz: float = Field(
+        200.0, gt=0.0, description="Samples a second that the devices latch."
     )
-    clock_ppm: Pair = Field((0.0, 0.0), description="How much faster than the host's each drive's clock runs.")
-    clock_offset_s: Pair = Field((0.0, 0.0), description="What each drive's clock says at the start.")
+    heartbeat_s: float | None = Field(
+        None,
+        gt=0.0,
+        description="How long a drive may be told nothing before it slows down and disables itself.",
+    )
+    clock_ppm: Pair = Field(
+        (0.0, 0.0), description="How much faster than the host's each drive's clock runs."
+    )
+    clock_offset_s: Pair = Field(
+        (0.0, 0.0), description="What each drive's clock says at the start."
+    )
     drive_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the drives' position loops.")
     kp_nm_rad: Pair = Field((1500.0, 600.0), description="Stiffness of the position loops.")
     kd_nm_s_rad: Pair = Field((120.0, 40.0), description="Damping of the position loops.")
     limit_nm: Pair = Field((200.0, 200.0), description="Torque at which the drives saturate.")
-    counts_per_turn: Pair = Field((400000.0, 400000.0), description="Encoder counts per turn of the joint; 0: ideal.")
+    counts_per_turn: Pair = Field(
+        (400000.0, 400000.0), description="Encoder counts per turn of the joint; 0: ideal."
+    )
     ripple_nm: Pair = Field((0.6, 0.4), description="RMS of the error of the measured torque.")
-    ripple_correlation_s: float = Field(0.02, ge=0.0, description="Time over which that error resembles itself.")
+    ripple_correlation_s: float = Field(
+        0.02, ge=0.0, description="Time over which that error resembles itself."
+    )
     cuff: CuffSettings = Field(CuffSettings(), description="The cuffs.")
     temperature: TemperatureSettings = Field(TemperatureSettings(), description="The motors.")
-    seed: int = Field(0, ge=0, description="Of what is constant for this rig, such as its sensors' zeros.")
+    seed: int = Field(
+        0, ge=0, description="Of what is constant for this rig, such as its sensors' zeros."
+    )
 
     def controllers(self) -> dict[str, dict]:
         """Return the drives' loops as a recording's metadata tell them, by joint."""
         pairs = zip(("hip", "knee"), self.kp_nm_rad, self.kd_nm_s_rad, self.limit_nm, strict=True)
         return {
-            joint: {"type": "pd", "kp_nm_rad": kp, "kd_nm_s_rad": kd, "rate_hz": self.drive_rate_hz, "limit_nm": limit}
+            joint: {
+                "type": "pd",
+                "kp_nm_rad": kp,
+                "kd_nm_s_rad": kd,
+                "rate_hz": self.drive_rate_hz,
+                "limit_nm": limit,
+            }
             for joint, kp, kd, limit in pairs
         }

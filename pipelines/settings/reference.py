@@ -1,6 +1,7 @@
 """The page docs/settings.md, written from the settings themselves.
 
-``python -m pipelines.settings.reference > docs/settings.md`` brings it up to date; a test says when it is not.
+``python -m pipelines.settings.reference > docs/settings.md`` brings it up to date; a test says when
+it is not.
 """
 
 import json

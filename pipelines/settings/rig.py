@@ -1,6 +1,7 @@
 """A rig file: the devices of a rig, how to read and drive them, what they must never do.
 
-A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage but the rig itself reads that.
+A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage but the rig itself
+reads that.
 """
 
 from collections import Counter
@@ -17,8 +18,19 @@ from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M, refuse_a
 from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
 
-RegisterType = Literal["int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"]
-REGISTERS = {"int16": 1, "uint16": 1, "int32": 2, "uint32": 2, "int64": 4, "uint64": 4, "float32": 2, "float64": 4}
+RegisterType = Literal[
+    "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
+]
+REGISTERS = {
+    "int16": 1,
+    "uint16": 1,
+    "int32": 2,
+    "uint32": 2,
+    "int64": 4,
+    "uint64": 4,
+    "float32": 2,
+    "float64": 4,
+}
 """Registers of 16 bits that a value takes."""
 
 UNITS = {
@@ -47,7 +59,8 @@ LONGEST_RAMP_S = 60.0
 """Longest way from rest into a motion, s."""
 
 MOST_EVERY = 1000
-"""Cycles from one reading of a sensor to the next: at 1000 cycles a second as long as the longest watchdog waits."""
+"""Cycles from one reading of a sensor to the next: at 1000 cycles a second as long as the longest
+watchdog waits."""
 
 MOST_QUEUED = 31
 """Registers that one FC24 answer carries."""
@@ -56,10 +69,16 @@ MOST_QUEUED = 31
 class Register(Settings):
     """Where a value lies and what its bits mean: value = raw x scale + offset, in ``unit``."""
 
-    address: int = Field(ge=0, le=65535, description="Address of its first register, counted from 0.")
+    address: int = Field(
+        ge=0, le=65535, description="Address of its first register, counted from 0."
+    )
     type: RegisterType = Field(description="How the bits are to be read.")
-    word_order: Literal["big", "little"] = Field("big", description="Which half of a long value comes first.")
-    byte_order: Literal["big", "little"] = Field("big", description="Which half of each register comes first.")
+    word_order: Literal["big", "little"] = Field(
+        "big", description="Which half of a long value comes first."
+    )
+    byte_order: Literal["big", "little"] = Field(
+        "big", description="Which half of each register comes first."
+    )
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
     offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")
@@ -67,9 +86,13 @@ class Register(Settings):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         if self.scale == 0.0:
-            raise ValueError("scale: found 0, expected units per count; every value would be the offset")
+            raise ValueError(
+                "scale: found 0, expected units per count; every value would be the offset"
+            )
         if self.address + self.registers > 65536:
-            raise ValueError(f"address: found {self.address}, but a {self.type} there ends beyond address 65535")
+            raise ValueError(
+                f"address: found {self.address}, but a {self.type} there ends beyond address 65535"
+            )
         return self
 
     @property
@@ -93,7 +116,11 @@ class Register(Settings):
         if self.type.startswith("float"):
             return None
         bits = 16 * self.registers
-        return (0, 2**bits - 1) if self.type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        return (
+            (0, 2**bits - 1)
+            if self.type.startswith("u")
+            else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        )
 
     @property
     def span(self) -> tuple[float, float]:
@@ -108,7 +135,8 @@ class Register(Settings):
         """Tell whether it can hold every SI value from ``low`` to ``high``."""
         scale, offset = self.si
         return self.counts is None or all(
-            self.counts[0] <= round((value - offset) / scale) <= self.counts[1] for value in (low, high)
+            self.counts[0] <= round((value - offset) / scale) <= self.counts[1]
+            for value in (low, high)
         )
 
 
@@ -125,11 +153,15 @@ class DriveRead(Settings):
     sequence: Register = Field(description="Sample counter.")
     time: Register = Field(description="The device's clock at the sample.")
     angle: Register = Field(description="Joint angle.")
-    current: Register = Field(description="Motor current, positive where it pushes the angle upward.")
+    current: Register = Field(
+        description="Motor current, positive where it pushes the angle upward."
+    )
     velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
     temperature: Register | None = Field(None, description="Drive or motor temperature.")
     status: Register | None = Field(None, description="Status word.")
-    reference: Register | None = Field(None, description="Set-point that was in force; else what exoid sent is kept.")
+    reference: Register | None = Field(
+        None, description="Set-point that was in force; else what exoid sent is kept."
+    )
 
 
 class DriveWrite(Settings):
@@ -137,7 +169,9 @@ class DriveWrite(Settings):
 
     reference: Register = Field(description="Set-point angle, to be reached within one sample.")
     control: Register = Field(description="Control word.")
-    heartbeat: Register | None = Field(None, description="Counts up with every write: the host lives.")
+    heartbeat: Register | None = Field(
+        None, description="Counts up with every write: the host lives."
+    )
 
 
 class RingRecord(Settings):
@@ -146,25 +180,44 @@ class RingRecord(Settings):
     sequence: Register = Field(description="Sample counter, which counts as read.sequence does.")
     time: Register = Field(description="The device's clock at the sample.")
     angle: Register = Field(description="Joint angle.")
-    current: Register = Field(description="Motor current, positive where it pushes the angle upward.")
+    current: Register = Field(
+        description="Motor current, positive where it pushes the angle upward."
+    )
     velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
-    reference: Register | None = Field(None, description="Set-point in force; left out, recordings hold none.")
+    reference: Register | None = Field(
+        None, description="Set-point in force; left out, recordings hold none."
+    )
 
 
 class RingSettings(Settings):
-    """A drive's own record of its latest samples: a ring of registers read by FC03, or a queue read by FC24."""
+    """A drive's own record of its latest samples: a ring of registers read by FC03, or a queue read
+    by FC24."""
 
-    newest: Register | None = Field(None, description="Of a ring: sequence number of the newest whole record.")
-    address: int | None = Field(None, ge=0, le=65535, description="Of a ring: where the record with number 0 begins.")
-    capacity: int | None = Field(None, ge=2, description="Of a ring: records in it; record n is the (n mod it)-th.")
-    fifo: int | None = Field(None, ge=0, le=65535, description="Of a queue: the address that FC24 asks for.")
-    words: int = Field(ge=1, le=MOST_REGISTERS["read"], description="Registers of 16 bits from one record to the next.")
+    newest: Register | None = Field(
+        None, description="Of a ring: sequence number of the newest whole record."
+    )
+    address: int | None = Field(
+        None, ge=0, le=65535, description="Of a ring: where the record with number 0 begins."
+    )
+    capacity: int | None = Field(
+        None, ge=2, description="Of a ring: records in it; record n is the (n mod it)-th."
+    )
+    fifo: int | None = Field(
+        None, ge=0, le=65535, description="Of a queue: the address that FC24 asks for."
+    )
+    words: int = Field(
+        ge=1,
+        le=MOST_REGISTERS["read"],
+        description="Registers of 16 bits from one record to the next.",
+    )
     record: RingRecord = Field(description="What a record holds.")
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         _refuse_bad_block(self.record, "record")
-        found = {name for name in ("newest", "address", "capacity") if getattr(self, name) is not None}
+        found = {
+            name for name in ("newest", "address", "capacity") if getattr(self, name) is not None
+        }
         if (self.fifo is None) != (len(found) == 3) or (self.fifo is not None and found):
             found |= set() if self.fifo is None else {"fifo"}
             raise ValueError(
@@ -173,9 +226,13 @@ class RingSettings(Settings):
             )
         length = max(r.address + r.registers for r in registers_of(self.record).values())
         if length > self.words:
-            raise ValueError(f"words: found {self.words}, but the record's registers take {length}; correct one")
+            raise ValueError(
+                f"words: found {self.words}, but the record's registers take {length}; correct one"
+            )
         if self.fifo is not None and self.words > MOST_QUEUED:
-            raise ValueError(f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer carries")
+            raise ValueError(
+                f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer carries"
+            )
         if self.newest is not None:
             _refuse_what_does_not_count(self.newest, "newest")
             self._refuse_bad_ring(self.newest)
@@ -190,9 +247,13 @@ class RingSettings(Settings):
         assert self.address is not None and self.capacity is not None  # a ring has all three
         end = self.address + self.capacity * self.words
         if end > 65536:
-            raise ValueError(f"capacity: found {self.capacity}, but such a ring ends beyond address 65535; lower it")
+            raise ValueError(
+                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535; lower it"
+            )
         if self.address <= newest.address < end:
-            raise ValueError(f"newest: register {newest.address} is part of the ring itself; correct one address")
+            raise ValueError(
+                f"newest: register {newest.address} is part of the ring itself; correct one address"
+            )
         for name, register in (("newest", newest), ("record.sequence", self.record.sequence)):
             span = 2 ** (16 * register.registers)
             # Else records would change places when the counter begins anew.
@@ -204,7 +265,8 @@ class RingSettings(Settings):
 
 
 class SensorRead(Settings):
-    """What a 3-axis force sensor tells; read in one block. Axes are those of the segment, see docs/contracts.md."""
+    """What a 3-axis force sensor tells; read in one block. Axes are those of the segment, see
+    docs/contracts.md."""
 
     sequence: Register = Field(description="Sample counter.")
     force_x: Register = Field(description="Force along the segment (distal).")
@@ -215,7 +277,9 @@ class SensorRead(Settings):
 class DriveMap(Settings):
     """Register map of a make of drives."""
 
-    identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
+    identity: tuple[Identity, ...] = Field(
+        (), description="What tells the right device from a wrong one."
+    )
     read: DriveRead = Field(description="Block that is read.")
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     own_scale: bool = Field(
@@ -225,15 +289,26 @@ class DriveMap(Settings):
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
-    halt: int | None = Field(None, description="Control word that holds the leg where a stop has led it; else enable.")
-    fault_reset: int | None = Field(None, description="Control word that clears a fault, for --reset-faults.")
-    fault_mask: int = Field(0, ge=0, description="Bits of the status word that mean a fault; 0 for none.")
-    faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
-        default_factory=dict, description="What a fault bit means, by its number; bit 0 is the lowest."
+    halt: int | None = Field(
+        None, description="Control word that holds the leg where a stop has led it; else enable."
     )
-    enabled_mask: int = Field(0, ge=0, description="Bits of the status word that tell whether it is enabled; 0: none.")
+    fault_reset: int | None = Field(
+        None, description="Control word that clears a fault, for --reset-faults."
+    )
+    fault_mask: int = Field(
+        0, ge=0, description="Bits of the status word that mean a fault; 0 for none."
+    )
+    faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
+        default_factory=dict,
+        description="What a fault bit means, by its number; bit 0 is the lowest.",
+    )
+    enabled_mask: int = Field(
+        0, ge=0, description="Bits of the status word that tell whether it is enabled; 0: none."
+    )
     enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
-    ring: RingSettings | None = Field(None, description="The drive's own record of its latest samples, if it has one.")
+    ring: RingSettings | None = Field(
+        None, description="The drive's own record of its latest samples, if it has one."
+    )
 
     @model_validator(mode="after")
     def _blocks_are_possible(self) -> Self:
@@ -242,7 +317,9 @@ class DriveMap(Settings):
         _refuse_gap(self.write, "write")
         for name in ("fault_mask", "enabled_mask"):
             if getattr(self, name) and self.read.status is None:
-                raise ValueError(f"{name}: needs a status register; add read.status or leave the mask out")
+                raise ValueError(
+                    f"{name}: needs a status register; add read.status or leave the mask out"
+                )
         for bit in self.faults:
             if not self.fault_mask >> bit & 1:
                 raise ValueError(
@@ -255,7 +332,11 @@ class DriveMap(Settings):
                 f"0x{self.enabled_mask:04X} only; correct one of them"
             )
         self._refuse_bits_that_tell_nothing()
-        counters = {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence} if self.ring else {}
+        counters = (
+            {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence}
+            if self.ring
+            else {}
+        )
         for name, counter in counters.items():
             if counter and counter.type != self.read.sequence.type:
                 raise ValueError(
@@ -265,7 +346,8 @@ class DriveMap(Settings):
         return self
 
     def _refuse_bits_that_tell_nothing(self) -> None:
-        """Refuse bits by which an enabled drive is not told from a disabled one, or from one with a fault."""
+        """Refuse bits by which an enabled drive is not told from a disabled one, or from one with a
+        fault."""
         if self.enabled_mask and "enabled_value" not in self.model_fields_set:
             raise ValueError(
                 f"enabled_value: missing beside enabled_mask 0x{self.enabled_mask:04X}, expected what these bits are "
@@ -289,7 +371,9 @@ class DriveMap(Settings):
         for word, times in Counter(word for word in words.values() if word is not None).items():
             if times > 1:
                 same = " and ".join(name for name, value in words.items() if value == word)
-                raise ValueError(f"{same}: both are 0x{word:04X}, expected different control words; correct one")
+                raise ValueError(
+                    f"{same}: both are 0x{word:04X}, expected different control words; correct one"
+                )
         return self
 
     @model_validator(mode="after")
@@ -309,13 +393,20 @@ class DriveMap(Settings):
                 )
             for key, value in told.items():
                 if value is not None and not register.holds(value, value):
-                    raise ValueError(f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of them")
+                    raise ValueError(
+                        f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of them"
+                    )
         return self
 
     def told_faults(self, status: int) -> str:
-        """Return the fault bits of a status word, and their names as far as they have any; nothing without a fault."""
+        """Return the fault bits of a status word, and their names as far as they have any; nothing
+        without a fault."""
         found = status & self.fault_mask
-        names = [self.faults.get(bit, f"bit {bit}") for bit in range(found.bit_length()) if found >> bit & 1]
+        names = [
+            self.faults.get(bit, f"bit {bit}")
+            for bit in range(found.bit_length())
+            if found >> bit & 1
+        ]
         if not found:
             return ""
         return f"0x{found:04X}" + (f": {', '.join(names)}" if self.faults else "")
@@ -324,7 +415,9 @@ class DriveMap(Settings):
 class SensorMap(Settings):
     """Register map of a make of force sensors."""
 
-    identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
+    identity: tuple[Identity, ...] = Field(
+        (), description="What tells the right device from a wrong one."
+    )
     read: SensorRead = Field(description="Block that is read.")
 
     @model_validator(mode="after")
@@ -343,7 +436,9 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
     for quantity, register in registers.items():
         if register.unit not in DIMENSION[quantity]:
             allowed = " or ".join(DIMENSION[quantity])
-            raise ValueError(f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the unit")
+            raise ValueError(
+                f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the unit"
+            )
     for quantity in ("sequence", "heartbeat"):
         if quantity in registers:
             _refuse_what_does_not_count(registers[quantity], f"{name}.{quantity}")
@@ -368,7 +463,8 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
 
 
 def _refuse_what_does_not_count(register: Register, name: str) -> None:
-    """Refuse a counter whose raw value is not the count: where it begins anew would be anybody's guess."""
+    """Refuse a counter whose raw value is not the count: where it begins anew would be anybody's
+    guess."""
     if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset {register.offset:g}, expected "
@@ -378,7 +474,9 @@ def _refuse_what_does_not_count(register: Register, name: str) -> None:
 
 def _refuse_gap(block: Settings, name: str) -> None:
     """Refuse a block with registers that nobody named: writing it would put something into them."""
-    named = {a for r in registers_of(block).values() for a in range(r.address, r.address + r.registers)}
+    named = {
+        a for r in registers_of(block).values() for a in range(r.address, r.address + r.registers)
+    }
     if nameless := sorted(set(range(min(named), max(named))) - named):
         raise ValueError(
             f"{name}: names nothing at register {nameless[0]} between {min(named)} and {max(named)}, expected a block "
@@ -394,15 +492,23 @@ def _refuse_looser(settings: "DriveSettings | SafetySettings", *names: str) -> N
     for name in names:
         found, allowed = getattr(settings.with_human, name), getattr(settings, name)
         if found is not None and found > allowed:
-            raise ValueError(f"with_human.{name}: found {found:g}, expected at most {name} ({allowed:g}); {TIGHTER}")
+            raise ValueError(
+                f"with_human.{name}: found {found:g}, expected at most {name} ({allowed:g}); {TIGHTER}"
+            )
 
 
 class DeviceSettings(Settings):
     """Where a device is found."""
 
-    line: str | None = Field(None, description="The line it is on, a table below [line]; else one of its own by TCP.")
-    host: str = Field("127.0.0.1", description="Name or address; an embedded rig is always on this machine.")
-    port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one.")
+    line: str | None = Field(
+        None, description="The line it is on, a table below [line]; else one of its own by TCP."
+    )
+    host: str = Field(
+        "127.0.0.1", description="Name or address; an embedded rig is always on this machine."
+    )
+    port: int = Field(
+        502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
+    )
     unit: int = Field(1, ge=1, le=247, description="Modbus unit id.")
     map: str = Field(description="Its register map, a table below [map].")
 
@@ -421,14 +527,20 @@ class HumanDriveSettings(Settings):
 
     angle_rad: tuple[float, float] | None = Field(None, description="Lowest and highest angle.")
     speed_rad_s: float | None = Field(None, gt=0.0, description="Highest speed, either way.")
-    torque_nm: float | None = Field(None, gt=0.0, description="Highest torque at the joint, either way.")
+    torque_nm: float | None = Field(
+        None, gt=0.0, description="Highest torque at the joint, either way."
+    )
 
 
 class HumanSafetySettings(Settings):
     """What stops a run with somebody in the machine; what is left out is as without."""
 
-    cuff_force_n: float | None = Field(None, gt=0.0, description="Highest force on any axis of any cuff sensor.")
-    following_error_rad: float | None = Field(None, gt=0.0, description="Farthest an angle may be from its set-point.")
+    cuff_force_n: float | None = Field(
+        None, gt=0.0, description="Highest force on any axis of any cuff sensor."
+    )
+    following_error_rad: float | None = Field(
+        None, gt=0.0, description="Farthest an angle may be from its set-point."
+    )
 
 
 class DriveSettings(DeviceSettings):
@@ -440,13 +552,17 @@ class DriveSettings(DeviceSettings):
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
     speed_rad_s: float = Field(gt=0.0, description="Highest speed, either way.")
     torque_nm: float = Field(gt=0.0, description="Highest torque at the joint, either way.")
-    with_human: HumanDriveSettings = Field(HumanDriveSettings(), description="Tighter limits of runs with_human.")
+    with_human: HumanDriveSettings = Field(
+        HumanDriveSettings(), description="Tighter limits of runs with_human."
+    )
 
     @model_validator(mode="after")
     def _low_is_below_high(self) -> Self:
         for low, high in (self.angle_rad, self.with_human.angle_rad or self.angle_rad):
             if low >= high:
-                raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+                raise ValueError(
+                    f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them"
+                )
         return self
 
     @model_validator(mode="after")
@@ -469,7 +585,9 @@ class DriveSettings(DeviceSettings):
 class SensorSettings(DeviceSettings):
     """A cuff force sensor."""
 
-    cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Where it sits.")
+    cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(
+        description="Where it sits."
+    )
     every: int = Field(
         1,
         ge=1,
@@ -492,31 +610,63 @@ class ControllerSettings(Settings):
 class GeometrySettings(Settings):
     """Lengths of the leg in this rig; what is left out comes from exoid.toml."""
 
-    thigh_length_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis.")
-    gravity_m_s2: float | None = Field(None, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
-    thigh_cuff_distance_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to thigh cuff.")
-    shank_cuff_distance_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Knee axis to shank cuff.")
+    thigh_length_m: float | None = Field(
+        None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis."
+    )
+    gravity_m_s2: float | None = Field(
+        None, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity."
+    )
+    thigh_cuff_distance_m: float | None = Field(
+        None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to thigh cuff."
+    )
+    shank_cuff_distance_m: float | None = Field(
+        None, gt=0.0, le=MOST_LENGTH_M, description="Knee axis to shank cuff."
+    )
 
 
 class SafetySettings(Settings):
     """What stops a run, and how."""
 
-    angle_margin_rad: float = Field(0.02, ge=0.0, description="Set-points keep this far from each angle limit.")
-    cuff_force_n: float = Field(400.0, gt=0.0, description="Highest force on any axis of any cuff sensor.")
-    following_error_rad: float = Field(0.15, gt=0.0, description="Farthest an angle may be from its set-point.")
-    watchdog_s: float = Field(0.1, gt=0.0, description="Longest a cycle or a device's next sample may take.")
+    angle_margin_rad: float = Field(
+        0.02, ge=0.0, description="Set-points keep this far from each angle limit."
+    )
+    cuff_force_n: float = Field(
+        400.0, gt=0.0, description="Highest force on any axis of any cuff sensor."
+    )
+    following_error_rad: float = Field(
+        0.15, gt=0.0, description="Farthest an angle may be from its set-point."
+    )
+    watchdog_s: float = Field(
+        0.1, gt=0.0, description="Longest a cycle or a device's next sample may take."
+    )
     reply_s: float | None = Field(
-        None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
+        None,
+        gt=0.0,
+        description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s.",
     )
     heartbeat_s: float | None = Field(
-        None, gt=0.0, description="Time-out of the drives' own watchdogs, as it is set in them; else it is not known."
+        None,
+        gt=0.0,
+        description="Time-out of the drives' own watchdogs, as it is set in them; else it is not known.",
     )
-    connect_s: float = Field(5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply.")
-    control_s: float = Field(1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it.")
-    deceleration_rad_s2: float = Field(8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down.")
-    ramp_s: float = Field(3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back.")
-    settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
-    with_human: HumanSafetySettings = Field(HumanSafetySettings(), description="Tighter limits of runs with_human.")
+    connect_s: float = Field(
+        5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply."
+    )
+    control_s: float = Field(
+        1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it."
+    )
+    deceleration_rad_s2: float = Field(
+        8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down."
+    )
+    ramp_s: float = Field(
+        3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back."
+    )
+    settle_s: float = Field(
+        1.0, ge=0.0, description="Motion before the recording begins, for transients to fade."
+    )
+    with_human: HumanSafetySettings = Field(
+        HumanSafetySettings(), description="Tighter limits of runs with_human."
+    )
 
     @model_validator(mode="after")
     def _limits_with_human_are_tighter(self) -> Self:
@@ -535,7 +685,8 @@ class SafetySettings(Settings):
     @property
     def longest_reply_s(self) -> float:
         """Longest wait for one reply while the leg moves, s."""
-        # Not a third: three lost replies are borne, and the fourth, not the watchdog, says who is silent.
+        # Not a third: three lost replies are borne, and the fourth, not the watchdog, says who is
+        # silent.
         return 0.3 * self.watchdog_s if self.reply_s is None else self.reply_s
 
 
@@ -550,20 +701,30 @@ class RigSettings(Settings):
     """Everything exoid knows of a rig."""
 
     name: Annotated[str, Field(min_length=1)] = Field(description="Name that recordings carry.")
-    embedded: bool = Field(False, description="Virtual: `exoid acquire` starts it in a process of its own.")
+    embedded: bool = Field(
+        False, description="Virtual: `exoid acquire` starts it in a process of its own."
+    )
     clock: Literal["lockstep", "real_time"] = Field(
-        "real_time", description="Devices sample on their own clock, or (virtual rigs) once for each exchange."
+        "real_time",
+        description="Devices sample on their own clock, or (virtual rigs) once for each exchange.",
     )
     clocks: Literal["common", "own"] = Field(
         "common", description="Drives sample at the same instants, or each by a clock of its own."
     )
     sampling: Literal["cyclic", "recorder"] = Field(
-        "cyclic", description="Samples are fetched with each set-point, or drained from the drives' own rings."
+        "cyclic",
+        description="Samples are fetched with each set-point, or drained from the drives' own rings.",
     )
-    record_rate_hz: float | None = Field(None, gt=0.0, description="Samples a second in the drives' rings.")
+    record_rate_hz: float | None = Field(
+        None, gt=0.0, description="Samples a second in the drives' rings."
+    )
     drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
-    sensor: tuple[SensorSettings, ...] = Field((), description="Cuff force sensors, read with a human only.")
-    line: dict[str, LineSettings] = Field(default_factory=dict, description="Lines that devices share, by name.")
+    sensor: tuple[SensorSettings, ...] = Field(
+        (), description="Cuff force sensors, read with a human only."
+    )
+    line: dict[str, LineSettings] = Field(
+        default_factory=dict, description="Lines that devices share, by name."
+    )
     map: Maps = Field(description="Register maps.")
     safety: SafetySettings = Field(SafetySettings(), description="What stops a run, and how.")
     geometry: GeometrySettings = Field(GeometrySettings(), description="The leg in this rig.")
@@ -576,7 +737,9 @@ class RigSettings(Settings):
     def _fits_together(self) -> Self:
         if tuple(drive.joint for drive in self.drive) != ("hip", "knee"):
             found = ", ".join(drive.joint for drive in self.drive)
-            raise ValueError(f"drive: found {found}, expected one for the hip, then one for the knee")
+            raise ValueError(
+                f"drive: found {found}, expected one for the hip, then one for the knee"
+            )
         for kind in ("drive", "sensor"):
             known = getattr(self.map, kind)
             for i, device in enumerate(getattr(self, kind)):
@@ -588,9 +751,13 @@ class RigSettings(Settings):
         self._refuse_bad_lines()
         for cuff, times in Counter(sensor.cuff for sensor in self.sensor).items():
             if times > 1:
-                raise ValueError(f"sensor: found two sensors at {cuff}, expected one; correct their cuffs")
+                raise ValueError(
+                    f"sensor: found two sensors at {cuff}, expected one; correct their cuffs"
+                )
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
-            raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
+            raise ValueError(
+                "plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays"
+            )
         self._refuse_impossible_sampling()
         self._refuse_torque_that_is_never_told()
         if self.plant is None:  # nobody is in a virtual one
@@ -604,7 +771,10 @@ class RigSettings(Settings):
         """Refuse a distance from the limits that no set-point can keep."""
         margin = self.safety.angle_margin_rad
         for drive in self.drive:
-            for key, limits in (("angle_rad", drive.angle_rad), ("with_human.angle_rad", drive.with_human.angle_rad)):
+            for key, limits in (
+                ("angle_rad", drive.angle_rad),
+                ("with_human.angle_rad", drive.with_human.angle_rad),
+            ):
                 if limits and not margin < (limits[1] - limits[0]) / 2.0:
                     raise ValueError(
                         f"safety.angle_margin_rad: found {margin:g}, expected less than "
@@ -613,8 +783,11 @@ class RigSettings(Settings):
                     )
 
     def _refuse_impossible_set_points(self) -> None:
-        """Refuse registers that cannot hold every set-point, or so coarsely that rounding leads the leg astray."""
-        following_rad = self.safety.with_human.following_error_rad or self.safety.following_error_rad
+        """Refuse registers that cannot hold every set-point, or so coarsely that rounding leads the
+        leg astray."""
+        following_rad = (
+            self.safety.with_human.following_error_rad or self.safety.following_error_rad
+        )
         for drive in self.drive:
             register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
             if not register.holds(low, high):
@@ -632,7 +805,8 @@ class RigSettings(Settings):
                 )
 
     def _refuse_torque_that_is_never_told(self) -> None:
-        """Refuse limits that a drive never tells more than, since it saturates: they would be watched in vain."""
+        """Refuse limits that a drive never tells more than, since it saturates: they would be
+        watched in vain."""
         for drive in self.drive:
             loop = self.controller.get(drive.joint)
             if loop and loop.limit_nm is not None and drive.torque_nm >= loop.limit_nm:
@@ -642,7 +816,8 @@ class RigSettings(Settings):
                 )
 
     def _refuse_limits_that_registers_cannot_tell(self) -> None:
-        """Refuse registers that end before a limit: it would be watched in vain, and the end taken for true."""
+        """Refuse registers that end before a limit: it would be watched in vain, and the end taken
+        for true."""
         for drive in self.drive:
             use, most = self.map.drive[drive.map], drive.torque_nm / drive.torque_per_ampere
             reach = {
@@ -652,13 +827,18 @@ class RigSettings(Settings):
             for block, registers in blocks.items():
                 for name, limits in reach.items():
                     _refuse_short(
-                        f"map.drive.{drive.map}.{block}.{name}", getattr(registers, name), limits, drive.joint
+                        f"map.drive.{drive.map}.{block}.{name}",
+                        getattr(registers, name),
+                        limits,
+                        drive.joint,
                     )
         for sensor in self.sensor:
             most = self.safety.cuff_force_n
             for name in ("force_x", "force_y", "force_z"):
                 register = getattr(self.map.sensor[sensor.map].read, name)
-                _refuse_short(f"map.sensor.{sensor.map}.read.{name}", register, (-most, most), sensor.cuff)
+                _refuse_short(
+                    f"map.sensor.{sensor.map}.read.{name}", register, (-most, most), sensor.cuff
+                )
 
     def _refuse_bad_lines(self) -> None:
         devices = (*self.drive, *self.sensor)
@@ -670,25 +850,37 @@ class RigSettings(Settings):
                 )
         for name in self.line:
             if name not in {device.line for device in devices}:
-                raise ValueError(f'line.{name}: no device is on it; remove it, or give one line = "{name}"')
+                raise ValueError(
+                    f'line.{name}: no device is on it; remove it, or give one line = "{name}"'
+                )
         for place, times in Counter(line.place for line in self.line.values()).items():
             if times > 1:
-                raise ValueError(f"line: two lines lead to {place}; make them one, with all its devices on it")
-        for (place, unit), times in Counter((self.line_of(d).place, d.unit) for d in devices).items():
+                raise ValueError(
+                    f"line: two lines lead to {place}; make them one, with all its devices on it"
+                )
+        for (place, unit), times in Counter(
+            (self.line_of(d).place, d.unit) for d in devices
+        ).items():
             if times > 1:
                 raise ValueError(f"unit: {place} unit {unit} stands for two devices; correct one")
 
     def line_of(self, device: DeviceSettings) -> LineSettings:
         """Return the line that a device is on."""
-        return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
+        return (
+            TcpLine(host=device.host, port=device.port)
+            if device.line is None
+            else self.line[device.line]
+        )
 
     def turn_of(self, sensor: SensorSettings) -> int:
-        """Return in which of its ``every`` cycles a sensor is read: those that are read equally seldom take turns."""
+        """Return in which of its ``every`` cycles a sensor is read: those that are read equally
+        seldom take turns."""
         alike = [other.cuff for other in self.sensor if other.every == sensor.every]
         return alike.index(sensor.cuff) % sensor.every
 
     def in_force(self, run: str) -> Self:
-        """Return the rig with the limits in force in a run (``exo_alone`` or ``with_human``), and no others."""
+        """Return the rig with the limits in force in a run (``exo_alone`` or ``with_human``), and
+        no others."""
         human = run == "with_human"
         drives = tuple(
             drive.model_copy(
@@ -703,17 +895,25 @@ class RigSettings(Settings):
 
     def label_of(self, device: DriveSettings | SensorSettings) -> str:
         """Return what errors call a device: what it is, and where."""
-        name = f"drive {device.joint}" if isinstance(device, DriveSettings) else f"sensor {device.cuff}"
+        name = (
+            f"drive {device.joint}"
+            if isinstance(device, DriveSettings)
+            else f"sensor {device.cuff}"
+        )
         return f"{name} ({self.line_of(device).place}, unit {device.unit})"
 
     def _refuse_impossible_sampling(self) -> None:
         drifts = self.plant is not None and any((*self.plant.clock_ppm, *self.plant.clock_offset_s))
         if self.clock == "lockstep" and (self.clocks == "own" or drifts):
-            raise ValueError('clock: found "lockstep", in which no time goes by; clocks of their own need "real_time"')
+            raise ValueError(
+                'clock: found "lockstep", in which no time goes by; clocks of their own need "real_time"'
+            )
         if self.sampling == "cyclic":
             return
         if self.record_rate_hz is None:
-            raise ValueError('record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\' rings')
+            raise ValueError(
+                'record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\' rings'
+            )
         for i, drive in enumerate(self.drive):
             if self.map.drive[drive.map].ring is None:
                 raise ValueError(
@@ -722,7 +922,8 @@ class RigSettings(Settings):
                 )
 
     def samples_per_cycle(self, sample_rate_hz: float) -> int:
-        """Return how many samples the drives take from one set-point to the next, or raise a SettingsError."""
+        """Return how many samples the drives take from one set-point to the next, or raise a
+        SettingsError."""
         if self.sampling == "cyclic" or self.record_rate_hz is None:
             return 1
         ratio = self.record_rate_hz / sample_rate_hz
@@ -741,26 +942,38 @@ class RigSettings(Settings):
         return round(ratio)
 
     def known_geometry(self) -> dict[str, float]:
-        """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's unless the file says."""
-        plant = {name: getattr(self.plant, name) for name in GeometrySettings.model_fields} if self.plant else {}
+        """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's
+        unless the file says."""
+        plant = (
+            {name: getattr(self.plant, name) for name in GeometrySettings.model_fields}
+            if self.plant
+            else {}
+        )
         return plant | self.geometry.model_dump(exclude_none=True)
 
     def known_controllers(self) -> dict[str, dict]:
-        """Return what is known of the drives' loops, by joint; a virtual rig's are its plant's unless the file says."""
+        """Return what is known of the drives' loops, by joint; a virtual rig's are its plant's
+        unless the file says."""
         plant = self.plant.controllers() if self.plant else {}
-        return plant | {joint: loop.model_dump(exclude_none=True) for joint, loop in self.controller.items()}
+        return plant | {
+            joint: loop.model_dump(exclude_none=True) for joint, loop in self.controller.items()
+        }
 
     @property
     def known_heartbeat_s(self) -> tuple[str, float | None]:
-        """The key that tells how long the drives' own watchdogs wait, and what it tells, s; None where nobody does."""
+        """The key that tells how long the drives' own watchdogs wait, and what it tells, s; None
+        where nobody does."""
         if self.safety.heartbeat_s is None and self.plant:
             return "plant.heartbeat_s", self.plant.heartbeat_s
         return "safety.heartbeat_s", self.safety.heartbeat_s
 
     def public(self) -> dict:
-        """Return what recordings may tell of the rig: everything but the plant, which later stages are to find."""
+        """Return what recordings may tell of the rig: everything but the plant, which later stages
+        are to find."""
         files: IncEx = {name: set(line.files) for name, line in self.line.items()}
-        return self.model_dump(mode="json", exclude={"plant": True, "line": files}, exclude_none=True)
+        return self.model_dump(
+            mode="json", exclude={"plant": True, "line": files}, exclude_none=True
+        )
 
 
 def load_rig(path: Path | str) -> RigSettings:
@@ -770,7 +983,9 @@ def load_rig(path: Path | str) -> RigSettings:
     return rig.model_copy(update={"line": lines})
 
 
-def _refuse_short(key: str, register: Register | None, limits: tuple[float, float], whose: str) -> None:
+def _refuse_short(
+    key: str, register: Register | None, limits: tuple[float, float], whose: str
+) -> None:
     """Refuse a register that cannot tell a value beyond both limits, SI."""
     if register is None:
         return

@@ -12,22 +12,42 @@ class SimulateSettings(Settings):
 
     duration_s: float = Field(10.0, gt=0.0, description="Simulated time.")
     step_s: float = Field(0.001, gt=0.0, le=0.01, description="Step of controller and integrator.")
-    error_gain_1_s: float = Field(10.0, gt=0.0, description="Lambda: weight of the error beside its derivative.")
-    feedback_gain_nm_s_rad: float = Field(300.0, ge=0.0, description="Kv: feedback of the filtered error.")
-    adaptation_gain: float = Field(500.0, ge=0.0, description="F: how fast the network's weights adapt.")
-    robust_gain_nm: float = Field(0.3, ge=0.0, description="Gain of the sign term against what the network misses.")
+    error_gain_1_s: float = Field(
+        10.0, gt=0.0, description="Lambda: weight of the error beside its derivative."
+    )
+    feedback_gain_nm_s_rad: float = Field(
+        300.0, ge=0.0, description="Kv: feedback of the filtered error."
+    )
+    adaptation_gain: float = Field(
+        500.0, ge=0.0, description="F: how fast the network's weights adapt."
+    )
+    robust_gain_nm: float = Field(
+        0.3, ge=0.0, description="Gain of the sign term against what the network misses."
+    )
     network_nodes: int = Field(7, ge=1, le=200, description="Gaussians of each joint's network.")
     network_width: float = Field(10.0, gt=0.0, description="b: width of each Gaussian.")
-    torque_limit_nm: float = Field(200.0, gt=0.0, description="Drive limit; adaptation pauses while it is reached.")
-    disturbance_nm: float = Field(2.0, ge=0.0, description="Amplitude of the sine disturbance on both joints.")
+    torque_limit_nm: float = Field(
+        200.0, gt=0.0, description="Drive limit; adaptation pauses while it is reached."
+    )
+    disturbance_nm: float = Field(
+        2.0, ge=0.0, description="Amplitude of the sine disturbance on both joints."
+    )
     disturbance_rad_s: float = Field(2.0, gt=0.0, description="Frequency of the disturbance.")
-    encoder_counts_per_turn: int = Field(0, ge=0, description="Of the angle the controller sees; 0 for an ideal one.")
-    encoder_noise_rad: float = Field(0.0, ge=0.0, description="Standard deviation of noise on each angle reading.")
+    encoder_counts_per_turn: int = Field(
+        0, ge=0, description="Of the angle the controller sees; 0 for an ideal one."
+    )
+    encoder_noise_rad: float = Field(
+        0.0, ge=0.0, description="Standard deviation of noise on each angle reading."
+    )
     speed_cutoff_hz: float = Field(
-        100.0, gt=0.0, description="Low-pass of the speed, a difference of angles where the encoder is not ideal."
+        100.0,
+        gt=0.0,
+        description="Low-pass of the speed, a difference of angles where the encoder is not ideal.",
     )
     seed: int = Field(0, ge=0, description="Seed of the encoder noise.")
-    settled_after_s: float = Field(5.0, ge=0.0, description="From here on the largest error counts.")
+    settled_after_s: float = Field(
+        5.0, ge=0.0, description="From here on the largest error counts."
+    )
     sweep_nm_s_rad: tuple[Annotated[float, Field(gt=0.0)], ...] = Field(
         (50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0),
         description="Values of Kv for the sweep of the paper's Figure 3; empty for none.",

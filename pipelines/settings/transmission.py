@@ -1,4 +1,5 @@
-"""From what was measured at a motor to what it is at the joint: encoder, gear, screw, torque constant."""
+"""From what was measured at a motor to what it is at the joint: encoder, gear, screw, torque
+constant."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ TARGETS: dict[str, dict[Kind, str]] = {
 
 @dataclass(frozen=True)
 class Step:
-    """One part of a drive train: it makes one dimension of another, by a number that stands on its data sheet."""
+    """One part of a drive train: it makes one dimension of another, by a number that stands on its
+    data sheet."""
 
     source: str
     target: str
@@ -54,9 +56,14 @@ GEARED = {
     "angle": -1, "length": -1, "angular velocity": -1, "velocity": -1, "torque": 1, "force": 1, "current": 0,
     "temperature": 0,
 }  # fmt: skip
-"""Power of the gear ratio, by what arrives at the joint: motion is divided by it, torque is multiplied."""
+"""Power of the gear ratio, by what arrives at the joint: motion is divided by it, torque is
+multiplied."""
 
-METRIC = {"length": ("m", "metres"), "velocity": ("m/s", "metres a second"), "force": ("N", "newtons")}
+METRIC = {
+    "length": ("m", "metres"),
+    "velocity": ("m/s", "metres a second"),
+    "force": ("N", "newtons"),
+}
 """What a log of a joint that slides may be in, where its map says what turns."""
 
 
@@ -64,13 +71,20 @@ def paths(source: str, target: str) -> list[tuple[Step, ...]]:
     """Return all ways through a drive train from one dimension to another, the shortest first."""
     if source == target:
         return [()]
-    found = [(step, *rest) for step in STEPS if step.source == source for rest in paths(step.target, target)]
+    found = [
+        (step, *rest)
+        for step in STEPS
+        if step.source == source
+        for rest in paths(step.target, target)
+    ]
     return sorted(found, key=len)
 
 
 def sources(target: str) -> list[str]:
     """Return the dimensions from which there is a way to one."""
-    return list(dict.fromkeys([target, *(step.source for step in STEPS if paths(step.source, target))]))
+    return list(
+        dict.fromkeys([target, *(step.source for step in STEPS if paths(step.source, target))])
+    )
 
 
 def gain(source: str, target: str, given: Mapping[str, float], gear_ratio: float) -> float:
@@ -92,7 +106,11 @@ def _what_is_wrong(ways: list[tuple[Step, ...]], target: str, given: set[str]) -
     wanted = [{step.key for step in way} for way in ways]
     for keys in wanted:
         if keys >= given:
-            instead = f", or {_both(wanted[0] - given)} in place of {_both(given)}" if given - wanted[0] else ""
+            instead = (
+                f", or {_both(wanted[0] - given)} in place of {_both(given)}"
+                if given - wanted[0]
+                else ""
+            )
             metric = METRIC[target] if keys == {"lead_m"} else None
             rather = f', or unit = "{metric[0]}", where the log is in {metric[1]}' if metric else ""
             return f"needs {_both(keys - given)}{instead}; add it from the data sheet{rather}"

@@ -8,7 +8,8 @@ BINS, FEWEST = 40, 8
 
 
 def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArray, NDArray]:
-    """Return the mean of a quantity in equally wide bins along another, neighbours joined until each has enough.
+    """Return the mean of a quantity in equally wide bins along another, neighbours joined until
+    each has enough.
 
     Enough is half of what bins have on average, and ``FEWEST``.
 
@@ -28,7 +29,9 @@ def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArra
     number = np.searchsorted(edges, x, side="right") - 1
     number = np.where(x == high, BINS - 1, number)  # the last bin has both its ends
     inside = (number >= 0) & (number < BINS)
-    sums = np.array([np.bincount(number[inside], weights, BINS) for weights in (None, x[inside], y[inside])])
+    sums = np.array(
+        [np.bincount(number[inside], weights, BINS) for weights in (None, x[inside], y[inside])]
+    )
     enough = max(FEWEST, inside.sum() / (2 * BINS))
     joined: list[NDArray] = [np.zeros(3)]
     for bin_sums in sums.T:

@@ -1,7 +1,9 @@
-"""The regression filter: averages over short blocks, applied to torque and every regressor column alike.
+"""The regression filter: averages over short blocks, applied to torque and every regressor column
+alike.
 
-Filtering the torque alone would leave a faultless fit with up to four times the noise; both sides alike, and
-kept away from reversals by short blocks, leave the noise itself (docs/identification.md).
+Filtering the torque alone would leave a faultless fit with up to four times the noise; both sides
+alike, and kept away from reversals by short blocks, leave the noise itself
+(docs/identification.md).
 """
 
 from dataclasses import dataclass
@@ -45,7 +47,9 @@ class BlockAverage:
         last = np.append(first[1:], len(segment))
         first[0] = -before % self.decimation
         width = self.decimation
-        return np.concatenate([np.arange(a, b - width + 1, width) for a, b in zip(first, last, strict=True)])
+        return np.concatenate(
+            [np.arange(a, b - width + 1, width) for a, b in zip(first, last, strict=True)]
+        )
 
     def mean(self, x: NDArray, starts: NDArray) -> NDArray:
         """Average ``x`` (n, ...) over the blocks: (blocks, ...)."""

@@ -13,14 +13,16 @@ WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
 HIGHEST_HZ = 12.5
-"""Highest cut-off, within the limits of ``HIGHEST_SHARE``: above it there is only what sticking joints do at reversals,
-which no fit uses."""
+"""Highest cut-off, within the limits of ``HIGHEST_SHARE``: above it there is only what sticking
+joints do at reversals, which no fit uses."""
 HIGHEST_SHARE = (0.125, 0.25)
-"""Limits of the highest cut-off, shares of the Nyquist frequency; they act above 200 Hz and below 100 Hz."""
+"""Limits of the highest cut-off, shares of the Nyquist frequency; they act above 200 Hz and below
+100 Hz."""
 SLOW_SHARE = 0.9999
 """Of the signal's power: the motion itself, which the filter must leave alone."""
 BEFORE_NOISE = 0.7
-"""Cut-off over the frequency where signal and noise meet: in acceleration noise outweighs signal well before."""
+"""Cut-off over the frequency where signal and noise meet: in acceleration noise outweighs signal
+well before."""
 QUIET_HZ = 3.0
 """Width of noise after which no more signal is expected."""
 CLEAR = 3.0
@@ -63,11 +65,14 @@ def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
     return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
 
 
-def choose_cutoff(pieces: Iterable[NDArray], samples: int, rate_hz: float, channels: tuple[str, ...]) -> Cutoff:
-    """Choose one cut-off for all channels of a signal that comes in pieces (n, channels), ``samples`` in all.
+def choose_cutoff(
+    pieces: Iterable[NDArray], samples: int, rate_hz: float, channels: tuple[str, ...]
+) -> Cutoff:
+    """Choose one cut-off for all channels of a signal that comes in pieces (n, channels),
+    ``samples`` in all.
 
-    The noisiest channel decides, for the acceleration of one joint stands in the torque of both; but twice the
-    frequency of the fastest motion passes, whatever the noise.
+    The noisiest channel decides, for the acceleration of one joint stands in the torque of both;
+    but twice the frequency of the fastest motion passes, whatever the noise.
     """
     welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
     for piece in pieces:
@@ -82,7 +87,12 @@ def choose_cutoff(pieces: Iterable[NDArray], samples: int, rate_hz: float, chann
     said = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
     chosen = BEFORE_NOISE * meets
     if chosen < needed:
-        return Cutoff(needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz")
+        return Cutoff(
+            needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz"
+        )
     if chosen > highest:
         return Cutoff(highest, f"{said}; above {highest:g} Hz is only what reversals leave")
-    return Cutoff(max(chosen, 2.0 * rate_hz / samples), f"{said}; in acceleration noise outweighs signal before that")
+    return Cutoff(
+        max(chosen, 2.0 * rate_hz / samples),
+        f"{said}; in acceleration noise outweighs signal before that",
+    )

@@ -10,7 +10,8 @@ Place = TypeVar("Place", float, NDArray[np.float64])
 
 
 def cubic_weights(x: Place) -> tuple[Place, Place, Place, Place]:
-    """Return the weights of the samples at -1, 0, 1 and 2 for a place between 0 and 1: Lagrange's cubic."""
+    """Return the weights of the samples at -1, 0, 1 and 2 for a place between 0 and 1: Lagrange's
+    cubic."""
     return (
         -x * (x - 1) * (x - 2) / 6,
         (x + 1) * (x - 1) * (x - 2) / 2,
@@ -20,7 +21,8 @@ def cubic_weights(x: Place) -> tuple[Place, Place, Place, Place]:
 
 
 def between_readings(x: NDArray, longest: int) -> NDArray:
-    """Return what is read only now and then at every sample, (n, k), along Akima's curve through its readings.
+    """Return what is read only now and then at every sample, (n, k), along Akima's curve through
+    its readings.
 
     Parameters
     ----------

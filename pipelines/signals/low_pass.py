@@ -18,10 +18,13 @@ NEGLIGIBLE = 1e-18
 
 
 def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
-    """Return how many samples away a cut in the data is no longer felt: it fades as the slowest pole does."""
+    """Return how many samples away a cut in the data is no longer felt: it fades as the slowest
+    pole does."""
     _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
     fading = int(np.ceil(np.log(NEGLIGIBLE) / np.log(np.max(np.abs(poles)))))
-    return max(fading, shortest(rate_hz, cutoff_hz), _padding(rate_hz, cutoff_hz)) + DERIVATIVE_STENCIL
+    return (
+        max(fading, shortest(rate_hz, cutoff_hz), _padding(rate_hz, cutoff_hz)) + DERIVATIVE_STENCIL
+    )
 
 
 def _padding(rate_hz: float, cutoff_hz: float) -> int:
@@ -29,7 +32,8 @@ def _padding(rate_hz: float, cutoff_hz: float) -> int:
 
 
 def shortest(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the fewest samples a stretch needs to be filtered: one time constant's padding on each side."""
+    """Return the fewest samples a stretch needs to be filtered: one time constant's padding on each
+    side."""
     return max(DERIVATIVE_STENCIL, int(np.ceil(rate_hz / cutoff_hz))) + 1
 
 
@@ -50,7 +54,8 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
 
 @lru_cache
 def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
-    """Return the filter's second-order sections: their design takes longer than a short stretch's filtering."""
+    """Return the filter's second-order sections: their design takes longer than a short stretch's
+    filtering."""
     return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
 
 
@@ -58,18 +63,29 @@ def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
 def _differences(order: int) -> NDArray:
     """Return the weights of a stencil's samples in the derivative at each of them, per sample."""
     size = DERIVATIVE_STENCIL
-    return np.array([savgol_coeffs(size, size - 1, deriv=order, pos=i, use="dot") for i in range(size)])
+    return np.array(
+        [savgol_coeffs(size, size - 1, deriv=order, pos=i, use="dot") for i in range(size)]
+    )
 
 
 def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
-    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central differences.
+    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central
+    differences.
 
-    ``scipy.signal.savgol_filter`` does the same, and fits a polynomial at both ends of each stretch anew.
+    ``scipy.signal.savgol_filter`` does the same, and fits a polynomial at both ends of each stretch
+    anew.
     """
     weights = _differences(order) * rate_hz**order
     half = DERIVATIVE_STENCIL // 2
     out = correlate1d(x, weights[half], axis=0, mode="nearest")
-    # Summed in one order whatever the shape of x, so that a column alone gives the same to the last digit.
-    for end, samples in ((slice(half), x[:DERIVATIVE_STENCIL]), (slice(-half, None), x[-DERIVATIVE_STENCIL:])):
-        out[end] = sum(np.multiply.outer(own, sample) for own, sample in zip(weights[end].T, samples, strict=True))
+    # Summed in one order whatever the shape of x, so that a column alone gives the same to the last
+    # digit.
+    for end, samples in (
+        (slice(half), x[:DERIVATIVE_STENCIL]),
+        (slice(-half, None), x[-DERIVATIVE_STENCIL:]),
+    ):
+        out[end] = sum(
+            np.multiply.outer(own, sample)
+            for own, sample in zip(weights[end].T, samples, strict=True)
+        )
     return np.asarray(out)

@@ -1,4 +1,5 @@
-"""The power spectral density of a signal that comes piece by piece (Welch, 1967, IEEE Trans. Audio 15(2))."""
+"""The power spectral density of a signal that comes piece by piece (Welch, 1967, IEEE Trans. Audio
+15(2))."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,8 @@ from scipy.signal import welch
 class Welch:
     """An average over windows that overlap by half, across the pieces as if they were one.
 
-    A Blackman-Harris window, because the leakage of a slow motion would otherwise hide the noise floor.
+    A Blackman-Harris window, because the leakage of a slow motion would otherwise hide the noise
+    floor.
 
     Parameters
     ----------
@@ -32,7 +34,12 @@ class Welch:
         if windows:
             whole = x[: (windows - 1) * self._hop + self._length]
             _, density = welch(
-                whole, self._rate_hz, window="blackmanharris", nperseg=self._length, detrend="linear", axis=0
+                whole,
+                self._rate_hz,
+                window="blackmanharris",
+                nperseg=self._length,
+                detrend="linear",
+                axis=0,
             )
             self._total = self._total + windows * density
             self._windows += windows

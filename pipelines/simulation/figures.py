@@ -17,9 +17,14 @@ JOINT_COLOURS = (BLUE, ORANGE)
 
 
 def draw_tracking(
-    frame: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, limit_nm: float, settled_after_s: float
+    frame: pd.DataFrame,
+    joints: tuple[Joint, ...],
+    folder: Path,
+    limit_nm: float,
+    settled_after_s: float,
 ) -> None:
-    """Draw tracking, error and torque of a closed loop (Figures 4 to 6); ``frame`` is a ``simulation/1`` table."""
+    """Draw tracking, error and torque of a closed loop (Figures 4 to 6); ``frame`` is a
+    ``simulation/1`` table."""
     with plt.rc_context(STYLE):
         save(_tracking(frame, joints), folder / "tracking")
         save(_error(frame, joints, settled_after_s), folder / "error")
@@ -32,22 +37,38 @@ def draw_sweep(sweep: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, cho
         figure, axis = plt.subplots(figsize=(6, 3.6))
         gains = sweep["feedback_gain_nm_s_rad"]
         for joint, colour in zip(joints, JOINT_COLOURS, strict=False):
-            axis.plot(gains, 1e3 * sweep[joint.column("error")], "o-", ms=3.5, color=colour, label=joint.name)
+            axis.plot(
+                gains,
+                1e3 * sweep[joint.column("error")],
+                "o-",
+                ms=3.5,
+                color=colour,
+                label=joint.name,
+            )
         axis.axvline(chosen, color=GREY, lw=0.9, ls=":")
         axis.annotate(
             "chosen", (chosen, 0.97), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points",
             color=GREY, va="top",
         )  # fmt: skip
-        axis.set(xlabel="feedback gain Kv, N·m·s/rad", ylabel="largest settled error, mrad", ylim=(0, None))
+        axis.set(
+            xlabel="feedback gain Kv, N·m·s/rad",
+            ylabel="largest settled error, mrad",
+            ylim=(0, None),
+        )
         axis.legend()
         axis.set_title("More feedback, less error", loc="left", fontweight="bold")
         save(figure, folder / "kv-sweep")
 
 
 def draw_replay(
-    open_loop: pd.DataFrame, closed_loop: pd.DataFrame | None, joints: tuple[Joint, ...], stem: Path, title: str
+    open_loop: pd.DataFrame,
+    closed_loop: pd.DataFrame | None,
+    joints: tuple[Joint, ...],
+    stem: Path,
+    title: str,
 ) -> None:
-    """Draw a recording beside its simulation; both tables are ``simulation/1``, as ``recorded`` makes them."""
+    """Draw a recording beside its simulation; both tables are ``simulation/1``, as ``recorded``
+    makes them."""
     with plt.rc_context(STYLE):
         columns = 1 if closed_loop is None else 2
         figure, axes = plt.subplots(
@@ -66,7 +87,9 @@ def draw_replay(
             axis.set_xlabel("time, s")
         axes[0, 0].set_title("under the recorded torque, 1 s windows", loc="left", fontsize=9)
         if closed_loop is not None:
-            axes[0, 1].set_title("in the drives' loop under the recorded references", loc="left", fontsize=9)
+            axes[0, 1].set_title(
+                "in the drives' loop under the recorded references", loc="left", fontsize=9
+            )
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right", ncols=2)
         figure.suptitle(title, x=0.02, ha="left", fontweight="bold")
         figure.align_ylabels()
@@ -75,26 +98,40 @@ def draw_replay(
 
 
 def _panels(joints: tuple[Joint, ...]) -> tuple[Figure, NDArray]:
-    figure, axes = plt.subplots(len(joints), 1, figsize=(8, 2.3 * len(joints)), sharex=True, squeeze=False)
+    figure, axes = plt.subplots(
+        len(joints), 1, figsize=(8, 2.3 * len(joints)), sharex=True, squeeze=False
+    )
     return figure, axes[:, 0]
 
 
 def _tracking(frame: pd.DataFrame, joints: tuple[Joint, ...]) -> Figure:
     figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
-        axis.plot(frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.6, label="wanted")
-        axis.plot(frame["time_s"], frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated")
+        axis.plot(
+            frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.6, label="wanted"
+        )
+        axis.plot(
+            frame["time_s"], frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated"
+        )
         axis.set_ylabel(f"{joint.name} angle, {joint.unit('angle')}")
     return _finished(figure, axes, "The leg follows its reference")
 
 
 def _error(frame: pd.DataFrame, joints: tuple[Joint, ...], settled_after_s: float) -> Figure:
-    """Draw the error from where it has settled on; how it began is told in words, or it would flatten the rest."""
+    """Draw the error from where it has settled on; how it began is told in words, or it would
+    flatten the rest."""
     figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
         error = 1e3 * frame[joint.column("error")]
         worst = error[frame["time_s"] >= settled_after_s].abs().max()
-        axis.axhspan(-worst, worst, color=GREY, alpha=0.15, lw=0, label=f"largest after {settled_after_s:g} s")
+        axis.axhspan(
+            -worst,
+            worst,
+            color=GREY,
+            alpha=0.15,
+            lw=0,
+            label=f"largest after {settled_after_s:g} s",
+        )
         axis.axhline(0, color="black", lw=0.6)
         axis.plot(frame["time_s"], error, color=BLUE, lw=1.0, label="error")
         axis.set_ylim(-4 * worst, 4 * worst)
@@ -109,10 +146,18 @@ def _torque(frame: pd.DataFrame, joints: tuple[Joint, ...], limit_nm: float) -> 
     for axis, joint in zip(axes, joints, strict=True):
         torque = frame[joint.column("torque")]
         axis.plot(frame["time_s"], torque, color=ORANGE, lw=1.0, label="torque")
-        axis.plot(frame["time_s"], frame[joint.column("network")], color=BLUE, lw=1.0, label="the network's share")
+        axis.plot(
+            frame["time_s"],
+            frame[joint.column("network")],
+            color=BLUE,
+            lw=1.0,
+            label="the network's share",
+        )
         if torque.abs().max() > 0.7 * limit_nm:
             for bound in (-limit_nm, limit_nm):
-                axis.axhline(bound, color=GREY, lw=0.9, ls=":", label="limit" if bound > 0 else None)
+                axis.axhline(
+                    bound, color=GREY, lw=0.9, ls=":", label="limit" if bound > 0 else None
+                )
         axis.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
     return _finished(figure, axes, "What the drives deliver")
 
@@ -121,7 +166,11 @@ def _finished(figure: Figure, axes: Iterable[Axes], title: str) -> Figure:
     axes = list(axes)
     axes[-1].set_xlabel("time, s")
     axes[-1].margins(x=0.01)
-    labels = {label: line for axis in axes for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    labels = {
+        label: line
+        for axis in axes
+        for line, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(labels.values(), labels.keys(), loc="upper right", ncols=len(labels))
     figure.suptitle(title, x=0.02, ha="left", fontweight="bold")
     figure.align_ylabels()
@@ -133,7 +182,9 @@ def _windows(angles: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> N
     # A break between two windows, so that no line joins the end of one to the begin of the next.
     ends = frame["window"].diff().fillna(0) != 0
     time = frame["time_s"].where(~ends)
-    angles.plot(frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.4, label="recorded")
+    angles.plot(
+        frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.4, label="recorded"
+    )
     angles.plot(time, frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated")
     errors.axhline(0, color="black", lw=0.6)
     errors.plot(time, 1e3 * frame[joint.column("error")], color=BLUE, lw=0.9)

@@ -1,4 +1,5 @@
-"""The model beside a recording: under the recorded torque, and in its drives' loop under the recorded references."""
+"""The model beside a recording: under the recorded torque, and in its drives' loop under the
+recorded references."""
 
 from dataclasses import dataclass
 
@@ -8,7 +9,14 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
-from pipelines.dynamics.pd_loop import Drives, LoopState, follow, loop_at_rest, make_drives, read_encoders
+from pipelines.dynamics.pd_loop import (
+    Drives,
+    LoopState,
+    follow,
+    loop_at_rest,
+    make_drives,
+    read_encoders,
+)
 from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult, known_temperature
 from pipelines.mechanics.motion import Motion
@@ -32,7 +40,8 @@ class UnderReferences:
 
 
 def why_no_closed_loop(motion: Motion) -> str:
-    """Say what a recording lacks for its drives' loop to be simulated; empty where it lacks nothing."""
+    """Say what a recording lacks for its drives' loop to be simulated; empty where it lacks
+    nothing."""
     controller = motion.metadata.get("controller") or {}
     for joint in motion.joints:
         about = controller.get(joint)
@@ -67,7 +76,11 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
             whole[segment] = part
     angle, velocity, torque = simulated
     return UnderReferences(
-        angle, velocity, torque, _rms((motion.q - angle)[motion.valid]), _rms((motion.torque - torque)[motion.valid])
+        angle,
+        velocity,
+        torque,
+        _rms((motion.q - angle)[motion.valid]),
+        _rms((motion.torque - torque)[motion.valid]),
     )
 
 
@@ -84,7 +97,8 @@ def _drives(motion: Motion) -> Drives:
 
 
 def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> LoopState:
-    """Return the loop in the recorded state at the begin of sample ``k``, half a period before its time."""
+    """Return the loop in the recorded state at the begin of sample ``k``, half a period before its
+    time."""
     motor = plant.model.sensed(motion)
     link = plant.model.behind_motors(motor)
     state = np.stack([link.q[k], link.dq[k], motor.q[k], motor.dq[k]])
@@ -107,13 +121,20 @@ def _rms(x: NDArray) -> NDArray:
     return np.sqrt(np.mean(x**2, axis=0))
 
 
-def open_loop_frame(replayed: ReplayResult, motion: Motion, joints: tuple[Joint, ...]) -> pd.DataFrame:
+def open_loop_frame(
+    replayed: ReplayResult, motion: Motion, joints: tuple[Joint, ...]
+) -> pd.DataFrame:
     """Return the windows that follow each other without overlap as a ``simulation/1`` table.
 
-    What the model should have done, the recorded angle, stands as its reference; ``window`` numbers the windows.
+    What the model should have done, the recorded angle, stands as its reference; ``window`` numbers
+    the windows.
     """
     apart = round(WINDOW_S / EVERY_S)
-    chosen = _without_overlap(replayed.first, replayed.angle.shape[1] - 1) if apart > 1 else replayed.first
+    chosen = (
+        _without_overlap(replayed.first, replayed.angle.shape[1] - 1)
+        if apart > 1
+        else replayed.first
+    )
     which = np.searchsorted(replayed.first, chosen)
     # A window's last sample is the next one's first.
     rows = (chosen[:, np.newaxis] + np.arange(replayed.angle.shape[1] - 1)).ravel()
@@ -121,7 +142,11 @@ def open_loop_frame(replayed: ReplayResult, motion: Motion, joints: tuple[Joint,
     def joined(windows: NDArray) -> NDArray:
         return windows[which, :-1].reshape(len(rows), -1)
 
-    angle, velocity, error = joined(replayed.angle), joined(replayed.velocity), joined(replayed.error)
+    angle, velocity, error = (
+        joined(replayed.angle),
+        joined(replayed.velocity),
+        joined(replayed.error),
+    )
     columns = {"time_s": motion.time[rows], "window": np.repeat(which, replayed.angle.shape[1] - 1)}
     for j, joint in enumerate(joints):
         columns[joint.column("reference")] = angle[:, j] + error[:, j]
@@ -141,8 +166,11 @@ def _without_overlap(first: NDArray, length: int) -> NDArray:
     return np.array(chosen)
 
 
-def closed_loop_frame(made: UnderReferences, motion: Motion, joints: tuple[Joint, ...]) -> pd.DataFrame:
-    """Return a closed loop under recorded references as a ``simulation/1`` table, the measured beside it."""
+def closed_loop_frame(
+    made: UnderReferences, motion: Motion, joints: tuple[Joint, ...]
+) -> pd.DataFrame:
+    """Return a closed loop under recorded references as a ``simulation/1`` table, the measured
+    beside it."""
     assert motion.reference is not None
     columns: dict[str, object] = {"time_s": motion.time}
     for j, joint in enumerate(joints):

@@ -8,7 +8,9 @@ from pydantic import ValidationError
 from pipelines.validation.suggestion import suggestion
 
 
-def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[str]] = lambda path: []) -> str:
+def explain(
+    error: ValidationError, data: Any, known_keys: Callable[[str], list[str]] = lambda path: []
+) -> str:
     """Say which key is wrong, what was found there and what was expected.
 
     Parameters
@@ -18,7 +20,8 @@ def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[
     data : dict
         The data it looked at, as read from TOML or JSON.
     known_keys : callable, optional
-        Returns the keys allowed in the table at a dotted path ("" is the top), to suggest one for a misspelt key.
+        Returns the keys allowed in the table at a dotted path ("" is the top), to suggest one for a
+        misspelt key.
 
     Returns
     -------
@@ -35,18 +38,23 @@ def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[
 
 
 def _own(error: ValidationError) -> list[Any]:
-    """Return the faults without those that are others' shadows: a list lacks the tables that have a fault."""
+    """Return the faults without those that are others' shadows: a list lacks the tables that have a
+    fault."""
     found = error.errors(include_url=False)
     at = [fault["loc"] for fault in found]
     return [
         fault
         for fault in found
         if fault["type"] != "too_short"
-        or not any(loc[: len(fault["loc"])] == fault["loc"] and len(loc) > len(fault["loc"]) for loc in at)
+        or not any(
+            loc[: len(fault["loc"])] == fault["loc"] and len(loc) > len(fault["loc"]) for loc in at
+        )
     ]
 
 
-def _sentence(path: str, faults: list[dict[str, Any]], known_keys: Callable[[str], list[str]]) -> str:
+def _sentence(
+    path: str, faults: list[dict[str, Any]], known_keys: Callable[[str], list[str]]
+) -> str:
     kind = faults[0]["type"]
     if kind == "missing":
         return f"{path}: missing; add it"
@@ -72,7 +80,8 @@ def _discriminator(fault: dict[str, Any]) -> str:
 
 
 def _key_path(fault: Any, data: Any) -> str:
-    """Return the fault's dotted path as the user wrote it, without pydantic's names for members of a union."""
+    """Return the fault's dotted path as the user wrote it, without pydantic's names for members of
+    a union."""
     path = ""
     for part in fault["loc"]:
         if isinstance(data, dict) and part in data:

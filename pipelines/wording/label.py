@@ -1,4 +1,5 @@
-"""A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
+"""A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say
+it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -36,7 +37,8 @@ def effect_labelled(label: str) -> Effect:
 def effect_at(
     label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str, why: str = ""
 ) -> Effect:
-    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold; ``why`` others do not.
+    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold;
+    ``why`` others do not.
 
     Raises
     ------
@@ -47,8 +49,15 @@ def effect_at(
         told = effect_labelled(label)
     if fits(type(told)) and told.joint in told.possible(machine):
         return type(told)(joint=told.joint, on=machine)
-    can_be = [one(joint=place, on=machine) for one in EFFECTS if fits(one) for place in one.possible(machine)]
-    expected = [one.label for one in can_be if one.name == told.name] or [one.label for one in can_be]
+    can_be = [
+        one(joint=place, on=machine)
+        for one in EFFECTS
+        if fits(one)
+        for place in one.possible(machine)
+    ]
+    expected = [one.label for one in can_be if one.name == told.name] or [
+        one.label for one in can_be
+    ]
     raise InputError(
         f"{setting}: found {label}, expected {' or '.join(expected) or 'nothing'}"
         f"{f' ({why})' if why else ''}; correct it or leave it out"
@@ -63,7 +72,8 @@ def effect_told(cause: Mapping[str, Any]) -> Effect:
 
 
 def number(machine: Machine, torque: float) -> str:
-    """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for an exoskeleton."""
+    """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for
+    an exoskeleton."""
     return f"{torque:.2f}" if machine.is_exoskeleton else f"{torque:.3g}"
 
 
@@ -85,5 +95,8 @@ def in_words(effect: Effect) -> str:
 
 
 def label_in_words(label: str, machine: Machine | None = None) -> str:
-    """Return a cause, or an unlisted law, as a sentence says it; the machine tells which of its joints slide."""
-    return law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))
+    """Return a cause, or an unlisted law, as a sentence says it; the machine tells which of its
+    joints slide."""
+    return (
+        law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))
+    )

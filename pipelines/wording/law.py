@@ -1,4 +1,5 @@
-"""An unlisted law's label, ``law:angle@hip``: the family that it belongs to, and how sentences say it."""
+"""An unlisted law's label, ``law:angle@hip``: the family that it belongs to, and how sentences say
+it."""
 
 from pipelines.contracts.joints import the
 from pipelines.mechanics.machine import Machine
@@ -6,7 +7,8 @@ from pipelines.mechanics.machine import Machine
 LAW = "law:"
 """What the label of an unlisted law begins with."""
 UNLISTED = "unlisted_"
-"""What the kind begins with of an unlisted effect that resembles a listed cause; the cause's family follows."""
+"""What the kind begins with of an unlisted effect that resembles a listed cause; the cause's family
+follows."""
 OTHER = "other"
 """In the kind of a law of what the other joint does."""
 FAMILIES = {
@@ -96,7 +98,8 @@ def family_in_words(
 
 
 def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:
-    """Return words about a joint, or about the machine; a joint that slides has a position and a force."""
+    """Return words about a joint, or about the machine; a joint that slides has a position and a
+    force."""
     if joint and machine is not None:
         own = machine.joint(joint)
         words = words.replace("angle", own.place).replace("torque", own.effort)

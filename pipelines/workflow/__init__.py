@@ -1,1 +1,2 @@
-"""The work of an experiment: which file comes from which, what is up to date, and the same told to make."""
+"""The work of an experiment: which file comes from which, what is up to date, and the same told to
+make."""

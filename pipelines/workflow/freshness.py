@@ -1,7 +1,9 @@
-"""Whether a step of an experiment is done, and if not, why: what its file was made of, against what is there.
+"""Whether a step of an experiment is done, and if not, why: what its file was made of, against what
+is there.
 
-A result tells the hashes of its inputs and its settings, so it is judged by content. Times count only for what no
-result may tell of; a folder that was copied, or a setting that was changed and changed back, makes nothing stale.
+A result tells the hashes of its inputs and its settings, so it is judged by content. Times count
+only for what no result may tell of; a folder that was copied, or a setting that was changed and
+changed back, makes nothing stale.
 """
 
 import os
@@ -45,7 +47,8 @@ class Judged:
 
 @dataclass
 class Judge:
-    """Judges the steps of one experiment, in the order of its graph; what has been done since is judged anew."""
+    """Judges the steps of one experiment, in the order of its graph; what has been done since is
+    judged anew."""
 
     out: Path
     """Folder of the results, from which they are named."""
@@ -72,8 +75,12 @@ class Judge:
         except ContractError as error:
             yield str(error).removeprefix(f"{step.target}: ")
             return
-        yield from self._lacking([*step.beside, *(step.target.with_name(name) for name in told.get("beside", []))])
-        yield from self._other_inputs(step, {(entry["name"], entry["sha256"]) for entry in told.get("inputs", [])})
+        yield from self._lacking(
+            [*step.beside, *(step.target.with_name(name) for name in told.get("beside", []))]
+        )
+        yield from self._other_inputs(
+            step, {(entry["name"], entry["sha256"]) for entry in told.get("inputs", [])}
+        )
         yield from _other_settings(told.get("config", {}), step.settings)
         if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
             yield f"{self._name(step.watched)} is newer"
@@ -122,7 +129,8 @@ def _left_out(judged: Judged) -> Judged:
 
 
 def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:
-    """Yield the settings that have another value; one that the file is silent about cannot be compared."""
+    """Yield the settings that have another value; one that the file is silent about cannot be
+    compared."""
     for key in sorted(then.keys() & now.keys()):
         old, new = then[key], now[key]
         if isinstance(old, Mapping) and isinstance(new, Mapping):

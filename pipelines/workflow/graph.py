@@ -1,7 +1,8 @@
-"""One experiment as a graph of files: which comes from which, by which command, under which settings.
+"""One experiment as a graph of files: which comes from which, by which command, under which
+settings.
 
-It is written here and nowhere else: ``exoid run``, ``exoid status``, a command that is given no files, and make, by the
-rules that ``split`` writes, all go by it.
+It is written here and nowhere else: ``exoid run``, ``exoid status``, a command that is given no
+files, and make, by the rules that ``split`` writes, all go by it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,7 +15,17 @@ from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
 from pipelines.workflow.imported import ImportedRuns
 
-STAGES = ("design", "acquire", "filter", "identify", "diagnose", "simulate", "replay", "extended", "report")
+STAGES = (
+    "design",
+    "acquire",
+    "filter",
+    "identify",
+    "diagnose",
+    "simulate",
+    "replay",
+    "extended",
+    "report",
+)
 """Those of an experiment; what it has nothing to do for has no step."""
 
 
@@ -39,7 +50,8 @@ class Step:
     beside: tuple[Path, ...] = ()
     """Other files that the command always makes; it is done where none is missing."""
     may_fail: bool = False
-    """Whether it may be impossible, so that what needs it does without: not every model with causes can move."""
+    """Whether it may be impossible, so that what needs it does without: not every model with causes
+    can move."""
     takes_all: bool = False
     """Whether it takes whatever else the results' folder holds, too."""
 
@@ -54,7 +66,9 @@ class Step:
         return tuple(f"run-{self.run}" if name == "run" else name for name in self.settings)
 
 
-def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRuns = ImportedRuns()) -> tuple[Step, ...]:
+def graph(
+    experiment: Experiment, config: Path, out: Path, imported: ImportedRuns = ImportedRuns()
+) -> tuple[Step, ...]:
     """Return an experiment's steps, each after those it needs.
 
     Parameters
@@ -99,17 +113,31 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
         verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
         words = ("diagnose", *_words(recordings))
-        steps.append(step("diagnose", verdict, recordings.values(), counted, *words, beside=DIAGNOSED))
+        steps.append(
+            step("diagnose", verdict, recordings.values(), counted, *words, beside=DIAGNOSED)
+        )
         extended = verdict.with_name("parameters.parquet")
 
     def simulated(model: Path, folder: Path, loop: str, replay: str) -> Iterator[Step]:
         called: tuple[str, ...] = ("simulate", model.as_posix())
         if imported.of_a_leg:
             sweep = [SWEEP] if experiment.simulate.sweep_nm_s_rad else []
-            yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called, beside=sweep)
+            yield step(
+                loop, folder / LOOP, [model], ("simulate", "mechanism"), *called, beside=sweep
+            )
         for name in (run.name for run in validate):
-            inputs, words = [model, recordings[name]], (*called, "--replay", recordings[name].as_posix())
-            yield step(replay, folder / f"replay-{name}.parquet", inputs, ("filter", "mechanism"), *words, run=name)
+            inputs, words = (
+                [model, recordings[name]],
+                (*called, "--replay", recordings[name].as_posix()),
+            )
+            yield step(
+                replay,
+                folder / f"replay-{name}.parquet",
+                inputs,
+                ("filter", "mechanism"),
+                *words,
+                run=name,
+            )
 
     # What somebody else recorded need not tell enough for a model that can move.
     loops = simulated(parameters, out / "simulated", "simulate", "replay")
@@ -125,7 +153,8 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
 LOOP, SWEEP, WHOLE_FOLDER = "rbf.parquet", "kv-sweep.csv", ("identify", "diagnose")
 IDENTIFIED = ("residuals.parquet",)
 DIAGNOSED = ("parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json")
-"""What these write besides their target, whatever they find; figures are drawn from it, and are not looked for."""
+"""What these write besides their target, whatever they find; figures are drawn from it, and are not
+looked for."""
 
 
 def _output(stage: str, target: Path) -> str:
@@ -138,7 +167,9 @@ def _words(files: Mapping[str, Path]) -> list[str]:
     return [file.as_posix() for file in files.values()]
 
 
-def _recorded(experiment: Experiment, run: RunSettings, target: Path, designed: Path, told: tuple[str, ...]) -> Step:
+def _recorded(
+    experiment: Experiment, run: RunSettings, target: Path, designed: Path, told: tuple[str, ...]
+) -> Step:
     """Return the step that records one run: its rig and its excitation count by their content."""
     excitation = experiment.file(run.trajectory) if run.trajectory else designed
     rig = experiment.file(experiment.acquire.rig)
@@ -146,16 +177,30 @@ def _recorded(experiment: Experiment, run: RunSettings, target: Path, designed: 
         "acquire",
         target,
         (excitation, rig),
-        # Of [acquire] the rig counts by its content, as an input does: it may stand elsewhere on another computer.
-        {"acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz}, "run": run.model_dump(mode="json")},
-        ("acquire", *told, "--run", run.name, "--trajectory", excitation.as_posix(), "-o", target.as_posix()),
+        # Of [acquire] the rig counts by its content, as an input does: it may stand elsewhere on
+        # another computer.
+        {
+            "acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz},
+            "run": run.model_dump(mode="json"),
+        },
+        (
+            "acquire",
+            *told,
+            "--run",
+            run.name,
+            "--trajectory",
+            excitation.as_posix(),
+            "-o",
+            target.as_posix(),
+        ),
         run=run.name,
         watched=sealed_file(rig),
     )
 
 
 def sealed_file(rig: Path) -> Path | None:
-    """Return the file of what a rig hides, where there is one; a rig that lacks it says so when it is started."""
+    """Return the file of what a rig hides, where there is one; a rig that lacks it says so when it
+    is started."""
     plant = load_rig(rig).plant if rig.is_file() else None
     sealed = rig.parent / plant.sealed if plant and plant.sealed else None
     return sealed if sealed and sealed.is_file() else None

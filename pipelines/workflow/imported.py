@@ -1,4 +1,5 @@
-"""Runs whose recordings came from elsewhere: no command of an experiment makes these, or could make them again."""
+"""Runs whose recordings came from elsewhere: no command of an experiment makes these, or could make
+them again."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,10 +22,12 @@ class ImportedRuns:
     of_a_leg: bool = True
     """Whether they are of hip and knee, whose gait the adaptive loop follows."""
     damaged: tuple[Path, ...] = ()
-    """Files among them that can no longer be read: of which run they are, and for what, nobody knows."""
+    """Files among them that can no longer be read: of which run they are, and for what, nobody
+    knows."""
 
     def refuse_damaged(self) -> None:
-        """Refuse to go on without a recording that was there: the results would be of the others alone."""
+        """Refuse to go on without a recording that was there: the results would be of the others
+        alone."""
         if self.damaged:
             raise InputError(damage(self.damaged))
 
@@ -44,8 +47,8 @@ DAMAGED = "damaged or truncated"
 def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, ImportedRuns]:
     """Return the experiment with its runs, and those whose recordings were imported.
 
-    Where exoid.toml names no run, the imported recordings in the folder of the results are the runs: each says itself
-    which kind of run it is, and for which purpose.
+    Where exoid.toml names no run, the imported recordings in the folder of the results are the
+    runs: each says itself which kind of run it is, and for which purpose.
     """
     files = sorted((out / "recordings").glob("*.parquet"))
     found = dict(_imported(files))
@@ -58,11 +61,14 @@ def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, Import
         ]
         experiment = experiment.model_copy(update={"run": tuple(runs)})
     names = frozenset(run.name for run in experiment.run if run.name in found)
-    return experiment, ImportedRuns(names, all(joints_of(found[name]) == HIP_AND_KNEE for name in names), damaged)
+    return experiment, ImportedRuns(
+        names, all(joints_of(found[name]) == HIP_AND_KNEE for name in names), damaged
+    )
 
 
 def _damaged(experiment: Experiment, imported: bool, files: Iterable[Path]) -> Iterator[Path]:
-    """Yield the damaged files that were imported, as far as others tell: they themselves tell nothing any more."""
+    """Yield the damaged files that were imported, as far as others tell: they themselves tell
+    nothing any more."""
     named = {run.name for run in experiment.run}
     if "run" in experiment.model_fields_set:
         counted = named if imported else set[str]()  # else the rig's, which can be recorded anew
@@ -78,9 +84,12 @@ def imported_in(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def refuse_imported(path: Path) -> None:
-    """Refuse to record where an imported recording is: make may not know yet that it is none of ours to make."""
+    """Refuse to record where an imported recording is: make may not know yet that it is none of
+    ours to make."""
     if dict(_imported([path])):
-        raise InputError(f"{path}: was imported, not overwritten; name another file with -o, or move it away")
+        raise InputError(
+            f"{path}: was imported, not overwritten; name another file with -o, or move it away"
+        )
 
 
 def _imported(paths: Iterable[Path]) -> Iterator[tuple[str, dict[str, Any]]]:

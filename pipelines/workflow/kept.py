@@ -7,7 +7,8 @@ from pipelines.errors import InputError
 
 
 def refuse_recorded(path: Path) -> None:
-    """Refuse to record over what a rig recorded that is not embedded; a virtual leg can be moved again."""
+    """Refuse to record over what a rig recorded that is not embedded; a virtual leg can be moved
+    again."""
     rig = told_by(path).get("config", {}).get("rig", {})
     if rig and not rig["embedded"]:
         raise InputError(

@@ -1,7 +1,8 @@
 """An experiment told to make: one small file a section of its settings, and the rules of its graph.
 
-A section's file whose content is already right keeps its time, so that make re-runs only what a change touches.
-``graph.mk`` is rewritten each time: its time says when the settings were last looked at.
+A section's file whose content is already right keeps its time, so that make re-runs only what a
+change touches. ``graph.mk`` is rewritten each time: its time says when the settings were last
+looked at.
 """
 
 import json
@@ -23,14 +24,19 @@ def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
     experiment, imported = with_imported(experiment, folder.parent)
     imported.refuse_damaged()
-    # Names that make knows stand for the places, so that the rules hold wherever make is told to work.
+    # Names that make knows stand for the places, so that the rules hold wherever make is told to
+    # work.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
-    sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate")
+    sections = experiment.sections(
+        "mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate"
+    )
     if any(step.stage == "acquire" for step in steps):
         experiment.refuse_missing_files()
         _add_what_is_recorded(experiment, sections)
     for name, content in sections.items():
-        _write_if_changed(folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n")
+        _write_if_changed(
+            folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n"
+        )
     write_text(folder / "graph.mk", "\n".join(_rules(steps)) + "\n")
 
 
@@ -38,7 +44,8 @@ def _add_what_is_recorded(experiment: Experiment, sections: dict[str, Any]) -> N
     # A rig or an excitation is a setting too: its content counts, not the time of its file.
     rig = experiment.file(experiment.acquire.rig)
     sections["acquire"]["rig_sha256"] = sha256(rig)
-    # No stage reads this file, it only has a time for make: what the rig keeps sealed goes no further than its hash.
+    # No stage reads this file, it only has a time for make: what the rig keeps sealed goes no
+    # further than its hash.
     sealed = sealed_file(rig)
     sections["acquire"]["hidden_sha256"] = sha256(sealed) if sealed else None
     for run in experiment.run:
@@ -78,7 +85,8 @@ def _rule(step: Step) -> Iterator[str]:
 
 
 def _if_incomplete(step: Step) -> Iterator[str]:
-    """Yield what a step needs that is to be done again for a missing file; rules of several files need make 4.3."""
+    """Yield what a step needs that is to be done again for a missing file; rules of several files
+    need make 4.3."""
     beside = " ".join(file.as_posix() for file in step.beside)
     if beside:
         yield f"$(if $(filter-out $(wildcard {beside}),{beside}),{INCOMPLETE})"

@@ -42,19 +42,30 @@ def rig_file(tmp_path):
     """Write a shipped rig file with changes; short ramps keep the tests short."""
 
     def write(shipped="plain", port=None, replace=None, drop=(), **changes) -> Path:
-        text = (datasets() / "rigs" / f"{shipped}.toml").read_text().replace("embedded = true", "embedded = false", 1)
+        text = (
+            (datasets() / "rigs" / f"{shipped}.toml")
+            .read_text()
+            .replace("embedded = true", "embedded = false", 1)
+        )
         if port:
             text = re.sub(r"^(map = .*)$", rf"\1\nport = {port}", text, flags=re.MULTILINE)
         # Hardly a shipped file names these.
         silent = {key: changes.pop(key) for key in ("connect_s", "control_s") if key in changes}
-        text = text.replace("[safety]\n", "[safety]\n" + "".join(f"{key} = {value}\n" for key, value in silent.items()))
+        text = text.replace(
+            "[safety]\n",
+            "[safety]\n" + "".join(f"{key} = {value}\n" for key, value in silent.items()),
+        )
         for key, value in {"ramp_s": 0.8, "settle_s": 0.2, "watchdog_s": 1.0, **changes}.items():
-            text, count = re.subn(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
+            text, count = re.subn(
+                rf"^{key} = [^#\n]*", f"{key} = {value} ", text, flags=re.MULTILINE
+            )
             assert count, key
         for old, new in (replace or {}).items():
             assert old in text
             text = text.replace(old, new)
-        text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(tuple(drop)))
+        text = "".join(
+            line for line in text.splitlines(keepends=True) if not line.startswith(tuple(drop))
+        )
         path = tmp_path / f"rig{len(list(tmp_path.glob('rig*.toml')))}.toml"
         path.write_text(text)
         return path
@@ -74,7 +85,13 @@ class Served:
 
     async def _serve(self) -> None:
         self._loop, self._until = asyncio.get_running_loop(), asyncio.Event()
-        await server.serve(self._rig, self._plant, self._port, lambda place, line: self._listening.set(), self._until)
+        await server.serve(
+            self._rig,
+            self._plant,
+            self._port,
+            lambda place, line: self._listening.set(),
+            self._until,
+        )
 
     def start(self) -> None:
         self._thread.start()
@@ -136,14 +153,17 @@ def record(tmp_path, excitation, rig_file, serve):
         duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, hooks=None,
         **changes,
     ):  # fmt: skip
-        """``believed`` are changes of the rig file that acquisition reads, not of the rig that is there.
+        """``believed`` are changes of the rig file that acquisition reads, not of the rig that is
+        there.
 
         ``hooks`` are called by acquisition: ``begin``, ``claim``.
         """
         port, replace = free_port(), changes.pop("replace", None) or {}
         rig = rig_file(port=port, replace=replace, **changes)
         seen = rig_file(port=port, replace=replace | believed, **changes) if believed else rig
-        settings = RunSettings(name="test", run=run, purpose="train", duration_s=duration_s, seed=seed)
+        settings = RunSettings(
+            name="test", run=run, purpose="train", duration_s=duration_s, seed=seed
+        )
         output = tmp_path / "test.parquet"
         with serve(rig, port, run, seed, fault) as served:
             if served_as is not None:

@@ -1,4 +1,5 @@
-"""A rig that misbehaves as it is told, in simulated time: what acquisition tells it is kept, nothing is waited for."""
+"""A rig that misbehaves as it is told, in simulated time: what acquisition tells it is kept,
+nothing is waited for."""
 
 import asyncio
 import heapq
@@ -91,7 +92,8 @@ class Asked:
 
 @dataclass
 class SimulatedDrive:
-    """Registers of a drive that follows its set-point at once, and whose control word works by its level."""
+    """Registers of a drive that follows its set-point at once, and whose control word works by its
+    level."""
 
     joint: int
     settings: object
@@ -119,11 +121,17 @@ class SimulatedDrive:
         self.told_at, self.pace = self.rig.count(), 0.0
         self.largest_leap, self.was_enabled, self.said_idle = 0.0, False, False
         self.was_without_torque = False
-        self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
+        self.read, self.write = (
+            Block(registers_of(self.map.read)),
+            Block(registers_of(self.map.write)),
+        )
 
     @property
     def enabled(self):
-        return not (self.fault or self.unpowered) and self.control in (self.map.enable, self.map.halt)
+        return not (self.fault or self.unpowered) and self.control in (
+            self.map.enable,
+            self.map.halt,
+        )
 
     def take(self, words):
         told = self.write.decode(words)
@@ -138,7 +146,8 @@ class SimulatedDrive:
             self.angle = self.told
 
     def go_on(self):
-        """Be where the drive is by now that goes on at its set-points' pace for some samples while none comes."""
+        """Be where the drive is by now that goes on at its set-points' pace for some samples while
+        none comes."""
         if self.rig.goes_on and self.enabled:
             self.angle = self.told + self.pace * min(max(self.count - self.told_at - 1, 0), 5)
 
@@ -178,7 +187,10 @@ class SimulatedRig:
         self.rig, self.clock, self.stopped_by, self.goes_on = rig, clock, stopped_by, goes_on
         self.requests, self.samples, self.began = 0, 0, clock.now
         self.events = sorted(events, key=lambda event: event.at)
-        self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self, angle=rest[j]) for j, d in enumerate(rig.drive)]
+        self.drives = [
+            SimulatedDrive(j, d, rig.map.drive[d.map], self, angle=rest[j])
+            for j, d in enumerate(rig.drive)
+        ]
         self.sensor_block = Block(registers_of(rig.map.sensor["force"].read))
         self.force = 0.0
         self.exchanged, self.dead = set(), {}
@@ -263,7 +275,14 @@ class SimulatedRig:
             block, words = write
             told = block.decode(words)
             self.told.append(
-                Told(self.clock.now, drive.joint, told["reference"], int(told["control"]), arrived, drive.said_idle)
+                Told(
+                    self.clock.now,
+                    drive.joint,
+                    told["reference"],
+                    int(told["control"]),
+                    arrived,
+                    drive.said_idle,
+                )
             )
             if told["control"] == drive.map.disable and kind:
                 self.failed_to_disable[drive.joint] += 1
@@ -289,10 +308,17 @@ class SimulatedRig:
             return []
         address, count = read
         if drive is None:
-            values = {"sequence": self.count(), "force_x": self.force, "force_y": sin(self.count()), "force_z": 0.0}
+            values = {
+                "sequence": self.count(),
+                "force_x": self.force,
+                "force_y": sin(self.count()),
+                "force_z": 0.0,
+            }
             return self.sensor_block.encode(values)
         if address == drive.write.address:
-            return drive.write.encode({"reference": drive.told, "control": drive.control, "heartbeat": 0})
+            return drive.write.encode(
+                {"reference": drive.told, "control": drive.control, "heartbeat": 0}
+            )
         if count == drive.read.count:
             drive.latch()
         if address <= drive.map.read.status.address < address + count:
@@ -322,7 +348,8 @@ class Run:
 
 
 def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=None, goes_on=False):
-    """Record one run on a simulated rig, whose drives hold while they are told nothing, or go on for a while.
+    """Record one run on a simulated rig, whose drives hold while they are told nothing, or go on
+    for a while.
 
     Parameters
     ----------
@@ -400,10 +427,17 @@ def _patched(simulated, time, run, plan, own):
     safety = simulated.rig.safety
 
     async def read(device, address, count, *, in_motion=False):
-        return await ask(device, None, (address, count), safety.longest_reply_s if in_motion else safety.connect_s)
+        return await ask(
+            device,
+            None,
+            (address, count),
+            safety.longest_reply_s if in_motion else safety.connect_s,
+        )
 
     async def write(device, block, words, *, in_motion=False):
-        await ask(device, (block, words), None, safety.longest_reply_s if in_motion else safety.watchdog_s)
+        await ask(
+            device, (block, words), None, safety.longest_reply_s if in_motion else safety.watchdog_s
+        )
 
     async def exchange(device, block, words, read):
         return await ask(device, (block, words), (read.address, read.count), safety.longest_reply_s)
@@ -429,7 +463,9 @@ def _patched(simulated, time, run, plan, own):
         for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))
         stack.enter_context(patch.object(Line, "connect", connect))
-        stack.enter_context(patch("pipelines.acquisition.acquire.refuse_unkept_rate", keeps_any_rate))
+        stack.enter_context(
+            patch("pipelines.acquisition.acquire.refuse_unkept_rate", keeps_any_rate)
+        )
         stack.enter_context(patch.object(ModbusBaseClient, "connected", True))
         stack.enter_context(patch.object(Supervisor, "abort", watched_abort))
         stack.enter_context(patch.object(Supervisor, "_go", watched_go))
@@ -445,7 +481,9 @@ def _patched(simulated, time, run, plan, own):
             if place == name:
                 genuine = getattr(where, attribute)
                 stack.enter_context(
-                    patch.object(where, attribute, lambda *a, genuine=genuine: (fail(), genuine(*a))[1])
+                    patch.object(
+                        where, attribute, lambda *a, genuine=genuine: (fail(), genuine(*a))[1]
+                    )
                 )
         yield report
         with suppress(RuntimeError):

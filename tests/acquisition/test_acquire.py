@@ -37,7 +37,9 @@ def test_every_sample_of_the_run_is_there_and_tells_its_time(record):
     assert table.metadata["period_s"] == pytest.approx(1.0)
 
 
-def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(record, monkeypatch, tmp_path):
+def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(
+    record, monkeypatch, tmp_path
+):
     def interrupted(*given):
         signal.raise_signal(signal.SIGINT)
         write_recording(*given)
@@ -71,7 +73,9 @@ def test_a_run_that_another_one_was_faster_than_says_so(record, tmp_path):
     def begin(rig, trajectory):
         others.append(Journal(path, ["time_s"], {"run": "exo_alone"}))
 
-    with pytest.raises(InputError, match=r"test\.parquet\.journal: another run is recording there now"):
+    with pytest.raises(
+        InputError, match=r"test\.parquet\.journal: another run is recording there now"
+    ):
         record(hooks={"begin": begin})
     others[0].close()
     assert path.exists()
@@ -101,10 +105,17 @@ def test_cuff_forces_are_read_with_the_human_only_and_belong_to_their_sample(rec
     table = record(run="with_human", ripple_nm="[0.0, 0.0]", noise_n=0.0)
     alone = record(run="exo_alone")
     assert not [column for column in alone.frame if "force" in column]
-    forces = table.frame[[column for column in table.frame if "force" in column]].to_numpy().reshape(-1, 4, 3)
+    forces = (
+        table.frame[[column for column in table.frame if "force" in column]]
+        .to_numpy()
+        .reshape(-1, 4, 3)
+    )
     q = table.stacked("angle")
-    on_leg = cuff_torque(forces[:, :2].sum(axis=1), forces[:, 2:].sum(axis=1), q, geometry_of(table.metadata))
-    # What the drives deliver less what the leg takes is the exoskeleton's own: small, and in step with the motion.
+    on_leg = cuff_torque(
+        forces[:, :2].sum(axis=1), forces[:, 2:].sum(axis=1), q, geometry_of(table.metadata)
+    )
+    # What the drives deliver less what the leg takes is the exoskeleton's own: small, and in step
+    # with the motion.
     own = table.stacked("torque") - on_leg
     assert (own.std(axis=0) < 0.8 * table.stacked("torque").std(axis=0)).all()
 
@@ -134,7 +145,8 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     frame, gaps = table.frame, table.metadata["gaps"]
     missed = sum(count for _, count in gaps)
     assert len(frame) + missed == 100
-    assert missed <= 10  # a computer that is busy with something else may miss some, and then says so
+    # A computer that is busy with something else may miss some, and then says so.
+    assert missed <= 10
     assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 50, atol=2e-6)
     # A sensor that is asked late finds the next sample, and has nothing new a cycle later.
     is_force = frame.columns.str.contains("_force_")
@@ -142,8 +154,12 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     assert frame.loc[:, is_force].isna().any(axis=1).sum() <= 10
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder in which nobody can write")
-def test_a_folder_that_takes_no_recording_is_refused_before_anything_is_connected(rig_file, excitation):
+@pytest.mark.skipif(
+    not Path("/proc/self").exists(), reason="needs a folder in which nobody can write"
+)
+def test_a_folder_that_takes_no_recording_is_refused_before_anything_is_connected(
+    rig_file, excitation
+):
     run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
     with pytest.raises(OSError) as refused:
         acquire(rig_file(port=1), run, excitation, Path("/proc/one.parquet"))

@@ -40,9 +40,16 @@ def test_a_run_enables_halts_and_disables_and_nothing_else(record, heard):
 
 def test_the_shipped_template_records_a_run_where_a_virtual_rig_plays_it(tmp_path, excitation):
     rigs, path, output = datasets() / "rigs", tmp_path / "lab.toml", tmp_path / "test.parquet"
-    template, plant = (rigs / "lab.toml").read_text(), (rigs / "plain.toml").read_text().partition("[plant]\n")[2]
-    embedded = template.replace('name = "lab"\n', 'name = "lab"\nembedded = true\nclock = "lockstep"\n')
-    path.write_text(f"{embedded}\n[plant]\n{plant}".replace("watchdog_s = 0.1 ", "watchdog_s = 20.0 "))
+    template, plant = (
+        (rigs / "lab.toml").read_text(),
+        (rigs / "plain.toml").read_text().partition("[plant]\n")[2],
+    )
+    embedded = template.replace(
+        'name = "lab"\n', 'name = "lab"\nembedded = true\nclock = "lockstep"\n'
+    )
+    path.write_text(
+        f"{embedded}\n[plant]\n{plant}".replace("watchdog_s = 0.1 ", "watchdog_s = 20.0 ")
+    )
     excitation.write_text(
         'unit = "rad"\nomega_rad_s = 6.283185307179586\ntheta0_rad = [0.2, -0.4]\n'
         "a = [[0.02], [0.02]]\nb = [[0.0], [0.0]]\n"
@@ -104,11 +111,15 @@ def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record,
     assert str(caught.value).startswith(
         "USE THE EMERGENCY STOP: the run is complete; and could not be disabled: drive hip (127.0.0.1:"
     )
-    assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(caught.value)
+    assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(
+        caught.value
+    )
     assert (told.count("hip"), told.count("knee")) == (4, 2)
 
 
-def test_a_drive_that_is_found_enabled_is_disabled_and_the_run_refused(record, monkeypatch, tmp_path):
+def test_a_drive_that_is_found_enabled_is_disabled_and_the_run_refused(
+    record, monkeypatch, tmp_path
+):
     served, begin = [], Servo.__init__
 
     def left_enabled(servo, *arguments):
@@ -116,7 +127,9 @@ def test_a_drive_that_is_found_enabled_is_disabled_and_the_run_refused(record, m
         servo._control = ENABLE
 
     monkeypatch.setattr(Servo, "__init__", left_enabled)
-    with pytest.raises(DeviceError, match=r"^drive hip \(.*\) and drive knee \(.*\): enabled before the run began"):
+    with pytest.raises(
+        DeviceError, match=r"^drive hip \(.*\) and drive knee \(.*\): enabled before the run began"
+    ):
         record(served_as=served)
     assert served[0].enabled == [False, False]
 
@@ -129,9 +142,13 @@ def first_drive(rig_file):
 
 
 @pytest.mark.parametrize("angle", [float("nan"), 1.8, -300.0])
-def test_no_set_point_goes_out_that_is_no_number_or_outside_the_limits_whoever_sends_it(rig_file, angle):
+def test_no_set_point_goes_out_that_is_no_number_or_outside_the_limits_whoever_sends_it(
+    rig_file, angle
+):
     drive = first_drive(rig_file)
-    with pytest.raises(DeviceError, match=r"outside its limits -0\.35 to 1\.75 rad; it was not sent"):
+    with pytest.raises(
+        DeviceError, match=r"outside its limits -0\.35 to 1\.75 rad; it was not sent"
+    ):
         drive.words(DISABLE, angle)
 
 
@@ -162,17 +179,27 @@ def test_a_fault_is_cleared_where_the_operator_asks_for_it_and_nowhere_else(
     port = free_port()
     with pytest.raises(DeviceError) as caught:
         faulty(rig_file(port=port), False, tmp_path, excitation, serve, port)
-    assert "clear the fault and start again, with --reset-faults where the drive is to clear it" in str(caught.value)
+    assert (
+        "clear the fault and start again, with --reset-faults where the drive is to clear it"
+        in str(caught.value)
+    )
     assert heard() == [[DISABLE]] * 2
     port = free_port()
     faulty(rig_file(port=port), True, tmp_path, excitation, serve, port)
-    assert sorted(heard()[2:]) == sorted([[DISABLE, ENABLE, HALT, DISABLE], [RESET, DISABLE, ENABLE, HALT, DISABLE]])
+    assert sorted(heard()[2:]) == sorted(
+        [[DISABLE, ENABLE, HALT, DISABLE], [RESET, DISABLE, ENABLE, HALT, DISABLE]]
+    )
 
 
-def test_a_fault_that_the_rig_file_knows_no_word_for_is_not_cleared(tmp_path, excitation, rig_file, serve):
+def test_a_fault_that_the_rig_file_knows_no_word_for_is_not_cleared(
+    tmp_path, excitation, rig_file, serve
+):
     port = free_port()
     rig = rig_file(port=port, drop=("fault_reset",))
-    with pytest.raises(SettingsError, match=r"map.drive.servo.fault_reset: missing, but drive knee .* reports a fault"):
+    with pytest.raises(
+        SettingsError,
+        match=r"map.drive.servo.fault_reset: missing, but drive knee .* reports a fault",
+    ):
         faulty(rig, True, tmp_path, excitation, serve, port)
 
 
@@ -188,6 +215,9 @@ def test_a_drive_is_told_with_every_write_that_the_host_lives(record, monkeypatc
 
     monkeypatch.setattr(Drive, "hear", remember)
     control = 'control = { address = 202, type = "uint16" }'
-    record(duration_s=1.0, replace={control: f'{control}\nheartbeat = {{ address = 203, type = "uint16" }}'})
+    record(
+        duration_s=1.0,
+        replace={control: f'{control}\nheartbeat = {{ address = 203, type = "uint16" }}'},
+    )
     assert beats == list(range(1, len(beats) + 1))
     assert len(beats) > 300

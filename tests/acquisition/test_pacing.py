@@ -70,7 +70,8 @@ def test_after_a_busy_moment_it_is_known_which_sample_the_exchange_finds(clock):
 
 
 def steps_about(clock, took_s, brought):
-    """Steps from sample to sample found in 100 cycles, where the exchange of cycle 50 takes so long.
+    """Steps from sample to sample found in 100 cycles, where the exchange of cycle 50 takes so
+    long.
 
     ``brought`` returns the sample that it brings, of the one before it and the one that was found.
     """

@@ -29,7 +29,9 @@ def test_set_points_leave_rest_gently_meet_the_motion_at_its_speed_and_come_back
     # A jump in speed would be an acceleration of at least 0.1 rad/s in one sample, 20 rad/s².
     assert np.abs(acceleration).max() < 15.0
     instants = (np.arange(1000) + 0.5) / RATE
-    assert_allclose(np.asarray(plan.reference)[plan.first : plan.stop], motion.at(instants)[0], atol=1e-12)
+    assert_allclose(
+        np.asarray(plan.reference)[plan.first : plan.stop], motion.at(instants)[0], atol=1e-12
+    )
 
 
 def test_before_the_recording_the_motion_itself_runs_for_the_settling_time(rig_file, motion):
@@ -66,23 +68,34 @@ def test_a_motion_too_fast_for_the_rig_is_refused(rig_file, motion):
     with pytest.raises(InputError) as caught:
         make_plan(load_rig(rig_file()), fast, REST, 5.0, RATE)
     assert "the hip would move at" in str(caught.value)
-    assert str(caught.value).endswith("but the rig allows 3 rad/s; make the excitation slower or smaller")
+    assert str(caught.value).endswith(
+        "but the rig allows 3 rad/s; make the excitation slower or smaller"
+    )
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.05, 0.0), (0.0, 0.05)])
 def test_a_motion_whose_set_points_show_a_standstill_is_refused_for_its_own_speed(rig_file, a, b):
     """One whole turn a sample: the phase is the same at each set-point."""
     alias = FourierTrajectory(
-        np.array([0.6, -0.9]), np.array([[a], [0.0]]), np.array([[b], [0.0]]), omega=2 * np.pi * RATE
+        np.array([0.6, -0.9]),
+        np.array([[a], [0.0]]),
+        np.array([[b], [0.0]]),
+        omega=2 * np.pi * RATE,
     )
-    with pytest.raises(InputError, match=r"the hip would move at .* which 200 set-points a second do not show"):
+    with pytest.raises(
+        InputError, match=r"the hip would move at .* which 200 set-points a second do not show"
+    ):
         make_plan(load_rig(rig_file()), alias, REST, 5.0, RATE)
 
 
 def test_a_run_shorter_than_the_period_does_not_let_the_ramps_leave_the_limits(rig_file):
-    # The first half of the period keeps the limits; the ramps run the other half, where the hip is at 2 rad.
+    # The first half of the period keeps the limits; the ramps run the other half, where the hip is
+    # at 2 rad.
     half = FourierTrajectory(
-        np.array([1.2, -0.9]), np.array([[-0.8], [0.1]]), np.array([[0.0], [0.0]]), omega=0.2 * np.pi
+        np.array([1.2, -0.9]),
+        np.array([[-0.8], [0.1]]),
+        np.array([[0.0], [0.0]]),
+        omega=0.2 * np.pi,
     )
     rig = load_rig(rig_file(shipped="plain", ramp_s=3.0, settle_s=1.0))
     assert half.at((np.arange(1000) + 0.5) / RATE)[0][:, 0].max() < 1.73
@@ -92,7 +105,9 @@ def test_a_run_shorter_than_the_period_does_not_let_the_ramps_leave_the_limits(r
     assert "on the way into the run, but the rig allows -0.35 to 1.75 rad" in str(caught.value)
 
 
-def test_set_points_that_are_computed_as_they_come_due_are_those_that_were_checked(rig_file, motion, monkeypatch):
+def test_set_points_that_are_computed_as_they_come_due_are_those_that_were_checked(
+    rig_file, motion, monkeypatch
+):
     monkeypatch.setattr("pipelines.acquisition.set_points.PIECE", 64)
     reference = make_plan(load_rig(rig_file()), motion, REST, 5.0, RATE).reference
     every = np.asarray(reference)

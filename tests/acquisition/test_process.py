@@ -42,7 +42,17 @@ def experiment(tmp_path, excitation):
             f'[[run]]\nname = "one"\nrun = "{run}"\npurpose = "train"\nduration_s = {duration_s}\nseed = 3\n'
         )
         output = tmp_path / "recordings" / "one.parquet"
-        return ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", output], output
+        return [
+            "acquire",
+            "--config",
+            config,
+            "--run",
+            "one",
+            "--trajectory",
+            excitation,
+            "-o",
+            output,
+        ], output
 
     return write
 
@@ -54,7 +64,9 @@ def start():
 
     def run(arguments):
         command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
-        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        started.append(
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        )
         return started[-1]
 
     yield run
@@ -96,11 +108,18 @@ def ended(folder):
 
 
 def said(err):
-    """Return what was said besides that the rig takes its time to start, which a busy computer says."""
-    return "".join(line for line in err.splitlines(keepends=True) if not line.startswith("starting the virtual rig"))
+    """Return what was said besides that the rig takes its time to start, which a busy computer
+    says."""
+    return "".join(
+        line
+        for line in err.splitlines(keepends=True)
+        if not line.startswith("starting the virtual rig")
+    )
 
 
-def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(start, experiment, tmp_path):
+def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
+    start, experiment, tmp_path
+):
     arguments, output = experiment("default", 2.0, run="with_human")
     process = start(arguments)
     out, err = process.communicate(timeout=120)
@@ -112,7 +131,15 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
     assert os.listdir(output.parent) == ["one.parquet"]
     assert ended(tmp_path)
     told = output.read_bytes().decode(errors="replace") + str(table.metadata) + out
-    for secret in ("sealed", "stribeck", "presliding", "elasticity", "encoder_offset", "inertial", "coulomb"):
+    for secret in (
+        "sealed",
+        "stribeck",
+        "presliding",
+        "elasticity",
+        "encoder_offset",
+        "inertial",
+        "coulomb",
+    ):
         assert secret not in told
 
 
@@ -126,7 +153,9 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
         (signal.SIGTSTP, "Ctrl-Z"),
     ],
 )
-def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, experiment, tmp_path, number, name):
+def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(
+    start, experiment, tmp_path, number, name
+):
     arguments, output = experiment("plain", 4000.0)
     process = start(arguments)
     wait_for_rows(process, output, 100)
@@ -145,7 +174,8 @@ def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, 
 
 @pytest.fixture
 def start_on_a_terminal():
-    """Start exoid on a terminal of its own; returns the process and the end that closes the terminal."""
+    """Start exoid on a terminal of its own; returns the process and the end that closes the
+    terminal."""
     started = []
 
     def run(arguments):
@@ -179,7 +209,9 @@ def test_a_terminal_that_is_closed_stops_the_leg_and_its_silence_is_no_fault_of_
     assert ended(tmp_path)
 
 
-def test_a_folder_that_vanishes_stops_the_leg_and_hides_neither_why_nor_how_it_was_left(start, experiment, tmp_path):
+def test_a_folder_that_vanishes_stops_the_leg_and_hides_neither_why_nor_how_it_was_left(
+    start, experiment, tmp_path
+):
     arguments, output = experiment("plain", 4000.0)
     process = start(arguments)
     wait_for_rows(process, output, 100)
@@ -202,7 +234,17 @@ def test_a_signal_while_a_silent_device_is_waited_for_before_anything_moves_ends
             "duration_s = 1.0\nseed = 3\n"
         )
         process = start(
-            ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", tmp_path / "one.parquet"]
+            [
+                "acquire",
+                "--config",
+                config,
+                "--run",
+                "one",
+                "--trajectory",
+                excitation,
+                "-o",
+                tmp_path / "one.parquet",
+            ]
         )
         connection, _ = silent.accept()
         with connection:
@@ -215,7 +257,13 @@ def test_a_signal_while_a_silent_device_is_waited_for_before_anything_moves_ends
 
 def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_path):
     arguments, output = experiment(
-        "real_time", 60.0, sample_rate_hz=SLOW_HZ, torque_nm=1000.0, speed_rad_s=50.0, watchdog_s=2.0, heartbeat_s=1.0
+        "real_time",
+        60.0,
+        sample_rate_hz=SLOW_HZ,
+        torque_nm=1000.0,
+        speed_rad_s=50.0,
+        watchdog_s=2.0,
+        heartbeat_s=1.0,
     )
     process = start(arguments)
     wait_for_rows(process, output, 1)
@@ -251,10 +299,17 @@ def status_of(client, unit):
     return reference * 1e-6, words[3]
 
 
-def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(start, rig_file, excitation, tmp_path):
+def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
+    start, rig_file, excitation, tmp_path
+):
     port, heartbeat_s = free_port(), 1.5
     rig = rig_file(
-        shipped="real_time", port=port, heartbeat_s=heartbeat_s, watchdog_s=2.0, torque_nm=1000.0, speed_rad_s=50.0
+        shipped="real_time",
+        port=port,
+        heartbeat_s=heartbeat_s,
+        watchdog_s=2.0,
+        torque_nm=1000.0,
+        speed_rad_s=50.0,
     )
     config = tmp_path / "exoid.toml"
     config.write_text(
@@ -264,7 +319,17 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
     serving = start(["rig", "serve", rig, "--run", "exo_alone", "--rate-hz", SLOW_HZ])
     assert str(port) in serving.stdout.readline() + serving.stdout.readline()
     output = tmp_path / "one.parquet"
-    arguments = ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", output]
+    arguments = [
+        "acquire",
+        "--config",
+        config,
+        "--run",
+        "one",
+        "--trajectory",
+        excitation,
+        "-o",
+        output,
+    ]
     acquiring = start(arguments)
     wait_for_rows(acquiring, output, 100)
     with ModbusTcpClient("127.0.0.1", port=port) as client:
@@ -275,7 +340,8 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
             seen.append((time.monotonic() - killed, *status_of(client, 1), status_of(client, 2)[1]))
             time.sleep(0.01)
     at, reference, hip, knee = np.transpose(seen)
-    # As docs/safety.md states it, and some time for a busy computer: at rest after five samples and the slowing down.
+    # As docs/safety.md states it, and some time for a busy computer: at rest after five samples and
+    # the slowing down.
     before = (at > 0.5 + 5 / SLOW_HZ + 1.3 / 8.0) & (hip == 0x0001)
     assert before.any() and np.ptp(reference[before]) < 1e-5
     for status in (hip, knee):
@@ -288,7 +354,7 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
     again = start([*arguments[:-1], tmp_path / "two.parquet", "--reset-faults"])
     _, err = again.communicate(timeout=60)
     assert again.returncode == 0
-    # On a busy computer a run in real time may miss a sample or leave a set-point out, and tells so: no fault of a
-    # drive is left to tell.
+    # On a busy computer a run in real time may miss a sample or leave a set-point out, and tells
+    # so: no fault of a drive is left to tell.
     missed = "samples were missed", "set-points were left out"
     assert all(any(words in line for words in missed) for line in err.splitlines()), err

@@ -1,4 +1,5 @@
-"""A stop heeds what the drives tell meanwhile, and what they told before it that nobody had come to judge."""
+"""A stop heeds what the drives tell meanwhile, and what they told before it that nobody had come to
+judge."""
 
 from dataclasses import replace
 
@@ -31,12 +32,19 @@ def run_with(tmp_path, *events, line=None, trajectory=TRAJECTORY):
     """Run on drives that read back and go on for a while when they are told nothing."""
     path = tmp_path / "x.parquet"
     return simulate(
-        RIGS["real_time", True, FINE_RAD, line], RUN, trajectory, path, list(events), REST_RAD, goes_on=True
+        RIGS["real_time", True, FINE_RAD, line],
+        RUN,
+        trajectory,
+        path,
+        list(events),
+        REST_RAD,
+        goes_on=True,
     )
 
 
 def times(share):
-    """Return a slower motion: after a silence these drives are where they are told within a sample."""
+    """Return a slower motion: after a silence these drives are where they are told within a
+    sample."""
     return replace(TRAJECTORY, a=share * TRAJECTORY.a, b=share * TRAJECTORY.b)
 
 
@@ -58,7 +66,9 @@ def test_a_stop_lets_go_of_a_leg_that_is_pressed_or_does_not_follow(joint, found
 
 
 @pytest.mark.parametrize("at", range(150, 162))
-def test_a_drive_that_said_beside_anothers_failure_that_it_is_not_enabled_is_told_disable_alone(tmp_path, at):
+def test_a_drive_that_said_beside_anothers_failure_that_it_is_not_enabled_is_told_disable_alone(
+    tmp_path, at
+):
     run = run_with(tmp_path, Event(at, "power"), Event(at, "raise", lambda: DeviceError("made up")))
     assert run.supervisor.why
     a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(run)
@@ -85,14 +95,18 @@ def test_a_drive_beside_a_silent_one_is_told_where_to_go_all_the_time(tmp_path, 
     told = [told.time for told in run.rig.told if told.joint != silent and told.control]
     reply_s = run.rig.rig.safety.longest_reply_s if line else 0.0
     assert max(np.diff(told)) <= 2 / RATE + reply_s + SOON_S
-    moved = np.diff([told.reference for told in run.rig.told if told.joint != silent and told.control])
+    moved = np.diff(
+        [told.reference for told in run.rig.told if told.joint != silent and told.control]
+    )
     assert moved[-1] == 0.0  # it has come to rest by then
 
 
 @pytest.mark.parametrize("line", LINES)
 @pytest.mark.parametrize("kind", ["lost", "no answer"])
 @pytest.mark.parametrize("at", range(125, 240, 7))
-def test_a_run_goes_on_after_one_lost_reply_though_the_other_drive_was_slowed_down(tmp_path, line, kind, at):
+def test_a_run_goes_on_after_one_lost_reply_though_the_other_drive_was_slowed_down(
+    tmp_path, line, kind, at
+):
     run = run_with(tmp_path, Event(at, kind), line=line, trajectory=times(0.1))
     assert run.supervisor.why is None
     # reply_s is three samples; on a shared line the device is not asked again for as long.
@@ -102,13 +116,18 @@ def test_a_run_goes_on_after_one_lost_reply_though_the_other_drive_was_slowed_do
 
 @pytest.mark.parametrize("at", range(150, 220))
 def test_a_stop_leaves_no_sample_of_a_drive_without_a_set_point(tmp_path, monkeypatch, at):
-    """Else it goes on by itself for a sample, and is led back with a jerk; replies take a fifth of a sample here."""
+    """Else it goes on by itself for a sample, and is led back with a jerk; replies take a fifth of
+    a sample here."""
     took_s = 0.2 / RATE
     monkeypatch.setattr("tests.acquisition.simulated.LATENCY_S", took_s)
     run = run_with(tmp_path, Event(at, "signal"))
     assert run.supervisor.why == "stopped by SIGTERM"
     for joint in range(2):
         told = [told for told in run.rig.told if told.joint == joint and told.control]
-        sample = [int((one.time + took_s - run.rig.began) * RATE) for one in told if one.time >= run.aborted_at]
+        sample = [
+            int((one.time + took_s - run.rig.began) * RATE)
+            for one in told
+            if one.time >= run.aborted_at
+        ]
         assert len(sample) >= 20
         assert set(np.diff(sample)) == {1}

@@ -1,4 +1,5 @@
-"""``make bench``: all speeds in one run. docs/benchmarks.md tells what was measured, and on which machine."""
+"""``make bench``: all speeds in one run. docs/benchmarks.md tells what was measured, and on which
+machine."""
 
 import os
 

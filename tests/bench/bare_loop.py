@@ -1,4 +1,5 @@
-"""What an acquisition cycle cannot be faster than here: its pymodbus calls, and nothing made of the answers."""
+"""What an acquisition cycle cannot be faster than here: its pymodbus calls, and nothing made of the
+answers."""
 
 import asyncio
 import time
@@ -17,9 +18,15 @@ def cycles_a_second(rig: RigSettings) -> float:
 
 
 async def _cycles_a_second(rig: RigSettings) -> float:
-    drives = [(await _connected(drive), drive.unit, *_blocks(rig, drive.map)) for drive in rig.drive]
+    drives = [
+        (await _connected(drive), drive.unit, *_blocks(rig, drive.map)) for drive in rig.drive
+    ]
     sensors = [
-        (await _connected(sensor), sensor.unit, Block(registers_of(rig.map.sensor[sensor.map].read)))
+        (
+            await _connected(sensor),
+            sensor.unit,
+            Block(registers_of(rig.map.sensor[sensor.map].read)),
+        )
         for sensor in rig.sensor
     ]
     began = time.perf_counter()
@@ -41,7 +48,9 @@ async def _cycles_a_second(rig: RigSettings) -> float:
 
 
 async def _connected(device: DeviceSettings) -> AsyncModbusTcpClient:
-    client = AsyncModbusTcpClient(device.host, port=device.port, timeout=5.0, retries=0, reconnect_delay=0)
+    client = AsyncModbusTcpClient(
+        device.host, port=device.port, timeout=5.0, retries=0, reconnect_delay=0
+    )
     assert await client.connect()
     return client
 

@@ -49,18 +49,27 @@ def cycles_a_second(run: str, duration_s: float) -> float:
     """Return how many cycles a second a run in lockstep reaches, start of the rig not counted."""
     rates = []
     with TemporaryDirectory() as folder:
-        _record(datasets() / "rigs" / "plain.toml", run, duration_s, Path(folder), lambda p: rates.append(p.rate_hz))
+        _record(
+            datasets() / "rigs" / "plain.toml",
+            run,
+            duration_s,
+            Path(folder),
+            lambda p: rates.append(p.rate_hz),
+        )
     return rates[-1]
 
 
 def beside_a_bare_loop(duration_s: float) -> tuple[list[float], list[float]]:
-    """Return cycles a second of runs, and of loops of the same pymodbus calls, each pair on the same rig."""
+    """Return cycles a second of runs, and of loops of the same pymodbus calls, each pair on the
+    same rig."""
     path, ours, bare = datasets() / "rigs" / "plain.toml", [], []
     text = path.read_text().replace("embedded = true", "embedded = false", 1)
     settings = RunSettings(name="bench", run="with_human", purpose="train", duration_s=duration_s)
     with TemporaryDirectory() as folder, embedded(load_rig(path), path, settings, 200.0) as rig:
         served = Path(folder) / "rig.toml"
-        served.write_text(re.sub(r"^(map = .*)$", rf"\1\nport = {rig.drive[0].port}", text, flags=re.MULTILINE))
+        served.write_text(
+            re.sub(r"^(map = .*)$", rf"\1\nport = {rig.drive[0].port}", text, flags=re.MULTILINE)
+        )
         for k in range(PAIRS):
             bare.append(bare_loop.cycles_a_second(rig))
             rates: list[float] = []
@@ -80,7 +89,8 @@ def real_time(duration_s: float) -> tuple[int, int]:
 
 
 def _without_limits(shipped: str, folder: Path) -> Path:
-    """Write a rig file: a missed sample shall be counted here, not end the run for the jerk that it gives the leg."""
+    """Write a rig file: a missed sample shall be counted here, not end the run for the jerk that it
+    gives the leg."""
     text = (datasets() / "rigs" / f"{shipped}.toml").read_text()
     path = folder / f"{shipped}.toml"
     for key, most in (
@@ -94,7 +104,8 @@ def _without_limits(shipped: str, folder: Path) -> Path:
 
 
 def recorder(set_points_hz: float, duration_s: float) -> tuple[int, int, float]:
-    """Return samples and missed samples of a run that drains rings, and the share of a core that it takes."""
+    """Return samples and missed samples of a run that drains rings, and the share of a core that it
+    takes."""
     used: list[tuple[float, float]] = []
 
     def note(progress: Progress) -> None:
@@ -108,10 +119,14 @@ def recorder(set_points_hz: float, duration_s: float) -> tuple[int, int, float]:
     return outcome.samples, outcome.missed, (after - before) / (ended - began)
 
 
-def _record(rig: Path, run: str, duration_s: float, folder: Path, report, set_points_hz: float = 200.0):
+def _record(
+    rig: Path, run: str, duration_s: float, folder: Path, report, set_points_hz: float = 200.0
+):
     settings = RunSettings(name="bench", run=run, purpose="train", duration_s=duration_s)
     excitation = datasets() / "paper" / "trajectory.toml"
-    return acquire(rig, settings, excitation, folder / "bench.parquet", set_points_hz, report=report)
+    return acquire(
+        rig, settings, excitation, folder / "bench.parquet", set_points_hz, report=report
+    )
 
 
 if __name__ == "__main__":

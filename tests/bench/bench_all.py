@@ -1,4 +1,5 @@
-"""How long ``make all`` takes once exoid is installed: every stage anew, every kernel compiled anew."""
+"""How long ``make all`` takes once exoid is installed: every stage anew, every kernel compiled
+anew."""
 
 import os
 import subprocess
@@ -17,7 +18,11 @@ def rows() -> Iterator[Row]:
     with TemporaryDirectory() as folder:
         # An empty cache: a fresh clone has compiled nothing yet.
         environment = {**os.environ, "NUMBA_CACHE_DIR": f"{folder}/cache", "MAKEFLAGS": ""}
-        yield Row("make all, first compilation included", f"{seconds(folder, environment):.0f} s", wanted="180 s")
+        yield Row(
+            "make all, first compilation included",
+            f"{seconds(folder, environment):.0f} s",
+            wanted="180 s",
+        )
         yield Row("make all again, nothing to do", f"{seconds(folder, environment):.1f} s")
 
 

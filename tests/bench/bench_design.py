@@ -1,7 +1,7 @@
 """Speed of ``exoid design``: its fitness against NumPy's SVD, its search against pyswarms.
 
-Run with ``python -m tests.bench.bench_design``. pyswarms comes with the extra ``bench``. Times are processor time,
-so that a busy machine does not decide.
+Run with ``python -m tests.bench.bench_design``. pyswarms comes with the extra ``bench``. Times are
+processor time, so that a busy machine does not decide.
 """
 
 import contextlib
@@ -37,7 +37,8 @@ SPREAD = spread_of(OF)
 
 
 def numpy_cost(candidate: np.ndarray) -> float:
-    """Evaluate a candidate as one would with NumPy alone: whole arrays, then the SVD; bounds by penalty."""
+    """Evaluate a candidate as one would with NumPy alone: whole arrays, then the SVD; bounds by
+    penalty."""
     coefficients = np.empty((2, 2, HARMONICS))
     expand(candidate, OF, coefficients)
     q, dq, ddq = FourierTrajectory(candidate[-2:], coefficients[0], coefficients[1], OMEGA).at(TIME)
@@ -69,7 +70,10 @@ def rows() -> Iterator[Row]:
 
 def fitness_rows() -> Iterator[Row]:
     """Compare one evaluation of a motion that keeps its bounds; the fastest of several rounds."""
-    candidate, work = 0.1 * np.random.default_rng(0).standard_normal(len(SPREAD)) * SPREAD, workspace(OF)
+    candidate, work = (
+        0.1 * np.random.default_rng(0).standard_normal(len(SPREAD)) * SPREAD,
+        workspace(OF),
+    )
     candidate[-2:] = 0.6, -0.9
     assert abs(cost(candidate, OF, work) / numpy_cost(candidate) - 1.0) < 1e-6
     many = np.tile(candidate, (200, 1))
@@ -81,11 +85,14 @@ def fitness_rows() -> Iterator[Row]:
 
 def search_rows() -> Iterator[Row]:
     """Compare searches at equal evaluations and at equal quality."""
-    design(DesignSettings(criterion="condition", iterations=1, seconds=0.1))  # compiled before the clock starts
+    # Compiled before the clock starts.
+    design(DesignSettings(criterion="condition", iterations=1, seconds=0.1))
     budget = f"{PARTICLES} x {ITERATIONS}"
     ours, value = timed(exoid_swarm)
     yield Row(f"swarm of exoid, {budget} evaluations", f"{ours:.2f} s, reaches {value:.1f}")
-    whole, found = timed(lambda: design(DesignSettings(criterion="condition", seed=0)).quality.condition)
+    whole, found = timed(
+        lambda: design(DesignSettings(criterion="condition", seed=0)).quality.condition
+    )
     yield Row("whole search of exoid", f"{whole:.2f} s, reaches {found:.2f}")
     # pyswarms writes a log file wherever it is used.
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
@@ -98,14 +105,28 @@ def pyswarms_rows(swarm_s: float, search_s: float) -> Iterator[Row]:
     import pyswarms
 
     budget = f"{PARTICLES} x {ITERATIONS}"
-    objectives = {"NumPy's fitness": lambda x: np.array([numpy_cost(one) for one in x]), "exoid's fitness": our_costs}
+    objectives = {
+        "NumPy's fitness": lambda x: np.array([numpy_cost(one) for one in x]),
+        "exoid's fitness": our_costs,
+    }
     for name, objective in objectives.items():
         optimizer = pyswarms_swarm(pyswarms, PARTICLES)
-        theirs, value = timed(lambda o=optimizer, f=objective: o.optimize(f, ITERATIONS, verbose=False)[0])
-        yield Row(f"pyswarms, {name}, {budget} evaluations", f"{theirs:.2f} s, reaches {value:.1f}", theirs / swarm_s)
+        theirs, value = timed(
+            lambda o=optimizer, f=objective: o.optimize(f, ITERATIONS, verbose=False)[0]
+        )
+        yield Row(
+            f"pyswarms, {name}, {budget} evaluations",
+            f"{theirs:.2f} s, reaches {value:.1f}",
+            theirs / swarm_s,
+        )
     theirs, value = timed(lambda: until_goal(pyswarms_swarm(pyswarms, 128)))
     outcome = f"reaches {value:.2f}" if value <= GOAL else f"gives up at {value:.2f}"
-    yield Row(f"pyswarms, exoid's fitness, until {GOAL}", f"{theirs:.2f} s, {outcome}", theirs / search_s, "over 1")
+    yield Row(
+        f"pyswarms, exoid's fitness, until {GOAL}",
+        f"{theirs:.2f} s, {outcome}",
+        theirs / search_s,
+        "over 1",
+    )
 
 
 def exoid_swarm() -> float:

@@ -1,7 +1,8 @@
-"""Speed of ``exoid diagnose``: its posterior against refits, its time against recordings' length and catalogue.
+"""Speed of ``exoid diagnose``: its posterior against refits, its time against recordings' length
+and catalogue.
 
-Run with ``python -m tests.bench.bench_diagnose``. Times are processor time of one core, so that a busy machine does
-not decide.
+Run with ``python -m tests.bench.bench_diagnose``. Times are processor time of one core, so that a
+busy machine does not decide.
 """
 
 import os
@@ -32,7 +33,12 @@ from tests.bench.report import Row, show
 from tests.diagnosis.sessions import session
 
 T = TypeVar("T")
-HIDDEN = {"effect": "stribeck_friction", "joint": "knee", "stribeck_torque": 2.0, "stribeck_velocity": 0.15}
+HIDDEN = {
+    "effect": "stribeck_friction",
+    "joint": "knee",
+    "stribeck_torque": 2.0,
+    "stribeck_velocity": 0.15,
+}
 SECONDS = 70.0
 """Of each of a session's four recordings."""
 SAMPLE = 50
@@ -60,10 +66,14 @@ def prepared_from(motions: Sequence[Motion]) -> Prepared:
 
 
 def posterior_rows(motions: Sequence[Motion], sample: int) -> Iterator[Row]:
-    """The library, the posterior from Gram matrices, and pairs of elements refitted from their rows."""
+    """The library, the posterior from Gram matrices, and pairs of elements refitted from their
+    rows."""
     prepared = prepared_from(motions)
     built, library = seconds_of(lambda: build_library(prepared))
-    yield Row(f"library: {len(library.causes)} shapes, {len(library.laws)} columns of laws", f"{built:.2f} s")
+    yield Row(
+        f"library: {len(library.causes)} shapes, {len(library.laws)} columns of laws",
+        f"{built:.2f} s",
+    )
     multiplied, evidence = seconds_of(lambda: Evidence.of(library, {}))
     weighed, found = seconds_of(lambda: posterior(evidence))
     ours = multiplied + weighed
@@ -79,7 +89,8 @@ def posterior_rows(motions: Sequence[Motion], sample: int) -> Iterator[Row]:
 
 
 def refits_of_pairs(library: Library, evidence: Evidence, sample: int) -> tuple[float, int]:
-    """Return how long refits of all pairs of elements take that begin with their rows, and how many there are."""
+    """Return how long refits of all pairs of elements take that begin with their rows, and how many
+    there are."""
     columns, _ = _stack(library)
     elements = evidence.elements
     pairs = [(one, other) for one, other in combinations(elements, 2) if one.label != other.label]
@@ -106,14 +117,16 @@ def length_rows(lengths: Sequence[float]) -> Iterator[Row]:
 
 
 def catalogue_rows(motions: Sequence[Motion], every: Sequence[int]) -> Iterator[Row]:
-    """The whole diagnosis against the number of effects to choose from: every fourth of the catalogue, and so on."""
+    """The whole diagnosis against the number of effects to choose from: every fourth of the
+    catalogue, and so on."""
     causes = [effect for effect in EFFECTS if effect.name not in BASELINE]
     for step in every:
         some = tuple(causes[::step])
         with patch("pipelines.diagnosis.candidates.candidate.EFFECTS", some):
             taken, found = seconds_of(lambda: diagnose(motions))
         yield Row(
-            f"  {len(some)} effects to choose from, {len(found.selected.library.causes)} shapes", f"{taken:.1f} s"
+            f"  {len(some)} effects to choose from, {len(found.selected.library.causes)} shapes",
+            f"{taken:.1f} s",
         )
 
 
@@ -127,7 +140,9 @@ def order_rows(motions: Sequence[Motion]) -> Iterator[Row]:
     for name, residuals in (("no line", left), ("four lines at a joint", rippled)):
         taken, found = seconds_of(lambda residuals=residuals: lines_in(motions, residuals))
         count = sum(len(joint.lines) for joint in found)
-        yield Row(f"order tracking, {name} ({count} found)", f"{1e3 * taken:.0f} ms", wanted="150 ms")
+        yield Row(
+            f"order tracking, {name} ({count} found)", f"{1e3 * taken:.0f} ms", wanted="150 ms"
+        )
 
 
 def seconds_of(work: Callable[[], T]) -> tuple[float, T]:

@@ -29,7 +29,13 @@ def rows(duration_s: float = HOUR_S) -> Iterator[Row]:
         path.write_text(text)
         settings = RunSettings(name="hour", run="exo_alone", purpose="train", duration_s=duration_s)
         excitation, output = datasets() / "paper" / "trajectory.toml", Path(folder) / "hour.parquet"
-        outcome = acquire(path, settings, excitation, output, report=lambda p: used.append((p.samples, peak_mib())))
+        outcome = acquire(
+            path,
+            settings,
+            excitation,
+            output,
+            report=lambda p: used.append((p.samples, peak_mib())),
+        )
         took_s, size = time.perf_counter() - began, output.stat().st_size
     early = next(mib for samples, mib in used if samples >= EARLY * outcome.samples)
     yield Row(

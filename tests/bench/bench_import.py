@@ -35,7 +35,11 @@ def rows(samples: int = SAMPLES) -> Iterator[Row]:
         pyarrow.csv.write_csv(table, log)
         map_.write_text(MAP, encoding="utf-8")
         peak, seconds = exoid("import", log, "--map", map_, "-o", folder)
-        yield Row(f"import, {samples:,} rows of 4 columns", f"{peak:.0f} MiB, {seconds:.0f} s", wanted="2048 MiB")
+        yield Row(
+            f"import, {samples:,} rows of 4 columns",
+            f"{peak:.0f} MiB, {seconds:.0f} s",
+            wanted="2048 MiB",
+        )
 
 
 if __name__ == "__main__":

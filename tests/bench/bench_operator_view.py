@@ -46,7 +46,9 @@ def on_a_terminal(view: OperatorView) -> Iterator[RichConsole]:
     """Show a view on a terminal of 80 x 24 that nobody looks at."""
     console = Console()
     with open(os.devnull, "w") as nobody:
-        console.err = RichConsole(file=nobody, force_terminal=True, color_system="256", width=80, height=24)
+        console.err = RichConsole(
+            file=nobody, force_terminal=True, color_system="256", width=80, height=24
+        )
         with console.live(view):
             yield console.err
 
@@ -71,7 +73,13 @@ def cycles_a_second(report: Callable[[Progress], None]) -> float:
 
     settings = RunSettings(name="bench", run="with_human", purpose="train", duration_s=DURATION_S)
     with TemporaryDirectory() as folder:
-        acquire(RIG, settings, datasets() / "paper" / "trajectory.toml", Path(folder) / "bench.parquet", report=note)
+        acquire(
+            RIG,
+            settings,
+            datasets() / "paper" / "trajectory.toml",
+            Path(folder) / "bench.parquet",
+            report=note,
+        )
     return rates[-1]
 
 

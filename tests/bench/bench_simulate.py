@@ -1,7 +1,8 @@
-"""Speed of ``exoid simulate``: the compiled adaptive loop against scipy's solve_ivp and against the clock.
+"""Speed of ``exoid simulate``: the compiled adaptive loop against scipy's solve_ivp and against the
+clock.
 
-Run with ``python -m tests.bench.bench_simulate``. Times are processor time of one thread,
-so that a busy machine does not decide. solve_ivp integrates the same loop (reference case, Table 3) with the
+Run with ``python -m tests.bench.bench_simulate``. Times are processor time of one thread, so that a
+busy machine does not decide. solve_ivp integrates the same loop (reference case, Table 3) with the
 loosest tolerance that is as accurate.
 """
 
@@ -35,7 +36,8 @@ TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
 
 
 def rates(t, y):
-    """The whole loop as one would write it for solve_ivp; y is q, dq and seven weights of hip and of knee."""
+    """The whole loop as one would write it for solve_ivp; y is q, dq and seven weights of hip and
+    of knee."""
     out = np.zeros(18)
     wanted = (
         (
@@ -44,9 +46,19 @@ def rates(t, y):
             -0.40 * pi**2 * cos(pi * t - 0.2) + 0.24 * pi**2 * cos(2 * pi * t + 0.6),
         ),
         (
-            -0.46 - 0.28 * cos(pi * t + 1.8) - 0.24 * cos(2 * pi * t + 2.6) - 0.06 * cos(3 * pi * t + 3.0),
-            0.28 * pi * sin(pi * t + 1.8) + 0.48 * pi * sin(2 * pi * t + 2.6) + 0.18 * pi * sin(3 * pi * t + 3.0),
-            pi**2 * (0.28 * cos(pi * t + 1.8) + 0.96 * cos(2 * pi * t + 2.6) + 0.54 * cos(3 * pi * t + 3.0)),
+            -0.46
+            - 0.28 * cos(pi * t + 1.8)
+            - 0.24 * cos(2 * pi * t + 2.6)
+            - 0.06 * cos(3 * pi * t + 3.0),
+            0.28 * pi * sin(pi * t + 1.8)
+            + 0.48 * pi * sin(2 * pi * t + 2.6)
+            + 0.18 * pi * sin(3 * pi * t + 3.0),
+            pi**2
+            * (
+                0.28 * cos(pi * t + 1.8)
+                + 0.96 * cos(2 * pi * t + 2.6)
+                + 0.54 * cos(3 * pi * t + 3.0)
+            ),
         ),
     )
     push = [0.0, 0.0]
@@ -81,8 +93,12 @@ def rates(t, y):
 def plant() -> Plant:
     """Return the leg of Table 3."""
     frictions = zip(("hip", "knee"), COULOMB, VISCOUS, strict=True)
-    terms = (Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in frictions)
-    return make_plant(Model((Term(RigidBody(), np.array(X)), *terms)), Geometry(), HIP_AND_KNEE, "with_human")
+    terms = (
+        Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in frictions
+    )
+    return make_plant(
+        Model((Term(RigidBody(), np.array(X)), *terms)), Geometry(), HIP_AND_KNEE, "with_human"
+    )
 
 
 def rows() -> Iterator[Row]:
@@ -103,13 +119,19 @@ def loop_rows() -> Iterator[Row]:
     compiled = njit(rates)
     tolerance, reached = tolerance_for(compiled, error, truth)
     theirs = fastest(lambda: integrate(rates, tolerance), 2)
-    yield Row(f"solve_ivp, rtol {tolerance:g}", f"{theirs:.2f} s, error {1e6 * reached:.0f} µrad", theirs / ours, "50")
+    yield Row(
+        f"solve_ivp, rtol {tolerance:g}",
+        f"{theirs:.2f} s, error {1e6 * reached:.0f} µrad",
+        theirs / ours,
+        "50",
+    )
     helped = fastest(lambda: integrate(compiled, tolerance), 2)
     yield Row("solve_ivp, its equations compiled too", f"{helped:.2f} s", helped / ours)
 
 
 def tolerance_for(function: Callable, error: float, truth: np.ndarray) -> tuple[float, float]:
-    """Return the loosest tolerance that is as accurate, and its error; the tightest where none is."""
+    """Return the loosest tolerance that is as accurate, and its error; the tightest where none
+    is."""
     for tolerance in TOLERANCES:
         reached = np.abs(integrate(function, tolerance) - truth).max()
         if reached <= error:
@@ -120,7 +142,13 @@ def tolerance_for(function: Callable, error: float, truth: np.ndarray) -> tuple[
 def integrate(function: Callable, tolerance: float) -> np.ndarray:
     """Return the angles at every millisecond, (10001, 2) rad."""
     at = np.arange(round(SECONDS * 1000) + 1) / 1000
-    return solve_ivp(function, (0.0, SECONDS), np.zeros(18), "RK45", at, rtol=tolerance, atol=tolerance).y[:2].T
+    return (
+        solve_ivp(
+            function, (0.0, SECONDS), np.zeros(18), "RK45", at, rtol=tolerance, atol=tolerance
+        )
+        .y[:2]
+        .T
+    )
 
 
 def replay_rows() -> Iterator[Row]:
@@ -128,8 +156,12 @@ def replay_rows() -> Iterator[Row]:
     leg, rate = plant(), 200.0
     t = (np.arange(8000) + 0.5) / rate
     reference = gait().at(0.3 * t)[0]
-    drives = make_drives(np.full(2, 2000.0), np.full(2, 150.0), np.full(2, 200.0), np.zeros(2), 1000.0, rate)
-    angle, _, torque, _ = follow(leg.assembly, drives, loop_at_rest(leg.assembly, reference[0]), reference, 0.0)
+    drives = make_drives(
+        np.full(2, 2000.0), np.full(2, 150.0), np.full(2, 200.0), np.zeros(2), 1000.0, rate
+    )
+    angle, _, torque, _ = follow(
+        leg.assembly, drives, loop_at_rest(leg.assembly, reference[0]), reference, 0.0
+    )
     q = low_pass(angle, rate, 12.0)
     motion = Motion(
         t, q, derivative(q, rate, 1), derivative(q, rate, 2), torque, np.zeros(8000, dtype=np.int64),
@@ -137,7 +169,8 @@ def replay_rows() -> Iterator[Row]:
     )  # fmt: skip
     windows = len(replay(leg.model, motion).first)
     yield Row(
-        f"replay of 40 s, {windows} windows of 1 s", f"{1e3 * fastest(lambda: replay(leg.model, motion), 9):.1f} ms"
+        f"replay of 40 s, {windows} windows of 1 s",
+        f"{1e3 * fastest(lambda: replay(leg.model, motion), 9):.1f} ms",
     )
 
 

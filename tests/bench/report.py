@@ -23,7 +23,8 @@ class Row:
 
 
 def show(title: str, rows: Iterable[Row]) -> None:
-    """Print a table, and how busy the machine was: what is measured beside other work is no measurement."""
+    """Print a table, and how busy the machine was: what is measured beside other work is no
+    measurement."""
     table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold", title=title)
     for heading in ("", "measured", "ratio", "asked for"):
         table.add_column(heading, justify="right" if heading == "ratio" else "left")
@@ -33,4 +34,6 @@ def show(title: str, rows: Iterable[Row]) -> None:
             table.add_row(row.name, row.value, f"{row.ratio:.1f}" if row.ratio else "", row.wanted)
     finally:  # some of it took long
         CONSOLE.print(table)
-    CONSOLE.print(f"load {before:.1f} before, {os.getloadavg()[0]:.1f} after, of {os.cpu_count()} cores\n")
+    CONSOLE.print(
+        f"load {before:.1f} before, {os.getloadavg()[0]:.1f} after, of {os.cpu_count()} cores\n"
+    )

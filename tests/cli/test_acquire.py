@@ -19,7 +19,8 @@ duration_s = 10.0
 
 @pytest.fixture
 def after(exoid, tmp_path, monkeypatch):
-    """Return what is said after a run that missed so many samples and left so many set-points out."""
+    """Return what is said after a run that missed so many samples and left so many set-points
+    out."""
 
     def say(missed, left_out):
         made = Outcome(tmp_path / "one.parquet", 1000, missed, left_out)

@@ -32,9 +32,7 @@ def test_the_list_of_commands_tells_each_whole(exoid):
 
 
 def test_help_loads_nothing_heavy():
-    code = (
-        "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if m in sys.modules])"
-    )
+    code = "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if m in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
@@ -45,8 +43,12 @@ def test_numpy_uses_one_thread_unless_told_otherwise(told, used):
         "from exoid_cli.__main__ import main\n"
         "try: main()\nexcept SystemExit: print(os.environ['OPENBLAS_NUM_THREADS'])"
     )
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | told
-    said = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True).stdout
+    environment = {
+        name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")
+    } | told
+    said = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+    ).stdout
     assert said.splitlines()[-1] == used
 
 
@@ -57,8 +59,12 @@ def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
     )
 
     def told(**more):
-        environment = {name: value for name, value in os.environ.items() if name != "EXOID_DEBUG"} | more
-        return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True).stderr
+        environment = {
+            name: value for name, value in os.environ.items() if name != "EXOID_DEBUG"
+        } | more
+        return subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+        ).stderr
 
     assert told() == ""
     assert "overflow" in told(EXOID_DEBUG="1")
@@ -67,7 +73,11 @@ def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [
-        (SettingsError("exoid.toml: design.seed:\nfound -1"), 2, "exoid: exoid.toml: design.seed: found -1\n"),
+        (
+            SettingsError("exoid.toml: design.seed:\nfound -1"),
+            2,
+            "exoid: exoid.toml: design.seed: found -1\n",
+        ),
         (DeviceError("hip drive: no answer"), 3, "exoid: hip drive: no answer\n"),
         (ExoidError("a sum did not add up"), 1, "exoid: a sum did not add up\n"),
         (KeyboardInterrupt(), 130, "exoid: stopped by Ctrl-C\n"),
@@ -119,15 +129,20 @@ app.main()
         (signal.SIGQUIT, "exoid: stopped by SIGQUIT\n"),
     ],
 )
-def test_a_signal_in_the_middle_of_a_command_leaves_what_was_there_and_says_so_in_one_line(tmp_path, number, line):
+def test_a_signal_in_the_middle_of_a_command_leaves_what_was_there_and_says_so_in_one_line(
+    tmp_path, number, line
+):
     path = tmp_path / "verdict.json"
     path.write_text("old")
     command = [sys.executable, "-c", HALT, "halt", str(path), str(int(number))]
-    # Of what nohup or a script's background has ignored exoid heeds nothing: here it is as from a terminal.
+    # Of what nohup or a script's background has ignored exoid heeds nothing: here it is as from a
+    # terminal.
     heeding = partial(signal.signal, number, signal.SIG_DFL)
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=heeding)
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", line)
-    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("verdict.json", "old")]
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [
+        ("verdict.json", "old")
+    ]
 
 
 IMPATIENT = """
@@ -156,7 +171,9 @@ app.main()
 
 
 def test_what_a_device_did_is_told_with_its_exit_code_however_many_signals_come_meanwhile():
-    done = subprocess.run([sys.executable, "-c", IMPATIENT, "stopped"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", IMPATIENT, "stopped"], capture_output=True, text=True
+    )
     assert (done.returncode, done.stderr) == (3, "exoid: USE THE EMERGENCY STOP: made up\n")
 
 
@@ -203,7 +220,9 @@ app.main()
         ("moving", 3, "exoid: made up\n"),  # what a device did is true nevertheless
     ],
 )
-def test_what_an_import_the_compiler_or_asyncio_makes_of_ctrl_c_is_told_as_ctrl_c(tmp_path, how, code, line):
+def test_what_an_import_the_compiler_or_asyncio_makes_of_ctrl_c_is_told_as_ctrl_c(
+    tmp_path, how, code, line
+):
     (tmp_path / "mistaken.py").write_text(MISTAKEN)
     command = [sys.executable, "-m", "mistaken", "compile", how]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
@@ -225,7 +244,11 @@ EntryPoint("exoid", sys.argv.pop(1), "console_scripts").load()()
 
 
 @pytest.mark.parametrize(
-    ("number", "line"), [(signal.SIGINT, "exoid: stopped by Ctrl-C\n"), (signal.SIGTERM, "exoid: stopped by SIGTERM\n")]
+    ("number", "line"),
+    [
+        (signal.SIGINT, "exoid: stopped by Ctrl-C\n"),
+        (signal.SIGTERM, "exoid: stopped by SIGTERM\n"),
+    ],
 )
 def test_a_signal_while_exoid_is_still_being_loaded_ends_it_in_one_line(number, line):
     settings = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())
@@ -259,8 +282,14 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
         (["shw"], "exoid: shw: no such command; did you mean show?\n"),
         (["settings"], "exoid: missing command; see `exoid settings --help`\n"),
         (["show"], "exoid: FILE: missing; see `exoid show --help`\n"),
-        (["show", "a", "--fast"], "exoid: --fast: no such option; `exoid show --help` lists those there are\n"),
-        (["filter", "--cutof-hz", "3"], "exoid: --cutof-hz: no such option; did you mean --cutoff-hz?\n"),
+        (
+            ["show", "a", "--fast"],
+            "exoid: --fast: no such option; `exoid show --help` lists those there are\n",
+        ),
+        (
+            ["filter", "--cutof-hz", "3"],
+            "exoid: --cutof-hz: no such option; did you mean --cutoff-hz?\n",
+        ),
         (["rig", "chek", "rig.toml"], "exoid: chek: no such command; did you mean check?\n"),
         (["export", "x"], "exoid: --to: missing; see `exoid export --help`\n"),
         (
@@ -271,7 +300,10 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
             ["detect", "x", "--power", "2"],
             "exoid: --power: expected less than or equal to 0.999; see `exoid detect --help`\n",
         ),
-        (["effects", "stribek"], "exoid: there is no effect 'stribek'; did you mean stribeck_friction?\n"),
+        (
+            ["effects", "stribek"],
+            "exoid: there is no effect 'stribek'; did you mean stribeck_friction?\n",
+        ),
     ],
 )
 def test_a_mistyped_command_line_is_one_line_too(exoid, arguments, line):
@@ -310,6 +342,8 @@ def test_version(exoid):
 def test_a_command_whose_output_nobody_reads_any_longer_ends_without_a_word(words):
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run([sys.executable, "-m", "exoid_cli.app", *words], stdout=writer, stderr=subprocess.PIPE)
+    done = subprocess.run(
+        [sys.executable, "-m", "exoid_cli.app", *words], stdout=writer, stderr=subprocess.PIPE
+    )
     os.close(writer)
     assert (done.returncode, done.stderr) == (128 + 13, b"")

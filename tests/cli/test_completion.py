@@ -40,7 +40,9 @@ def test_names_are_completed(completed, words, offered):
     assert completed(words) == offered
 
 
-def test_runs_and_stages_come_from_the_experiment_in_the_folder(completed, exoid, tmp_path, monkeypatch):
+def test_runs_and_stages_come_from_the_experiment_in_the_folder(
+    completed, exoid, tmp_path, monkeypatch
+):
     assert exoid("init", tmp_path / "e").code == 0
     monkeypatch.chdir(tmp_path / "e")
     assert completed("exoid acquire --run with_") == ["with_human_train", "with_human_validate"]

@@ -16,7 +16,8 @@ from pipelines.settings.rig import RigSettings
 
 @pytest.fixture
 def experiment(tmp_path):
-    """Write an experiment with one run on a rig that is not there; returns the arguments that record it."""
+    """Write an experiment with one run on a rig that is not there; returns the arguments that
+    record it."""
 
     def write(run="with_human", embedded="false"):
         text = (datasets() / "rigs" / "real_time.toml").read_text()
@@ -58,14 +59,17 @@ def answer(monkeypatch):
 
 @pytest.fixture
 def typed_ahead(experiment):
-    """Start the experiment's run in a process of its own, with a yes typed before it asks; returns it and its end."""
+    """Start the experiment's run in a process of its own, with a yes typed before it asks; returns
+    it and its end."""
     pty = pytest.importorskip("pty")
 
     def start(err=None):
         here, there = pty.openpty()
         os.write(here, b"y\n")
         command = [sys.executable, "-m", "exoid_cli.app", *map(str, experiment())]
-        process = subprocess.Popen(command, stdin=there, stdout=subprocess.DEVNULL, stderr=err or there)
+        process = subprocess.Popen(
+            command, stdin=there, stdout=subprocess.DEVNULL, stderr=err or there
+        )
         os.close(there)
         return process, here
 
@@ -104,7 +108,9 @@ def test_a_question_that_nobody_sees_is_not_asked(typed_ahead, tmp_path):
 WENT_ON = "drive hip (127.0.0.1:1, unit 1): refuses the connection"
 
 
-def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(exoid, experiment, monkeypatch):
+def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(
+    exoid, experiment, monkeypatch
+):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     outcome = exoid(*experiment())
     assert (outcome.code, outcome.out) == (2, "")
@@ -122,7 +128,9 @@ def test_whatever_is_no_yes_is_a_no(exoid, experiment, answer, text):
     assert outcome.err.endswith("exoid: run one was not confirmed; nothing was moved\n")
 
 
-def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_question(exoid, experiment, answer):
+def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_question(
+    exoid, experiment, answer
+):
     answer("yes\n")
     outcome = exoid(*experiment(), "--quiet")
     assert outcome.code == 3 and WENT_ON in outcome.err
@@ -137,7 +145,9 @@ def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_questio
         assert words in shown
 
 
-def test_a_motion_beyond_the_limits_with_somebody_is_refused_before_the_question(exoid, experiment, answer, tmp_path):
+def test_a_motion_beyond_the_limits_with_somebody_is_refused_before_the_question(
+    exoid, experiment, answer, tmp_path
+):
     answer("y\n")
     arguments = experiment()
     rig = tmp_path / "rig.toml"
@@ -161,12 +171,16 @@ def test_who_says_yes_beforehand_is_told_that_nobody_watches_the_cuffs(exoid, ex
     without = re.sub(r"\[\[sensor\]\][^\[]*", "", text)
     (tmp_path / "rig.toml").write_text(without)
     outcome = exoid(*arguments, "--yes")
-    assert outcome.err.startswith("warning: the rig file has no [[sensor]]: nobody watches how hard the cuffs press\n")
+    assert outcome.err.startswith(
+        "warning: the rig file has no [[sensor]]: nobody watches how hard the cuffs press\n"
+    )
 
 
 def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch):
     recorded = []
-    monkeypatch.setattr("pipelines.acquisition.acquire.acquire", lambda *a, **k: recorded.append(a) or 1 / 0)
+    monkeypatch.setattr(
+        "pipelines.acquisition.acquire.acquire", lambda *a, **k: recorded.append(a) or 1 / 0
+    )
     outcome = exoid(*experiment(embedded="true"))
     assert len(recorded) == 1
     assert "[y/N]" not in outcome.err
@@ -174,16 +188,22 @@ def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch)
 
 @pytest.mark.parametrize("option", ["--move", "--by-hand"])
 def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_somebody_in_it(exoid, option):
-    outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", "--run", "with_human", option, "--yes")
+    outcome = exoid(
+        "rig", "check", datasets() / "rigs" / "plain.toml", "--run", "with_human", option, "--yes"
+    )
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err == (
         f"exoid: {option} wants nobody in the machine, but --run with_human says that somebody is; drop one\n"
     )
 
 
-def test_what_was_shown_is_what_runs_though_the_file_is_changed_meanwhile(exoid, experiment, answer, monkeypatch):
+def test_what_was_shown_is_what_runs_though_the_file_is_changed_meanwhile(
+    exoid, experiment, answer, monkeypatch
+):
     loads, load = [], RigSettings.in_force
-    monkeypatch.setattr(RigSettings, "in_force", lambda rig, run: (loads.append(run), load(rig, run))[1])
+    monkeypatch.setattr(
+        RigSettings, "in_force", lambda rig, run: (loads.append(run), load(rig, run))[1]
+    )
     answer("y\n")
     assert WENT_ON in exoid(*experiment()).err
     assert loads == ["with_human"]
@@ -211,7 +231,9 @@ def test_a_run_that_nobody_named_is_asked_about_before_it_moves_even_an_empty_ma
     with_excitation(run="exo_alone")
     outcome = exoid(*words)
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert "run one moves the empty machine, which wants to be confirmed on a terminal" in outcome.err
+    assert (
+        "run one moves the empty machine, which wants to be confirmed on a terminal" in outcome.err
+    )
 
 
 def test_a_no_to_it_moves_nothing_and_a_yes_goes_on_to_the_drives(exoid, with_excitation, answer):
@@ -232,8 +254,15 @@ def recorded(tmp_path):
     def leave(embedded):
         path = tmp_path / "one.parquet"
         rig = {"name": "leg", "embedded": embedded}
-        metadata = {"run": "exo_alone", "purpose": "train", "sample_rate_hz": 200.0, "config": {"rig": rig}}
-        frame = pd.DataFrame({name: [0.0, 0.005] for name in ("time_s", "hip_angle_rad", "hip_torque_nm")})
+        metadata = {
+            "run": "exo_alone",
+            "purpose": "train",
+            "sample_rate_hz": 200.0,
+            "config": {"rig": rig},
+        }
+        frame = pd.DataFrame(
+            {name: [0.0, 0.005] for name in ("time_s", "hip_angle_rad", "hip_torque_nm")}
+        )
         RECORDING.write(path, frame, metadata | {"joints": [{"name": "hip", "kind": "revolute"}]})
         return path
 

@@ -26,9 +26,18 @@ def test_the_published_excitation_is_judged_by_its_three_condition_numbers_and_i
         assert any(all(word in line for word in words) for line in lines), words
     margins = [line.split() for line in lines if line.startswith(("hip ", "knee "))]
     assert [row[:2] for row in margins] == [
-        [joint, quantity] for joint in ("hip", "knee") for quantity in ("angle", "velocity", "acceleration")
+        [joint, quantity]
+        for joint in ("hip", "knee")
+        for quantity in ("angle", "velocity", "acceleration")
     ]
-    assert [row[-1] for row in margins] == ["0.0000", "0.9869", "4.3410", "0.0001", "1.0338", "4.5751"]
+    assert [row[-1] for row in margins] == [
+        "0.0000",
+        "0.9869",
+        "4.3410",
+        "0.0001",
+        "1.0338",
+        "4.5751",
+    ]
 
 
 def test_what_lies_outside_the_bounds_is_marked(tmp_path, capsys):
@@ -67,8 +76,14 @@ def test_options_win_over_the_file(tmp_path, config):
     ("arguments", "told"),
     [
         ([], "exoid: neither -o FILE nor --evaluate FILE is given, and there is no exoid.toml in "),
-        (["--evaluate", "no.toml"], "exoid: no.toml: no such file; check the name, or make one with `exoid design`"),
-        (["--evaluate", "no.parquet"], "exoid: no.parquet: no such file; check the name, or make it first"),
+        (
+            ["--evaluate", "no.toml"],
+            "exoid: no.toml: no such file; check the name, or make one with `exoid design`",
+        ),
+        (
+            ["--evaluate", "no.parquet"],
+            "exoid: no.parquet: no such file; check the name, or make it first",
+        ),
     ],
 )
 def test_a_wrong_call_is_one_line_and_code_2(arguments, told, capsys):

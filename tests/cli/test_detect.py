@@ -6,7 +6,9 @@ MOTION = 'unit = "rad"\nomega_rad_s = 0.628\ntheta0_rad = [0.6, -0.9]\na = [[{hi
 
 
 @pytest.mark.parametrize(("hip", "still"), [(0.0, "hip"), (0.3, "knee")])
-def test_an_excitation_that_leaves_a_joint_at_rest_is_refused_in_one_line(exoid, tmp_path, hip, still):
+def test_an_excitation_that_leaves_a_joint_at_rest_is_refused_in_one_line(
+    exoid, tmp_path, hip, still
+):
     path = tmp_path / "pose.toml"
     path.write_text(MOTION.format(hip=hip))
     outcome = exoid("detect", path)

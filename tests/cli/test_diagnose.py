@@ -43,7 +43,9 @@ def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
 def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it(capsys):
     show_verdict(verdict_of(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
     show_verdict(verdict_of(), HIP_AND_KNEE)
-    knee, older = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")][::2]
+    knee, older = [
+        line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")
+    ][::2]
     assert knee[:3] == ["knee", "12.250", "0.272"]
     assert older[:2] == ["knee", "0.272"]
 
@@ -51,7 +53,9 @@ def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it
 def test_a_gait_is_told_of_a_leg_alone(capsys):
     slide = [Joint("axis", "prismatic")]
     errors = {key: {"axis": 0.5} for key in (*ERRORS, "unexplained")}
-    control = verdict_of()["control"] | {"reason": "the reference case is a leg's gait, with its gains and limits"}
+    control = verdict_of()["control"] | {
+        "reason": "the reference case is a leg's gait, with its gains and limits"
+    }
     show_verdict(verdict_of(**errors, control=control), slide)
     assert "adaptive control" not in capsys.readouterr().out
     show_verdict(verdict_of(), HIP_AND_KNEE)
@@ -72,7 +76,11 @@ def probabilities(printed):
 @pytest.mark.parametrize("law", [0.0051, 0.0249, 0.02])
 def test_the_three_cases_add_up_to_one_as_they_are_printed(capsys, nothing, law):
     cases = probabilities(shown(capsys, **decision_of(nothing=nothing, law=law)))[:3]
-    assert [words for _, words, _ in cases] == ["nothing", "listed causes only", "something unlisted"]
+    assert [words for _, words, _ in cases] == [
+        "nothing",
+        "listed causes only",
+        "something unlisted",
+    ]
     assert sum(p for *_, p in cases) == 100
 
 
@@ -109,9 +117,21 @@ def test_two_findings_share_the_lines_above_both(capsys):
     told = decision_of(ties=(), law=0.0)
     (first,) = told["findings"]
     law = {"law": "load", "joint": "knee", "probability": 0.8, "words": "a law of the knee's load"}
-    path = [*first["path"][:3], first["path"][3] | {"value": "load", "words": "a law of the knee's load"}]
-    second = first | {"level": "family", "family": "load", "causes": [], "laws": [law], "path": path}
-    words = [words for _, words, _ in probabilities(shown(capsys, **told | {"findings": [first, second]}))[3:]]
+    path = [
+        *first["path"][:3],
+        first["path"][3] | {"value": "load", "words": "a law of the knee's load"},
+    ]
+    second = first | {
+        "level": "family",
+        "family": "load",
+        "causes": [],
+        "laws": [law],
+        "path": path,
+    }
+    words = [
+        words
+        for _, words, _ in probabilities(shown(capsys, **told | {"findings": [first, second]}))[3:]
+    ]
     assert words == [
         "something that repeats with the motion", "something at the knee", "a law of the knee's angle",
         "cogging at the knee", "a law of the knee's load", "unlisted: a law of the knee's load",
@@ -126,10 +146,14 @@ def test_what_is_known_to_be_missing_and_no_more_has_a_line(capsys):
     assert lines == [(0, "something is missing", 97)]
 
 
-def test_a_line_that_is_too_long_goes_on_below_itself_and_keeps_its_probability(capsys, monkeypatch):
+def test_a_line_that_is_too_long_goes_on_below_itself_and_keeps_its_probability(
+    capsys, monkeypatch
+):
     monkeypatch.setattr(console.out, "_width", 80)
     told = decision_of(ties=())
-    told["findings"][0]["laws"][0]["words"] = "friction of the knee that depends on the other joint's angle " + "so"
+    told["findings"][0]["laws"][0]["words"] = (
+        "friction of the knee that depends on the other joint's angle " + "so"
+    )
     printed = shown(capsys, **told)
     assert max(map(len, printed.splitlines()[2:14])) <= 80
     (first,) = [line for line in printed.splitlines() if "unlisted: friction" in line]
@@ -143,10 +167,16 @@ def test_shares_of_the_residual_have_columns_where_there_is_something(capsys):
 
 
 def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_every_fault(capsys):
-    fault = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
+    fault = {
+        "file": "run_1.parquet",
+        "channel": "hip_angle_rad",
+        "what": "the hip's angle is stuck",
+    }
     other = fault | {"file": "run_2.parquet"}
     told = decision_of() | {"findings": [], "posterior": None}
-    printed = shown(capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **told)
+    printed = shown(
+        capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **told
+    )
     assert "No cause was looked for. Mend acquisition, and record again." in printed
     assert "- run_2.parquet, hip_angle_rad: the hip's angle is stuck" in printed
     assert "is anything missing?" not in printed

@@ -37,4 +37,7 @@ def test_programs_get_the_same_as_json(exoid):
 def test_a_mistyped_name_is_mended(exoid):
     outcome = exoid("effects", "stribek_friction")
     assert outcome.code == 2
-    assert outcome.err == "exoid: there is no effect 'stribek_friction'; did you mean stribeck_friction?\n"
+    assert (
+        outcome.err
+        == "exoid: there is no effect 'stribek_friction'; did you mean stribeck_friction?\n"
+    )

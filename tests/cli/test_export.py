@@ -32,14 +32,23 @@ def model(tmp_path):
     ],
 )
 def test_each_format_is_written_and_told(exoid, model, tmp_path, to, files):
-    outcome = exoid("export", model(named("stribeck_friction@knee")), "--to", to, "-o", tmp_path / "out" / files[0])
+    outcome = exoid(
+        "export",
+        model(named("stribeck_friction@knee")),
+        "--to",
+        to,
+        "-o",
+        tmp_path / "out" / files[0],
+    )
     assert outcome.code == 0, outcome.err
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
     assert "stribeck_friction@knee" in outcome.out and "the with_human model" in outcome.out
     assert ("not in the file" in outcome.err) == (to in ("mjcf", "urdf"))
 
 
-def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(exoid, model, tmp_path):
+def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(
+    exoid, model, tmp_path
+):
     outcome = exoid("export", model(named("stribeck_friction@knee")), "--to", "mjcf", "--json")
     assert (
         "warning: stribeck_friction@knee is not in the file (MJCF has no element for it): "
@@ -54,7 +63,10 @@ def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(
 def test_show_knows_the_json_document(exoid, model, tmp_path):
     exoid("export", model(), "--to", "json", "-o", tmp_path / "leg.json")
     outcome = exoid("show", tmp_path / "leg.json")
-    assert outcome.code == 0 and "model/1, a model, as `exoid export --to json` writes it" in outcome.out
+    assert (
+        outcome.code == 0
+        and "model/1, a model, as `exoid export --to json` writes it" in outcome.out
+    )
     assert "parameters.parquet" in outcome.out
 
 
@@ -62,14 +74,28 @@ def test_show_knows_the_json_document(exoid, model, tmp_path):
     ("arguments", "complaint"),
     [
         (("--to", "mjfc"), "--to mjfc: there is no such format; did you mean mjcf?"),
-        (("--to", "urdf", "--run", "human"), "holds no rigid body for run 'human', only for with_human; set --run"),
+        (
+            ("--to", "urdf", "--run", "human"),
+            "holds no rigid body for run 'human', only for with_human; set --run",
+        ),
         (("--to", "c", "-o", "my leg.c"), "my leg.c: its functions are called as the file is"),
-        (("--to", "c", "-o", "x.xml"), "-o x.xml: ends as --to mjcf writes it, expected .c with --to c"),
-        (("--to", "urdf", "-o", "leg.xml"), "-o leg.xml: ends as --to mjcf writes it, expected .urdf with --to urdf"),
-        (("--to", "json", "-o", "parameters.parquet"), "parameters.parquet: is the model itself; choose another file"),
+        (
+            ("--to", "c", "-o", "x.xml"),
+            "-o x.xml: ends as --to mjcf writes it, expected .c with --to c",
+        ),
+        (
+            ("--to", "urdf", "-o", "leg.xml"),
+            "-o leg.xml: ends as --to mjcf writes it, expected .urdf with --to urdf",
+        ),
+        (
+            ("--to", "json", "-o", "parameters.parquet"),
+            "parameters.parquet: is the model itself; choose another file",
+        ),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(exoid, model, tmp_path, monkeypatch, arguments, complaint):
+def test_what_cannot_be_is_refused_in_one_line(
+    exoid, model, tmp_path, monkeypatch, arguments, complaint
+):
     monkeypatch.chdir(tmp_path)
     outcome = exoid("export", model(), *arguments)
     assert outcome.code == 2 and complaint in outcome.err and outcome.err.count("\n") == 1
@@ -87,6 +113,7 @@ def test_a_leg_that_cannot_be_is_refused_with_file_and_reason(exoid, model, tmp_
     PARAMETERS.write(path, table.frame, table.metadata)
     outcome = exoid("export", path, "--to", "mjcf")
     assert (
-        outcome.code == 2 and "unreal.parquet: the with_human parameters are no real leg: X2 (X1 - X2)" in outcome.err
+        outcome.code == 2
+        and "unreal.parquet: the with_human parameters are no real leg: X2 (X1 - X2)" in outcome.err
     )
     assert [p.name for p in tmp_path.iterdir()] == ["unreal.parquet"]

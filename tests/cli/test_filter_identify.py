@@ -51,19 +51,29 @@ def test_filter_then_identify_as_a_user_would(exoid, recordings, tmp_path):
     residuals = RESIDUALS.read(tmp_path / "identified" / "residuals.parquet").frame
     rest = residuals["hip_torque_nm"] - residuals["hip_predicted_nm"]
     np.testing.assert_allclose(residuals["hip_residual_nm"], rest, atol=1e-9)
-    assert sorted(p.suffix for p in (tmp_path / "identified").glob("torque-*")) == [".pdf", ".pdf", ".png", ".png"]
+    assert sorted(p.suffix for p in (tmp_path / "identified").glob("torque-*")) == [
+        ".pdf",
+        ".pdf",
+        ".png",
+        ".png",
+    ]
 
 
 def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tmp_path):
     outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--json")
     assert outcome.code == 0, outcome.err
-    said = json.loads(outcome.out, parse_constant=pytest.fail)  # NaN is no JSON, though Python reads it
+    # NaN is no JSON, though Python reads it.
+    said = json.loads(outcome.out, parse_constant=pytest.fail)
     assert {"hip", "knee"} == set(said["validation"]["all"])
     assert {row["joint"] for row in said["parameters"]} == {"hip", "knee", None}
 
 
-@pytest.mark.parametrize("method", ["iteratively_reweighted", "instrumental_variables", "realizable"])
-def test_a_method_gives_the_same_table_and_says_how_it_was_made(exoid, recordings, tmp_path, method):
+@pytest.mark.parametrize(
+    "method", ["iteratively_reweighted", "instrumental_variables", "realizable"]
+)
+def test_a_method_gives_the_same_table_and_says_how_it_was_made(
+    exoid, recordings, tmp_path, method
+):
     (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
     given = ("-o", tmp_path, "--config", tmp_path / "exoid.toml", "--method", method)
     outcome = exoid("identify", *sorted(recordings.iterdir()), *given)
@@ -78,29 +88,46 @@ def test_a_method_gives_the_same_table_and_says_how_it_was_made(exoid, recording
 
 
 def test_the_method_can_stand_in_the_settings(exoid, recordings, tmp_path):
-    (tmp_path / "exoid.toml").write_text('[identify]\nmethod = "ordinary_least_squares"\nfigures = false\n')
-    given = ["identify", *sorted(recordings.iterdir()), "-o", tmp_path / "out", "--config", tmp_path / "exoid.toml"]
+    (tmp_path / "exoid.toml").write_text(
+        '[identify]\nmethod = "ordinary_least_squares"\nfigures = false\n'
+    )
+    given = [
+        "identify",
+        *sorted(recordings.iterdir()),
+        "-o",
+        tmp_path / "out",
+        "--config",
+        tmp_path / "exoid.toml",
+    ]
     assert exoid(*given).code == 0
     found = PARAMETERS.read(tmp_path / "out" / "parameters.parquet")
     assert found.metadata["method"]["name"] == "two-step ordinary least squares"
 
 
-def test_a_method_that_does_not_exist_ends_in_one_line_with_the_nearest(exoid, recordings, tmp_path):
-    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path / "out", "--method", "realisable")
+def test_a_method_that_does_not_exist_ends_in_one_line_with_the_nearest(
+    exoid, recordings, tmp_path
+):
+    outcome = exoid(
+        "identify", *sorted(recordings.iterdir()), "-o", tmp_path / "out", "--method", "realisable"
+    )
     assert outcome.code == 2
     assert outcome.err.count("\n") == 1
     assert "--method: there is no method 'realisable'; did you mean realizable?" in outcome.err
     assert not (tmp_path / "out").exists()
 
 
-def test_instruments_without_set_points_end_in_one_line_that_names_the_file(exoid, recordings, tmp_path):
+def test_instruments_without_set_points_end_in_one_line_that_names_the_file(
+    exoid, recordings, tmp_path
+):
     (tmp_path / "runs").mkdir()
     for file in recordings.iterdir():
         table = RECORDING.read(file)
         frame = table.frame.drop(columns=["hip_reference_rad", "knee_reference_rad"])
         RECORDING.write(tmp_path / "runs" / file.name, frame, table.metadata)
     files = sorted((tmp_path / "runs").iterdir())
-    outcome = exoid("identify", *files, "-o", tmp_path / "out", "--method", "instrumental_variables")
+    outcome = exoid(
+        "identify", *files, "-o", tmp_path / "out", "--method", "instrumental_variables"
+    )
     assert outcome.code == 2
     assert outcome.err.count("\n") == 1
     assert "exo_alone_train.parquet: has no set-points of the hip, which" in outcome.err
@@ -124,7 +151,9 @@ def broken(recordings, tmp_path, change):
     import pyarrow as pa
 
     target = tmp_path / "broken.parquet"
-    pq.write_table(pa.Table.from_pandas(frame).replace_schema_metadata(table.schema.metadata), target)
+    pq.write_table(
+        pa.Table.from_pandas(frame).replace_schema_metadata(table.schema.metadata), target
+    )
     return target
 
 
@@ -156,7 +185,9 @@ def in_degrees(frame):
     ],
 )
 @pytest.mark.parametrize("command", ["filter", "identify"])
-def test_a_bad_recording_ends_in_one_line_and_no_file(exoid, recordings, tmp_path, command, change, words):
+def test_a_bad_recording_ends_in_one_line_and_no_file(
+    exoid, recordings, tmp_path, command, change, words
+):
     file = broken(recordings, tmp_path, change)
     target = tmp_path / "out.parquet"
     outcome = exoid(command, file, "-o", target)
@@ -199,12 +230,17 @@ def test_a_recording_is_not_overwritten_by_its_motion(exoid, recordings, tmp_pat
     assert RECORDING.read(file).metadata["run"] == "exo_alone"
 
 
-def test_an_output_that_cannot_be_written_ends_in_one_line_that_names_it(exoid, recordings, tmp_path):
+def test_an_output_that_cannot_be_written_ends_in_one_line_that_names_it(
+    exoid, recordings, tmp_path
+):
     recording = recordings / "exo_alone_train.parquet"
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "folder" / recording.name).mkdir(parents=True)
     inside = tmp_path / "file" / "motion.parquet"
-    for output, words in {tmp_path / "folder": "is a folder", inside: "a file stands where a folder should"}.items():
+    for output, words in {
+        tmp_path / "folder": "is a folder",
+        inside: "a file stands where a folder should",
+    }.items():
         outcome = exoid("filter", recording, "-o", output)
         assert outcome.code == 2
         assert outcome.err.count("\n") == 1
@@ -217,14 +253,23 @@ def test_several_recordings_are_filtered_into_a_folder(exoid, recordings, tmp_pa
     files = sorted(recordings.iterdir())
     outcome = exoid("filter", *files, "-o", tmp_path / "motions", "--json")
     assert outcome.code == 0, outcome.err
-    assert [one["file"] for one in json.loads(outcome.out)] == [str(tmp_path / "motions" / f.name) for f in files]
+    assert [one["file"] for one in json.loads(outcome.out)] == [
+        str(tmp_path / "motions" / f.name) for f in files
+    ]
     twice = exoid("filter", files[0], files[0], "-o", tmp_path / "motions")
     assert (twice.code, twice.err.count("\n")) == (2, 1)
     assert "found two files named exo_alone_train.parquet" in twice.err
 
 
 def test_settings_that_are_not_there_end_in_one_line(exoid, recordings, tmp_path):
-    outcome = exoid("filter", recordings / "exo_alone_train.parquet", "-o", tmp_path / "m", "--config", "none.toml")
+    outcome = exoid(
+        "filter",
+        recordings / "exo_alone_train.parquet",
+        "-o",
+        tmp_path / "m",
+        "--config",
+        "none.toml",
+    )
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "none.toml: no such file" in outcome.err
     assert list(tmp_path.iterdir()) == []
@@ -250,16 +295,22 @@ def test_the_same_run_twice_is_refused(exoid, recordings, tmp_path):
 @pytest.mark.parametrize(
     ("content", "said"), [(b"", "is empty (0 bytes)"), (b"no Parquet" * 9, "is not a Parquet file")]
 )
-def test_files_that_are_alike_since_they_hold_nothing_are_not_called_copies(exoid, tmp_path, content, said):
+def test_files_that_are_alike_since_they_hold_nothing_are_not_called_copies(
+    exoid, tmp_path, content, said
+):
     for name in ("one.parquet", "two.parquet"):
         (tmp_path / name).write_bytes(content)
-    outcome = exoid("diagnose", tmp_path / "one.parquet", tmp_path / "two.parquet", "-o", tmp_path / "d")
+    outcome = exoid(
+        "diagnose", tmp_path / "one.parquet", tmp_path / "two.parquet", "-o", tmp_path / "d"
+    )
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert said in outcome.err and "same data" not in outcome.err
 
 
 def test_a_diagnosis_that_is_refused_leaves_no_folder(exoid, recordings, tmp_path):
-    outcome = exoid("diagnose", recordings / "exo_alone_train.parquet", "-o", tmp_path / "new" / "diagnosed")
+    outcome = exoid(
+        "diagnose", recordings / "exo_alone_train.parquet", "-o", tmp_path / "new" / "diagnosed"
+    )
     assert outcome.code == 2
     assert not (tmp_path / "new").exists()
 
@@ -273,8 +324,11 @@ def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
     assert isinstance(MOTION.read(target).frame, pd.DataFrame)
 
 
-def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_without(exoid, recordings, tmp_path):
-    """The rig's knee has an elastic transmission of 900 N·m/rad, says the file; its amplitudes are none."""
+def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_without(
+    exoid, recordings, tmp_path
+):
+    """The rig's knee has an elastic transmission of 900 N·m/rad, says the file; its amplitudes are
+    none."""
     quiet = tmp_path / "exoid.toml"
     quiet.write_text("[identify]\nfigures = false\n")
     files, given = sorted(recordings.iterdir()), ("--config", quiet)
@@ -285,7 +339,9 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
         ci95_low=820.0, ci95_high=980.0, step="extension", effect="joint_elasticity",
     )  # fmt: skip
     frame = pd.concat([plain.frame, elastic], ignore_index=True)
-    metadata = {key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")}
+    metadata = {
+        key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")
+    }
     PARAMETERS.write(tmp_path / "named.parquet", frame, metadata)
     asked = ("--causes", tmp_path / "named.parquet", "--effect", "torque_offset@hip", *given)
     refused = exoid("identify", *files, *asked)
@@ -304,7 +360,9 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
     found = PARAMETERS.read(tmp_path / "refitted" / "parameters.parquet")
     assert np.array(found.metadata["covariance"]).shape == (19, 19)
     assert found.metadata["inputs"][-1]["name"] == "named.parquet"
-    assert set(RESIDUALS.read(tmp_path / "refitted" / "residuals.parquet").frame["model"]) == {"extended"}
+    assert set(RESIDUALS.read(tmp_path / "refitted" / "residuals.parquet").frame["model"]) == {
+        "extended"
+    }
     replayed = ("--replay", files[0], "-o", tmp_path / "replay.parquet")
     outcome = exoid("simulate", tmp_path / "refitted" / "parameters.parquet", *replayed)
     assert outcome.code == 0, outcome.err
@@ -312,7 +370,13 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
 
 def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordings, tmp_path):
     (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\nreversals = true\n")
-    asked = (*sorted(recordings.iterdir()), "--config", tmp_path / "exoid.toml", "--effect", "rotor_inertia@knee")
+    asked = (
+        *sorted(recordings.iterdir()),
+        "--config",
+        tmp_path / "exoid.toml",
+        "--effect",
+        "rotor_inertia@knee",
+    )
     outcome = exoid("identify", *asked, "-o", tmp_path)
     assert outcome.code == 0, outcome.err
     assert "knee J" in outcome.out
@@ -327,18 +391,31 @@ def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordi
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda f: pd.concat([f, f.tail(1)], ignore_index=True), "row 17 tells stiffness of joint_elasticity again"),
-        (lambda f: f.assign(std_error=-0.1), "column std_error, row 0: found -0.1, expected 0 or more"),
-        (lambda f: f.assign(effect=f["effect"].replace("joint_elasticity", "joint_elastic")), "there is no effect"),
+        (
+            lambda f: pd.concat([f, f.tail(1)], ignore_index=True),
+            "row 17 tells stiffness of joint_elasticity again",
+        ),
+        (
+            lambda f: f.assign(std_error=-0.1),
+            "column std_error, row 0: found -0.1, expected 0 or more",
+        ),
+        (
+            lambda f: f.assign(effect=f["effect"].replace("joint_elasticity", "joint_elastic")),
+            "there is no effect",
+        ),
     ],
 )
-def test_a_damaged_table_of_causes_is_refused_with_its_name(exoid, recordings, tmp_path, damage, said):
+def test_a_damaged_table_of_causes_is_refused_with_its_name(
+    exoid, recordings, tmp_path, damage, said
+):
     files = sorted(recordings.iterdir())
     (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
     given = ("--config", tmp_path / "exoid.toml")
     assert exoid("identify", *files, "-o", tmp_path / "plain", *given).code == 0
     plain = PARAMETERS.read(tmp_path / "plain" / "parameters.parquet")
-    metadata = {key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")}
+    metadata = {
+        key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")
+    }
     elastic = plain.frame.iloc[[0]].assign(
         name="stiffness", joint="knee", run=None, value=900.0, effect="joint_elasticity", step="extension"
     )  # fmt: skip
@@ -346,7 +423,9 @@ def test_a_damaged_table_of_causes_is_refused_with_its_name(exoid, recordings, t
     table = pa.Table.from_pandas(frame, preserve_index=False)
     about = {b"exoid": json.dumps(metadata | {"contract": "parameters/1"}).encode()}
     pq.write_table(table.replace_schema_metadata(about), tmp_path / "named.parquet")
-    outcome = exoid("identify", *files, "-o", tmp_path / "out", "--causes", tmp_path / "named.parquet", *given)
+    outcome = exoid(
+        "identify", *files, "-o", tmp_path / "out", "--causes", tmp_path / "named.parquet", *given
+    )
     assert outcome.code == 2
     assert f"{tmp_path / 'named.parquet'}" in outcome.err
     assert said in outcome.err
@@ -365,7 +444,9 @@ def test_the_causes_own_folder_is_no_place_for_a_refit(exoid, recordings, tmp_pa
     assert "would be overwritten" in outcome.err
     assert causes.read_bytes() == before
     (tmp_path / "plain" / "verdict.json").write_text("{}")
-    outcome = exoid("identify", *files, "-o", tmp_path / "plain", "--effect", "rotor_inertia@knee", *given)
+    outcome = exoid(
+        "identify", *files, "-o", tmp_path / "plain", "--effect", "rotor_inertia@knee", *given
+    )
     assert outcome.code == 2
     assert "holds a diagnosis" in outcome.err
     assert causes.read_bytes() == before
@@ -373,7 +454,11 @@ def test_the_causes_own_folder_is_no_place_for_a_refit(exoid, recordings, tmp_pa
 
 def test_runs_to_validate_on_are_of_a_kind_that_is_trained_on(exoid, recordings, tmp_path):
     outcome = exoid(
-        "identify", recordings / "exo_alone_train.parquet", recordings / "with_human_validate.parquet", "-o", tmp_path
+        "identify",
+        recordings / "exo_alone_train.parquet",
+        recordings / "with_human_validate.parquet",
+        "-o",
+        tmp_path,
     )
     assert outcome.code == 2
     assert "found no run to validate on of a kind that is trained on (exo_alone)" in outcome.err

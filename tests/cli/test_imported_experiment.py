@@ -14,7 +14,8 @@ RATE_HZ = 200.0
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Two recordings of a pendulum of 0.5 kg·m², as `exoid import` leaves them, and an empty exoid.toml."""
+    """Two recordings of a pendulum of 0.5 kg·m², as `exoid import` leaves them, and an empty
+    exoid.toml."""
     random = np.random.default_rng(3)
     time = np.arange(0.0, 20.0, 1.0 / RATE_HZ)
     for name, purpose, phase in (("Monday-1", "train", 0.0), ("Monday-2", "validate", 1.0)):
@@ -22,7 +23,9 @@ def folder(tmp_path, monkeypatch):
         speed = 1.2 * np.cos(2.0 * time + phase) + np.cos(5.0 * time)
         acceleration = -2.4 * np.sin(2.0 * time + phase) - 5.0 * np.sin(5.0 * time)
         torque = 0.5 * acceleration + 3.0 * np.sin(angle) + 0.4 * np.sign(speed) + 0.2 * speed
-        frame = pd.DataFrame({"time_s": time, "arm_angle_rad": angle + 1e-4 * random.standard_normal(len(time))})
+        frame = pd.DataFrame(
+            {"time_s": time, "arm_angle_rad": angle + 1e-4 * random.standard_normal(len(time))}
+        )
         frame["arm_torque_nm"] = torque + 0.05 * random.standard_normal(len(time))
         metadata = {
             "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ, "imported": {"log": "arm.csv"},
@@ -52,7 +55,15 @@ def test_it_is_filtered_identified_and_never_recorded(exoid, folder):
         ("acquire",),
         ("design",),
         ("acquire", "--run", "Monday-1"),
-        ("acquire", "--run", "Monday-1", "--trajectory", "mine.toml", "-o", "recordings/Monday-1.parquet"),
+        (
+            "acquire",
+            "--run",
+            "Monday-1",
+            "--trajectory",
+            "mine.toml",
+            "-o",
+            "recordings/Monday-1.parquet",
+        ),
     ],
 )
 def test_nothing_is_recorded_in_its_place(exoid, folder, words):
@@ -63,13 +74,17 @@ def test_nothing_is_recorded_in_its_place(exoid, folder, words):
     assert (folder / "recordings" / "Monday-1.parquet").read_bytes() == before
 
 
-def test_results_about_another_machine_tell_no_settings_of_a_leg_until_somebody_writes_them(exoid, folder):
+def test_results_about_another_machine_tell_no_settings_of_a_leg_until_somebody_writes_them(
+    exoid, folder
+):
     assert exoid("run", "identify").code == 0
     made = PARAMETERS.read(folder / "identified" / "parameters.parquet").metadata
     assert made["config"]["mechanism"] is None
     assert made["geometry"] == {"gravity_m_s2": 9.8}
     (folder / "exoid.toml").write_text('[mechanism]\nname = "single"\ngravity_m_s2 = 1.6\n')
-    stale = {one["stage"]: one["why"] for one in json.loads(exoid("status", "--json").out)}["identify"]
+    stale = {one["stage"]: one["why"] for one in json.loads(exoid("status", "--json").out)}[
+        "identify"
+    ]
     assert any(why.startswith("mechanism was unset, is ") for why in stale)
 
 
@@ -103,14 +118,25 @@ def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoi
     (folder / "exoid.toml").unlink()
     outcome = exoid("filter")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert "with an empty exoid.toml beside recordings/, `exoid run` does all with what was imported" in outcome.err
+    assert (
+        "with an empty exoid.toml beside recordings/, `exoid run` does all with what was imported"
+        in outcome.err
+    )
 
 
 @pytest.mark.parametrize("left", [0, 4, 3000])
 def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, folder, left):
     path = folder / "recordings" / "Monday-1.parquet"
     path.write_bytes(path.read_bytes()[:left])
-    for words in ("run",), ("status",), ("filter",), ("identify",), ("diagnose",), ("simulate",), ("acquire",):
+    for words in (
+        ("run",),
+        ("status",),
+        ("filter",),
+        ("identify",),
+        ("diagnose",),
+        ("simulate",),
+        ("acquire",),
+    ):
         outcome = exoid(*words)
         assert (outcome.code, outcome.err) == (
             2, "exoid: recordings/Monday-1.parquet: damaged or truncated, and nothing is done without it; import it "
@@ -140,12 +166,16 @@ def test_a_table_of_somebody_elses_beside_the_recordings_is_none_of_them(exoid, 
     assert exoid("status").code == 0
 
 
-def test_a_damaged_recording_of_a_named_run_is_not_recorded_over_where_others_were_imported(exoid, folder):
+def test_a_damaged_recording_of_a_named_run_is_not_recorded_over_where_others_were_imported(
+    exoid, folder
+):
     path = folder / "recordings" / "spare.parquet"
     path.write_bytes(b"PAR1")
     runs = ""
     for number, purpose in enumerate(("train", "validate"), 1):
-        (folder / "recordings" / f"Monday-{number}.parquet").rename(folder / "recordings" / f"run{number}.parquet")
+        (folder / "recordings" / f"Monday-{number}.parquet").rename(
+            folder / "recordings" / f"run{number}.parquet"
+        )
         runs += f'[[run]]\nname = "run{number}"\nrun = "exo_alone"\npurpose = "{purpose}"\n'
     (folder / "exoid.toml").write_text(runs)
     assert exoid("status").code == 0  # no run is named spare

@@ -29,7 +29,13 @@ def test_a_slide_is_filtered_identified_and_simulated_in_its_own_units(exoid, re
     assert table.frame["value"].to_numpy() == pytest.approx([90.0, 20.0, 200.0], rel=0.1)
     replayed = tmp_path / "replay.parquet"
     outcome = exoid(
-        "simulate", tmp_path / "identified" / "parameters.parquet", "--replay", validate, "-o", replayed, "--json"
+        "simulate",
+        tmp_path / "identified" / "parameters.parquet",
+        "--replay",
+        validate,
+        "-o",
+        replayed,
+        "--json",
     )
     assert outcome.code == 0, outcome.err
     assert json.loads(outcome.out)["simulation_rmse_rad"]["axis"] < 0.002
@@ -39,21 +45,34 @@ def test_a_slide_is_filtered_identified_and_simulated_in_its_own_units(exoid, re
 
 def test_a_simulation_of_a_slide_asks_what_to_follow(exoid, recordings, tmp_path):
     assert exoid("identify", *recordings, "-o", tmp_path).code == 0
-    outcome = exoid("simulate", tmp_path / "parameters.parquet", "-o", tmp_path / "out", "--run", "exo_alone")
+    outcome = exoid(
+        "simulate", tmp_path / "parameters.parquet", "-o", tmp_path / "out", "--run", "exo_alone"
+    )
     assert outcome.code == 2
-    assert "is of axis, expected hip and knee: the gait is a leg's; name what to follow with --reference" in " ".join(
-        outcome.err.split()
+    assert (
+        "is of axis, expected hip and knee: the gait is a leg's; name what to follow with --reference"
+        in " ".join(outcome.err.split())
     )
 
 
 def test_what_is_for_legs_alone_refuses_a_slide_in_one_line(exoid, recordings, tmp_path):
     chosen = tmp_path / "exoid.toml"
-    chosen.write_text('[mechanism]\nname = "single"\n[[mechanism.joints]]\nname = "axis"\nkind = "prismatic"\n')
+    chosen.write_text(
+        '[mechanism]\nname = "single"\n[[mechanism.joints]]\nname = "axis"\nkind = "prismatic"\n'
+    )
     outcome = exoid("design", "--config", chosen, "-o", tmp_path / "a.parquet")
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert "mechanism: found single with axis (prismatic), expected a leg with hip and knee: `exoid" in outcome.err
-    assert exoid("identify", "--config", chosen, *recordings, "-o", tmp_path / "identified").code == 0
+    assert (
+        "mechanism: found single with axis (prismatic), expected a leg with hip and knee: `exoid"
+        in outcome.err
+    )
+    assert (
+        exoid("identify", "--config", chosen, *recordings, "-o", tmp_path / "identified").code == 0
+    )
     chosen.write_text('[mechanism]\nname = "leg"\n')
     outcome = exoid("identify", "--config", chosen, *recordings, "-o", tmp_path / "identified")
     assert outcome.code == 2
-    assert "train.parquet has joints axis (prismatic), expected those of exoid.toml's [mechanism]" in outcome.err
+    assert (
+        "train.parquet has joints axis (prismatic), expected those of exoid.toml's [mechanism]"
+        in outcome.err
+    )

@@ -1,4 +1,5 @@
-"""What the operator sees: the leg as it stands, all that has limits, and one big word when something is wrong."""
+"""What the operator sees: the leg as it stands, all that has limits, and one big word when
+something is wrong."""
 
 import io
 from dataclasses import replace
@@ -30,10 +31,15 @@ ABORTS = (
 
 
 def progress(state=State.RUN, hip=0.5, knee=-0.9, torque=31.0, force=20.0, **changes):
-    readings = (Reading(7, 0.1, hip, torque, 0, 0, 20, hip), Reading(7, 0.1, knee, -4.0, 0, 0, 20, knee))
+    readings = (
+        Reading(7, 0.1, hip, torque, 0, 0, 20, hip),
+        Reading(7, 0.1, knee, -4.0, 0, 0, 20, knee),
+    )
     forces = np.full((4, 3), np.nan)
     forces[1] = -2.0, force, 0.5
-    made = Progress(state, time_s=12.3, duration_s=40.0, row=Row(readings, forces), samples=2460, rate_hz=200.0)
+    made = Progress(
+        state, time_s=12.3, duration_s=40.0, row=Row(readings, forces), samples=2460, rate_hz=200.0
+    )
     return replace(made, **changes)
 
 
@@ -50,7 +56,9 @@ def picture(made, width=80, height=24):
 
 def shown(made):
     """What a terminal gets, escape sequences included."""
-    screen = Console(file=io.StringIO(), force_terminal=True, color_system="256", width=80, height=24)
+    screen = Console(
+        file=io.StringIO(), force_terminal=True, color_system="256", width=80, height=24
+    )
     screen.print(made)
     return screen.file.getvalue()
 
@@ -76,7 +84,9 @@ def drawn(lines):
     rows = [[ord(c) - 0x2800 if "\u2800" <= c <= "\u28ff" else 0 for c in line] for line in lines]
     codes = np.array([row + [0] * (max(map(len, rows)) - len(row)) for row in rows])
     bits = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
-    return (codes[:, None, :, None] & bits[None, :, None, :]).astype(bool).reshape(4 * len(rows), -1)
+    return (
+        (codes[:, None, :, None] & bits[None, :, None, :]).astype(bool).reshape(4 * len(rows), -1)
+    )
 
 
 def test_on_the_screen_forward_is_right_and_down_is_down():
@@ -127,7 +137,13 @@ def test_every_abort_is_one_big_word_and_its_reason_stands_below(why, state):
 
 
 def test_a_drive_that_could_not_be_disabled_is_more_than_an_abort():
-    lines = picture(view(progress(State.ABORT, abort=f"{ABORTS[2]}; and could not be disabled", still_enabled=True)))
+    lines = picture(
+        view(
+            progress(
+                State.ABORT, abort=f"{ABORTS[2]}; and could not be disabled", still_enabled=True
+            )
+        )
+    )
     assert has_word(lines, "PRESS E-STOP")
     assert not has_word(lines, "ABORT")
 
@@ -138,7 +154,9 @@ def test_on_a_screen_without_room_for_the_big_word_it_is_the_first_that_is_read(
     assert picture(made, width, height)[0].startswith(" PRESS E-STOP"[:width])
 
 
-@pytest.mark.parametrize("close", [{"hip": 1.72}, {"knee": -2.05}, {"torque": 145.0}, {"force": -390.0}])
+@pytest.mark.parametrize(
+    "close", [{"hip": 1.72}, {"knee": -2.05}, {"torque": 145.0}, {"force": -390.0}]
+)
 def test_a_limit_that_is_near_is_said_and_stays_said_for_a_while(close):
     assert view(progress()).word() == ""
     assert view(progress(**close), progress()).word() == "LIMIT NEAR"
@@ -184,6 +202,8 @@ def test_without_a_terminal_a_line_tells_the_same():
     assert plain_line(progress(knee=-2.08, missed=1)) == (
         "run          12.3/40.0 s  +0.500, -2.080 rad  +31.0, -4.0 N·m  200 Hz  1 missed"
     )
-    assert plain_line(progress(State.ABORT, row=None, abort="stopped by Ctrl-C")).endswith("stopped by Ctrl-C")
+    assert plain_line(progress(State.ABORT, row=None, abort="stopped by Ctrl-C")).endswith(
+        "stopped by Ctrl-C"
+    )
     urgent = plain_line(progress(State.ABORT, abort="x" * 300, still_enabled=True))
     assert urgent.startswith("USE THE EMERGENCY STOP"), "what somebody must do at once comes first"

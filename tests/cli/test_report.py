@@ -37,7 +37,11 @@ def test_two_sessions_are_compared(exoid, folder, tmp_path):
 def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
     names = ("error-budget", "verdict", "kv-sweep")
     outcome = exoid(
-        "figures", folder, "-o", tmp_path / "figures", *(word for name in names for word in ("--only", name))
+        "figures",
+        folder,
+        "-o",
+        tmp_path / "figures",
+        *(word for name in names for word in ("--only", name)),
     )
     assert outcome.code == 0
     for name in names:
@@ -45,7 +49,9 @@ def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
         picture = imread(tmp_path / "figures" / f"{name}.png")[..., :3]
         assert picture.shape[0] > 300 and picture.shape[1] > 600  # 200 dpi
         # Nothing is cut off: what is drawn stands within a white edge.
-        assert all((edge == 1).all() for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]))
+        assert all(
+            (edge == 1).all() for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1])
+        )
         assert (picture < 1).any()
 
 
@@ -63,7 +69,10 @@ def test_a_mistyped_figure_gets_a_suggestion(exoid, folder):
             ["nowhere"],
             "nowhere: no such folder, expected an experiment's folder; name the one that its stages wrote to",
         ),
-        (["demo", "-o", "demo"], "-o demo: is a folder, expected the name of a page; write demo/report.html"),
+        (
+            ["demo", "-o", "demo"],
+            "-o demo: is a folder, expected the name of a page; write demo/report.html",
+        ),
         (
             ["demo", "--compare", "demo", "demo"],
             "--compare names both its folders itself; drop the others, or --compare",
@@ -80,11 +89,15 @@ def test_where_there_is_nothing_to_draw_that_is_said(exoid, tmp_path):
     write_parameters(tmp_path)
     outcome = exoid("figures", tmp_path)
     assert outcome.code == 2
-    assert "holds nothing to draw; `exoid diagnose` and `exoid simulate` make it" in " ".join(outcome.err.split())
+    assert "holds nothing to draw; `exoid diagnose` and `exoid simulate` make it" in " ".join(
+        outcome.err.split()
+    )
 
 
 @pytest.mark.parametrize("text", ['{"contract": "verdict/1", "sta', '{"contract": "verdict/1"}'])
-def test_a_damaged_verdict_is_told_on_the_terminal_and_on_the_page_and_the_rest_is_shown(exoid, folder, tmp_path, text):
+def test_a_damaged_verdict_is_told_on_the_terminal_and_on_the_page_and_the_rest_is_shown(
+    exoid, folder, tmp_path, text
+):
     (folder / "diagnosed" / "verdict.json").write_text(text)
     outcome = exoid("report", folder, "-o", tmp_path / "page.html")
     assert outcome.code == 0

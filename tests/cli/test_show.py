@@ -19,8 +19,12 @@ def recording(tmp_path):
         frame[f"{joint}_angle_rad"] = np.linspace(-0.5, 0.5, 5)
         frame[f"{joint}_torque_nm"] = 1.0
         frame[f"{joint}_current_a"] = np.nan
-    origin = describe([tmp_path / "excitation.toml"], {"sample_rate_hz": 200.0, "bounds": {"hip": [0, 1]}})
-    RECORDING.write(path, frame, {"run": "exo_alone", "purpose": "train", "sample_rate_hz": 200.0, **origin})
+    origin = describe(
+        [tmp_path / "excitation.toml"], {"sample_rate_hz": 200.0, "bounds": {"hip": [0, 1]}}
+    )
+    RECORDING.write(
+        path, frame, {"run": "exo_alone", "purpose": "train", "sample_rate_hz": 200.0, **origin}
+    )
     return path
 
 
@@ -29,7 +33,15 @@ def test_a_table_is_shown_with_origin_metadata_and_columns_in_80_columns(exoid, 
     assert outcome.code == 0
     title, *lines = outcome.out.splitlines()
     assert title == f"{recording}: recording/1, one run on the rig"
-    for expected in ("created_by", "excitation.toml", "2 settings;", "sample_rate_hz", "rad", "-0.5", "float64"):
+    for expected in (
+        "created_by",
+        "excitation.toml",
+        "2 settings;",
+        "sample_rate_hz",
+        "rad",
+        "-0.5",
+        "float64",
+    ):
         assert expected in outcome.out
     assert all(len(line) <= 80 for line in lines)
 
@@ -101,13 +113,18 @@ def test_verdict_and_trajectory_toml_are_recognised(exoid, tmp_path):
     assert outcome.code == 0
     assert "verdict/1" in outcome.out
     trajectory = tmp_path / "paper.toml"
-    trajectory.write_text('unit = "deg"\nomega_rad_s = 0.628\ntheta0_rad = [0.1, 0.2]\na = [[1.0]]\nb = [[2.0]]\n')
+    trajectory.write_text(
+        'unit = "deg"\nomega_rad_s = 0.628\ntheta0_rad = [0.1, 0.2]\na = [[1.0]]\nb = [[2.0]]\n'
+    )
     assert "trajectory as TOML" in exoid("show", trajectory).out
 
 
 def test_what_a_motion_would_reveal_is_shown_with_its_origin_and_set_to_the_left(exoid, tmp_path):
     path = tmp_path / "detectability.json"
-    told = {"causes": [{"effect": "base_tilt", "joint": None}], "provenance": {"created_by": "exoid 9"}}
+    told = {
+        "causes": [{"effect": "base_tilt", "joint": None}],
+        "provenance": {"created_by": "exoid 9"},
+    }
     path.write_text(json.dumps({"contract": "detectability/1"} | told))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
@@ -132,6 +149,8 @@ def test_nan_counts_as_missing_and_is_in_no_range(exoid, tmp_path):
     import pyarrow as pa
 
     path = tmp_path / "nan.parquet"
-    parquet.save(path, [pa.table({"time_s": [0.0, float("nan"), None, 1.0]})], {"contract": "trajectory/1"})
+    parquet.save(
+        path, [pa.table({"time_s": [0.0, float("nan"), None, 1.0]})], {"contract": "trajectory/1"}
+    )
     (column,) = json.loads(exoid("show", path, "--json").out)["columns"]
     assert (column["nulls"], column["min"], column["max"]) == (2, 0.0, 1.0)

@@ -1,4 +1,5 @@
-"""What is printed fits a terminal of 80 columns, says the same without colour, and nothing where nobody reads."""
+"""What is printed fits a terminal of 80 columns, says the same without colour, and nothing where
+nobody reads."""
 
 import json
 import os
@@ -21,7 +22,9 @@ def on_a_terminal(*arguments: str, **environment: str) -> str:
     """What a command prints to a terminal, as bytes that the terminal sees."""
     here, there = pty.openpty()
     command = [sys.executable, "-m", "exoid_cli.app", *arguments]
-    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
+    kept = {
+        name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")
+    }
     told = kept | {"TERM": "xterm", "COLUMNS": "80"} | environment
     subprocess.run(command, stdin=there, stdout=there, stderr=there, env=told, check=False)
     os.close(there)
@@ -37,7 +40,10 @@ def on_a_terminal(*arguments: str, **environment: str) -> str:
 
 
 def test_an_error_is_red_on_a_terminal_and_the_same_words_without_colour():
-    red, plain = on_a_terminal("effects", "stribek"), on_a_terminal("effects", "stribek", NO_COLOR="1")
+    red, plain = (
+        on_a_terminal("effects", "stribek"),
+        on_a_terminal("effects", "stribek", NO_COLOR="1"),
+    )
     assert COLOUR.search(red)
     assert not COLOUR.search(plain)
     assert re.sub(r"\x1b\[[0-9;]*m", "", red) == re.sub(r"\x1b\[[0-9;]*m", "", plain)
@@ -49,7 +55,9 @@ def leaves(command, words=()):
         yield from leaves(inner, (*words, name)) if hasattr(inner, "commands") else [(*words, name)]
 
 
-@pytest.mark.parametrize("words", list(leaves(typer.main.get_command(application.app))), ids=" ".join)
+@pytest.mark.parametrize(
+    "words", list(leaves(typer.main.get_command(application.app))), ids=" ".join
+)
 def test_every_command_has_an_example_and_its_json_and_quiet_within_80_columns(exoid, words):
     outcome = exoid(*words, "--help")
     assert outcome.code == 0
@@ -59,8 +67,12 @@ def test_every_command_has_an_example_and_its_json_and_quiet_within_80_columns(e
     assert max(map(len, outcome.out.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("words", [("effects",), ("effects", "cogging"), ("status",), ("settings", "check")])
-def test_json_is_one_document_quiet_is_nothing_and_neither_minds_where_it_stands(exoid, tmp_path, monkeypatch, words):
+@pytest.mark.parametrize(
+    "words", [("effects",), ("effects", "cogging"), ("status",), ("settings", "check")]
+)
+def test_json_is_one_document_quiet_is_nothing_and_neither_minds_where_it_stands(
+    exoid, tmp_path, monkeypatch, words
+):
     assert exoid("init", tmp_path / "e", "--json").code == 0
     monkeypatch.chdir(tmp_path / "e")
     before, after = exoid("--json", *words), exoid(*words, "--json")
@@ -72,12 +84,19 @@ def test_json_is_one_document_quiet_is_nothing_and_neither_minds_where_it_stands
 
 def test_a_table_ends_its_lines_where_its_words_end(capsys):
     Console().table(("joint", "why"), [("hip", "a"), ("knee", "")], title="what a table is called")
-    assert capsys.readouterr().out.splitlines() == ["what a table is called", "joint  why", "hip    a", "knee"]
+    assert capsys.readouterr().out.splitlines() == [
+        "what a table is called",
+        "joint  why",
+        "hip    a",
+        "knee",
+    ]
 
 
 def test_a_table_too_wide_is_broken_between_words_and_in_a_path_after_a_slash(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "50")
-    rows = [("replay", "simulated/extended/replay-PULSES.parquet", "waits for identify, as it must")]
+    rows = [
+        ("replay", "simulated/extended/replay-PULSES.parquet", "waits for identify, as it must")
+    ]
     Console().table(("stage", "result", "why"), [*rows, ("report", "report.html", "")])
     assert capsys.readouterr().out.splitlines() == [
         "stage   result                 why",
@@ -90,11 +109,18 @@ def test_a_table_too_wide_is_broken_between_words_and_in_a_path_after_a_slash(ca
 def test_a_remark_is_set_in_and_broken_between_words(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "30")
     Console().note("- creep the empty joint through 0.01 to 0.3 rad/s")
-    assert capsys.readouterr().out.splitlines() == ["  - creep the empty joint", "    through 0.01 to 0.3 rad/s"]
+    assert capsys.readouterr().out.splitlines() == [
+        "  - creep the empty joint",
+        "    through 0.01 to 0.3 rad/s",
+    ]
 
 
-@pytest.mark.parametrize(("lasts_s", "said"), [(0.5, ["compiling"]), (0.0, [])], ids=["long", "soon"])
-def test_what_is_started_where_nothing_moves_is_told_once_it_takes_long(capsys, monkeypatch, lasts_s, said):
+@pytest.mark.parametrize(
+    ("lasts_s", "said"), [(0.5, ["compiling"]), (0.0, [])], ids=["long", "soon"]
+)
+def test_what_is_started_where_nothing_moves_is_told_once_it_takes_long(
+    capsys, monkeypatch, lasts_s, said
+):
     monkeypatch.setattr("exoid_cli.console.LATE_S", 0.05 if lasts_s else 5.0)
     with Console().starting("compiling"):
         time.sleep(lasts_s)

@@ -1,4 +1,5 @@
-"""A new experiment from `exoid init` to the simulated leg, over Modbus TCP, on a rig that hides nothing."""
+"""A new experiment from `exoid init` to the simulated leg, over Modbus TCP, on a rig that hides
+nothing."""
 
 import json
 import os
@@ -15,7 +16,8 @@ from pipelines.contracts import MOTION, PARAMETERS
 from pipelines.settings.rig import load_rig
 
 CHANGES = {
-    "iterations = 800 ": "iterations = 100 ",  # not seconds: a busy machine would find another motion
+    # Not seconds: a busy machine would find another motion.
+    "iterations = 800 ": "iterations = 100 ",
     "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
     "harmonics = 5\n": "harmonics = 3\n",
     'rig = "rigs/default.toml"': 'rig = "rigs/plain.toml"',
@@ -23,7 +25,9 @@ CHANGES = {
     "figures = true": "figures = false",
 }
 OTHER_GAIN = ("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 200.0")
-RUNS = [f"{kind}_{purpose}" for kind in ("exo_alone", "with_human") for purpose in ("train", "validate")]
+RUNS = [
+    f"{kind}_{purpose}" for kind in ("exo_alone", "with_human") for purpose in ("train", "validate")
+]
 AT_99_9 = 3.29 / 1.96
 """From the half-width of a 95 % interval to that of a 99.9 % one."""
 
@@ -56,7 +60,9 @@ def change(path, old, new):
 def make(folder):
     """Run make as a user would; returns what it said and the stages that ran."""
     command = ["make", "-C", folder, f"EXOID={sys.executable} -m exoid_cli.app"]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "MAKEFLAGS": ""})
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, "MAKEFLAGS": ""}
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout, re.findall(r"^\S+ -m exoid_cli\.app (\w+)", done.stdout, flags=re.MULTILINE)
 
@@ -117,7 +123,12 @@ def test_a_file_that_a_stage_lacks_is_told_and_made_again(exoid, experiment):
     for name in lost:
         (experiment / name).unlink()
     told = {reason for one in json.loads(exoid("status", "--json").out) for reason in one["why"]}
-    assert told == {"waits for identify", "waits for simulate", "waits for replay", *(f"{x} is missing" for x in lost)}
+    assert told == {
+        "waits for identify",
+        "waits for simulate",
+        "waits for replay",
+        *(f"{x} is missing" for x in lost),
+    }
     again = [one["stage"] for one in json.loads(exoid("run", "--json").out)]
     assert again == ["identify", "simulate", "replay", "report"]
     assert all((experiment / name).is_file() for name in lost)
@@ -140,7 +151,9 @@ def test_a_command_alone_leaves_what_is_up_to_date(exoid, experiment):
         ("acquire", *(f"recordings/{name}.parquet" for name in RUNS)),
         ("diagnose", "diagnosed/verdict.json"),
     ):
-        assert exoid(command).out.splitlines() == [f"{result}: up to date; --again makes it anew" for result in results]
+        assert exoid(command).out.splitlines() == [
+            f"{result}: up to date; --again makes it anew" for result in results
+        ]
 
 
 def test_a_command_alone_does_its_stage_and_warns_of_what_it_builds_on(exoid, experiment):
@@ -153,12 +166,18 @@ def test_a_command_alone_does_its_stage_and_warns_of_what_it_builds_on(exoid, ex
     outcome = exoid("filter")
     assert outcome.code == 0
     assert [line for line in outcome.out.splitlines() if line.startswith("exoid ")] == [
-        f"exoid filter recordings/{name}.parquet --config exoid.toml -o motions/{name}.parquet" for name in RUNS
+        f"exoid filter recordings/{name}.parquet --config exoid.toml -o motions/{name}.parquet"
+        for name in RUNS
     ]
-    assert all(MOTION.read(f"motions/{name}.parquet").metadata["config"]["filter"]["order"] == 2 for name in RUNS)
+    assert all(
+        MOTION.read(f"motions/{name}.parquet").metadata["config"]["filter"]["order"] == 2
+        for name in RUNS
+    )
     done = json.loads(exoid("run", "simulate", "--json").out)
     assert [one["stage"] for one in done] == ["identify", "simulate"]
-    stale = {one["stage"] for one in json.loads(exoid("status", "--json").out) if one["state"] == "stale"}
+    stale = {
+        one["stage"] for one in json.loads(exoid("status", "--json").out) if one["state"] == "stale"
+    }
     assert stale == {"diagnose", "replay", "extended", "report"}
 
 
@@ -187,7 +206,9 @@ def test_a_model_is_shown_by_its_parameters(exoid, experiment):
     outcome = exoid("show", "identified/parameters.parquet")
     assert (outcome.code, outcome.err) == (0, "")
     lines = outcome.out.splitlines()
-    assert any(line.startswith("X1 human ") and line.endswith("kg·m²      inertia") for line in lines)
+    assert any(
+        line.startswith("X1 human ") and line.endswith("kg·m²      inertia") for line in lines
+    )
     assert max(map(len, lines)) <= 80
 
 
@@ -195,7 +216,9 @@ def test_the_candidates_of_a_diagnosis_are_shown_with_what_became_of_each(exoid,
     lines = exoid("show", "diagnosed/candidates.parquet").out.splitlines()
     first_reason = next(n for n, line in enumerate(lines) if line.startswith("  "))
     entry = " ".join(lines[2:first_reason])  # its words may take two lines
-    assert re.fullmatch(r"1 \S.* at the (hip|knee).*: (named|unlisted|rejected|absorbed|indistinguishable)", entry)
+    assert re.fullmatch(
+        r"1 \S.* at the (hip|knee).*: (named|unlisted|rejected|absorbed|indistinguishable)", entry
+    )
     assert not any("@" in line for line in lines)
     assert max(map(len, lines)) <= 80
 

@@ -1,7 +1,8 @@
-"""What Windows lacks, exoid does without: an experiment is run, up to its model, with all of that taken away.
+"""What Windows lacks, exoid does without: an experiment is run, up to its model, with all of that
+taken away.
 
-No Windows is asked. What is taken away is what it does not have (modules, signals, waiting for pipes, scheduling),
-what it forbids (removing or replacing a file that is open), and make.
+No Windows is asked. What is taken away is what it does not have (modules, signals, waiting for
+pipes, scheduling), what it forbids (removing or replacing a file that is open), and make.
 """
 
 import os
@@ -84,7 +85,9 @@ figures = false
 """
 
 
-@pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="only Linux tells which files are open")
+@pytest.mark.skipif(
+    not os.path.isdir("/proc/self/fd"), reason="only Linux tells which files are open"
+)
 def test_an_experiment_runs_without_what_windows_lacks(exoid, tmp_path):
     folder = tmp_path / "experiment"
     assert exoid("init", folder).code == 0
@@ -94,11 +97,20 @@ def test_an_experiment_runs_without_what_windows_lacks(exoid, tmp_path):
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert len(PARAMETERS.read(folder / "identified" / "parameters.parquet").frame) == 8
-    assert sorted(path.name for path in (folder / "recordings").iterdir()) == ["a.parquet", "b.parquet"]
+    assert sorted(path.name for path in (folder / "recordings").iterdir()) == [
+        "a.parquet",
+        "b.parquet",
+    ]
 
 
 def test_patterns_are_replaced_by_the_files_that_match(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("b.csv", "a.csv"):
         (tmp_path / name).touch()
-    assert matching_files(["import", "*.csv", "--map", "m?.toml"]) == ["import", "a.csv", "b.csv", "--map", "m?.toml"]
+    assert matching_files(["import", "*.csv", "--map", "m?.toml"]) == [
+        "import",
+        "a.csv",
+        "b.csv",
+        "--map",
+        "m?.toml",
+    ]

@@ -13,7 +13,9 @@ from pipelines.contracts.atomic import all_or_none, open_folder, write_text
 from pipelines.contracts.parquet import refuse_place
 from pipelines.errors import InputError
 
-of_linux = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's /proc and /dev/full")
+of_linux = pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="needs Linux's /proc and /dev/full"
+)
 
 
 def test_a_folder_is_made_and_left_empty(tmp_path):
@@ -37,7 +39,9 @@ def test_a_full_disk_is_refused_though_it_takes_names(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-@pytest.mark.parametrize("write", [lambda p: write_text(p, "x"), lambda p: refuse_place(p, "recording/1")])
+@pytest.mark.parametrize(
+    "write", [lambda p: write_text(p, "x"), lambda p: refuse_place(p, "recording/1")]
+)
 @pytest.mark.parametrize("linked", [False, True])
 def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
     pipe = place = tmp_path / "pipe"
@@ -47,7 +51,10 @@ def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
         place.symlink_to(pipe)
     with pytest.raises(InputError) as refused:
         write(place)
-    assert str(refused.value) == f"{place}: is a pipe or a device, expected the name of a file to write; name another"
+    assert (
+        str(refused.value)
+        == f"{place}: is a pipe or a device, expected the name of a file to write; name another"
+    )
     assert pipe.is_fifo()
     assert {path.name for path in tmp_path.iterdir()} == {"pipe", place.name}
 
@@ -57,7 +64,9 @@ def test_a_folder_is_not_replaced_by_a_file(tmp_path):
         write_text(tmp_path, "x")
 
 
-def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_made_with(tmp_path, monkeypatch):
+def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_made_with(
+    tmp_path, monkeypatch
+):
     def make(**texts):
         with all_or_none(tmp_path, vouching="a") as made:
             for name, text in texts.items():
@@ -66,7 +75,9 @@ def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_mad
     make(a="one", b="one")
     real = os.replace
     monkeypatch.setattr(
-        atomic.os, "replace", lambda new, old: exit("killed") if old == tmp_path / "b" else real(new, old)
+        atomic.os,
+        "replace",
+        lambda new, old: exit("killed") if old == tmp_path / "b" else real(new, old),
     )
     with pytest.raises(SystemExit):
         make(a="two", b="two")
@@ -116,12 +127,20 @@ def test_what_is_made_anew_and_says_the_same_stays_byte_for_byte_with_a_new_time
         (save_table, {"table": TABLE.rename_columns(["time_z"])}),
         (
             save_table,
-            {"table": pa.table([[0.0, 1.0, 2.0]], pa.schema([pa.field("time_s", "double", True, {"u": "s"})]))},
+            {
+                "table": pa.table(
+                    [[0.0, 1.0, 2.0]], pa.schema([pa.field("time_s", "double", True, {"u": "s"})])
+                )
+            },
         ),
     ],
 )
 def test_what_says_something_else_replaces_what_was_there(tmp_path, save, other):
-    path, then, now = tmp_path / "result.parquet", "2026-01-01T00:00:00+00:00", "2026-01-02T00:00:00+00:00"
+    path, then, now = (
+        tmp_path / "result.parquet",
+        "2026-01-01T00:00:00+00:00",
+        "2026-01-02T00:00:00+00:00",
+    )
     save(path, then)
     save(path, now, **other)
     assert now.encode() in path.read_bytes()

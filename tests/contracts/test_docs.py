@@ -10,7 +10,10 @@ from pipelines.contracts.joints import QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "contracts.md").read_text(encoding="utf-8")
-EXPANDED = PAGE.replace("{thigh,shank}_{front,back}_force_{x,y,z}_n", "cuff") + "angle velocity acceleration"
+EXPANDED = (
+    PAGE.replace("{thigh,shank}_{front,back}_force_{x,y,z}_n", "cuff")
+    + "angle velocity acceleration"
+)
 
 
 @pytest.mark.parametrize("contract", CONTRACTS, ids=lambda contract: contract.name)
@@ -32,11 +35,22 @@ def test_every_page_stands_in_the_index():
     assert {page for page in pages if f"({page})" not in index} == set()
 
 
-DECISION = (verdict.Finding, verdict.Likely, verdict.Law, verdict.Node, verdict.Shares, verdict.Posterior)
+DECISION = (
+    verdict.Finding,
+    verdict.Likely,
+    verdict.Law,
+    verdict.Node,
+    verdict.Shares,
+    verdict.Posterior,
+)
 
 
 @pytest.mark.parametrize(
-    "key", sorted({name for model in DECISION for name in model.model_fields} | {"findings", "router", "posterior"})
+    "key",
+    sorted(
+        {name for model in DECISION for name in model.model_fields}
+        | {"findings", "router", "posterior"}
+    ),
 )
 def test_every_key_of_the_decision_is_documented(key):
     assert re.search(rf"`(?:\w+(?:\[\])?\.)?{key}`", PAGE)

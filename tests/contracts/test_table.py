@@ -9,7 +9,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.contracts import CANDIDATES, MOTION, PARAMETERS, RECORDING, RESIDUALS, SIMULATION, Joint, contract_of
+from pipelines.contracts import (
+    CANDIDATES,
+    MOTION,
+    PARAMETERS,
+    RECORDING,
+    RESIDUALS,
+    SIMULATION,
+    Joint,
+    contract_of,
+)
 from pipelines.contracts import parquet as storage
 from pipelines.errors import ContractError
 
@@ -22,7 +31,12 @@ def refusal(action, *arguments) -> str:
 
 def test_what_is_written_is_read_again(tmp_path, swinging_leg, run_metadata):
     swinging_leg["note"] = "extra columns stay"
-    metadata = {**run_metadata, "lab": {"room": 3}, "gaps": [[0.1, 2]], "sample_rate_hz": np.float64(200.0)}
+    metadata = {
+        **run_metadata,
+        "lab": {"room": 3},
+        "gaps": [[0.1, 2]],
+        "sample_rate_hz": np.float64(200.0),
+    }
     RECORDING.write(tmp_path / "new folder" / "a.parquet", swinging_leg, metadata)
     table = RECORDING.read(tmp_path / "new folder" / "a.parquet")
     assert table.frame.equals(swinging_leg)
@@ -34,7 +48,10 @@ def test_what_is_written_is_read_again(tmp_path, swinging_leg, run_metadata):
 def test_unit_and_meaning_travel_with_the_column(tmp_path, swinging_leg, run_metadata):
     RECORDING.write(tmp_path / "a.parquet", swinging_leg, run_metadata)
     field = pq.read_schema(tmp_path / "a.parquet").field("hip_torque_nm")
-    assert field.metadata == {b"unit": "N·m".encode(), b"meaning": b"what the drive delivers at the joint"}
+    assert field.metadata == {
+        b"unit": "N·m".encode(),
+        b"meaning": b"what the drive delivers at the joint",
+    }
 
 
 def test_a_prismatic_axis_has_columns_of_its_own(tmp_path, swinging_leg, run_metadata):
@@ -42,13 +59,16 @@ def test_a_prismatic_axis_has_columns_of_its_own(tmp_path, swinging_leg, run_met
     assert [axis.column(q) for q in ("angle", "torque", "velocity")] == [
         "axis_position_m", "axis_force_n", "axis_velocity_m_s",
     ]  # fmt: skip
-    frame = swinging_leg[["time_s"]].assign(axis_position_m=12.0, axis_force_n=1.0)  # 12 m is no angle in degrees
+    # 12 m is no angle in degrees.
+    frame = swinging_leg[["time_s"]].assign(axis_position_m=12.0, axis_force_n=1.0)
     metadata = {**run_metadata, "joints": [{"name": "axis", "kind": "prismatic"}]}
     RECORDING.write(tmp_path / "a.parquet", frame, metadata)
     assert RECORDING.read(tmp_path / "a.parquet").joints == (axis,)
 
 
-def test_numbers_of_other_types_are_converted_where_nothing_is_lost(tmp_path, swinging_leg, run_metadata):
+def test_numbers_of_other_types_are_converted_where_nothing_is_lost(
+    tmp_path, swinging_leg, run_metadata
+):
     swinging_leg["hip_angle_rad"] = swinging_leg["hip_angle_rad"].astype("float32")
     swinging_leg["knee_angle_rad"] = -1
     swinging_leg["hip_torque_nm"] = [Decimal("0.5")] * 100
@@ -60,8 +80,14 @@ def test_numbers_of_other_types_are_converted_where_nothing_is_lost(tmp_path, sw
 
 
 def test_lists_and_structs_keep_their_types_even_when_empty(tmp_path):
-    joints = {f"rmse_{when}_{joint}_nm": [1.0, np.nan] for when in ("before", "after") for joint in ("hip", "knee")}
-    gains = {f"{name}": [1.0, None] for name in ("train_score", "gain_nm", "gain_low_nm", "gain_high_nm")}
+    joints = {
+        f"rmse_{when}_{joint}_nm": [1.0, np.nan]
+        for when in ("before", "after")
+        for joint in ("hip", "knee")
+    }
+    gains = {
+        f"{name}": [1.0, None] for name in ("train_score", "gain_nm", "gain_low_nm", "gain_high_nm")
+    }
     frame = pd.DataFrame(
         {
             "rank": [1, 2],
@@ -76,9 +102,13 @@ def test_lists_and_structs_keep_their_types_even_when_empty(tmp_path):
     )
     CANDIDATES.write(tmp_path / "c.parquet", frame, {})
     table = CANDIDATES.read(tmp_path / "c.parquet")
-    CANDIDATES.write(tmp_path / "c.parquet", table.frame, table.metadata)  # what was read can be written
+    # What was read can be written.
+    CANDIDATES.write(tmp_path / "c.parquet", table.frame, table.metadata)
     schema = pq.read_schema(tmp_path / "c.parquet")
-    assert str(schema.field("parameters").type) == "list<element: struct<name: string, value: double, unit: string>>"
+    assert (
+        str(schema.field("parameters").type)
+        == "list<element: struct<name: string, value: double, unit: string>>"
+    )
     assert table.frame["parameters"][0][0]["value"] == 8.0
 
 
@@ -108,11 +138,17 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path, swinging_leg, run_metada
     cut = tmp_path / "cut.parquet"
     for length in range(4, len(whole), len(whole) // 20):
         cut.write_bytes(whole[:length])
-        assert refusal(RECORDING.read, cut) == f"{cut}: is a damaged or truncated Parquet file; copy or make it again"
+        assert (
+            refusal(RECORDING.read, cut)
+            == f"{cut}: is a damaged or truncated Parquet file; copy or make it again"
+        )
 
 
 def test_a_folder_is_refused(tmp_path, swinging_leg, run_metadata):
-    assert refusal(RECORDING.read, tmp_path) == f"{tmp_path}: is a folder, expected a Parquet file; name a file in it"
+    assert (
+        refusal(RECORDING.read, tmp_path)
+        == f"{tmp_path}: is a folder, expected a Parquet file; name a file in it"
+    )
     assert refusal(RECORDING.write, tmp_path, swinging_leg, run_metadata) == (
         f"{tmp_path}: is a folder, expected the name of a Parquet file to write"
     )
@@ -246,8 +282,12 @@ def test_a_table_that_breaks_its_contract_is_refused(swinging_leg, run_metadata,
 def test_reading_refuses_what_writing_refuses(tmp_path, swinging_leg, run_metadata):
     swinging_leg.loc[12, "hip_angle_rad"] = np.nan
     path = tmp_path / "a.parquet"
-    storage.save(path, [pa.Table.from_pandas(swinging_leg)], {**run_metadata, "contract": "recording/1"})
-    assert refusal(RECORDING.read, path).startswith(f"{path}: column hip_angle_rad, row 12: found NaN")
+    storage.save(
+        path, [pa.Table.from_pandas(swinging_leg)], {**run_metadata, "contract": "recording/1"}
+    )
+    assert refusal(RECORDING.read, path).startswith(
+        f"{path}: column hip_angle_rad, row 12: found NaN"
+    )
 
 
 def test_a_name_that_stands_twice_is_refused(swinging_leg, run_metadata):
@@ -289,14 +329,20 @@ def test_metadata_that_break_the_contract_are_refused(swinging_leg, run_metadata
 
 
 def test_metadata_that_json_cannot_hold_are_refused(swinging_leg, run_metadata):
-    told = refusal(RECORDING.check, swinging_leg, {**run_metadata, "noise": float("nan")}, "a.parquet")
-    assert told.startswith("a.parquet: metadata cannot be written as JSON (Out of range float values")
+    told = refusal(
+        RECORDING.check, swinging_leg, {**run_metadata, "noise": float("nan")}, "a.parquet"
+    )
+    assert told.startswith(
+        "a.parquet: metadata cannot be written as JSON (Out of range float values"
+    )
 
 
 def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
     state = {f"{joint}_{quantity}": 0.0 for joint in ("hip", "knee") for quantity in
              ("velocity_rad_s", "acceleration_rad_s2", "predicted_nm", "residual_nm")}  # fmt: skip
-    frame = swinging_leg.assign(**state, run="exo_alone", purpose="train", segment=0, model="baseline", scored=True)
+    frame = swinging_leg.assign(
+        **state, run="exo_alone", purpose="train", segment=0, model="baseline", scored=True
+    )
     both = pd.concat([frame.assign(file="a"), frame.assign(file="b")], ignore_index=True)
     RESIDUALS.check(both, {})
     told = refusal(RESIDUALS.check, both.assign(file="a"), {}, "r.parquet")
@@ -311,7 +357,9 @@ def test_a_diverging_simulation_is_not_taken_for_a_wrong_unit(swinging_leg):
     frame = swinging_leg.assign(
         **{f"{joint}_{quantity}": 100.0 for joint in ("hip", "knee") for quantity in quantities}
     )
-    SIMULATION.check(frame.assign(hip_angle_rad=500.0, knee_torque_nm=1e20, hip_network_nm=np.nan), {})
+    SIMULATION.check(
+        frame.assign(hip_angle_rad=500.0, knee_torque_nm=1e20, hip_network_nm=np.nan), {}
+    )
 
 
 def test_the_covariance_has_a_row_for_each_parameter():
@@ -326,8 +374,12 @@ def test_the_covariance_has_a_row_for_each_parameter():
     )
 
 
-def test_nothing_but_an_older_version_of_itself_is_overwritten(tmp_path, swinging_leg, run_metadata):
-    path, notes, left_over = (tmp_path / name for name in ("a.parquet", "notes.parquet", "cut.parquet"))
+def test_nothing_but_an_older_version_of_itself_is_overwritten(
+    tmp_path, swinging_leg, run_metadata
+):
+    path, notes, left_over = (
+        tmp_path / name for name in ("a.parquet", "notes.parquet", "cut.parquet")
+    )
     RECORDING.write(path, swinging_leg, run_metadata)
     RECORDING.write(path, swinging_leg, run_metadata)
     notes.write_text("a month of work")
@@ -373,7 +425,10 @@ def test_a_damaged_page_is_one_line_that_names_the_file(tmp_path, swinging_leg, 
     content = bytearray(path.read_bytes())
     content[4:400] = bytes(396)
     path.write_bytes(content)
-    assert refusal(storage.load, path) == f"{path}: is a damaged or truncated Parquet file; copy or make it again"
+    assert (
+        refusal(storage.load, path)
+        == f"{path}: is a damaged or truncated Parquet file; copy or make it again"
+    )
 
 
 def test_a_journal_is_recognised_and_its_whole_samples_are_counted(tmp_path):
@@ -395,18 +450,31 @@ def in_pieces(frame, *ends):
     return [pa.Table.from_pandas(frame.iloc[a:b], preserve_index=False) for a, b in pairwise(cuts)]
 
 
-def test_a_table_written_in_pieces_is_the_table_written_at_once(tmp_path, swinging_leg, run_metadata):
+def test_a_table_written_in_pieces_is_the_table_written_at_once(
+    tmp_path, swinging_leg, run_metadata
+):
     RECORDING.write(tmp_path / "whole.parquet", swinging_leg, run_metadata)
-    RECORDING.write_pieces(tmp_path / "pieces.parquet", in_pieces(swinging_leg, 1, 1, 7), run_metadata)
-    whole, pieces = (RECORDING.read(tmp_path / name) for name in ("whole.parquet", "pieces.parquet"))
+    RECORDING.write_pieces(
+        tmp_path / "pieces.parquet", in_pieces(swinging_leg, 1, 1, 7), run_metadata
+    )
+    whole, pieces = (
+        RECORDING.read(tmp_path / name) for name in ("whole.parquet", "pieces.parquet")
+    )
     assert pieces.frame.equals(whole.frame)
     assert pieces.metadata == whole.metadata
-    assert pq.read_schema(tmp_path / "pieces.parquet").equals(pq.read_schema(tmp_path / "whole.parquet"), True)
+    assert pq.read_schema(tmp_path / "pieces.parquet").equals(
+        pq.read_schema(tmp_path / "whole.parquet"), True
+    )
 
 
 @pytest.mark.parametrize(
     ("column", "row", "value"),
-    [("time_s", 7, 0.0), ("time_s", 8, 0.0), ("hip_angle_rad", 8, np.nan), ("knee_angle_rad", 9, 30.0)],
+    [
+        ("time_s", 7, 0.0),
+        ("time_s", 8, 0.0),
+        ("hip_angle_rad", 8, np.nan),
+        ("knee_angle_rad", 9, 30.0),
+    ],
 )
 def test_what_is_refused_in_a_whole_table_is_refused_alike_in_pieces_and_leaves_nothing(
     tmp_path, swinging_leg, run_metadata, column, row, value
@@ -415,14 +483,20 @@ def test_what_is_refused_in_a_whole_table_is_refused_alike_in_pieces_and_leaves_
     swinging_leg.loc[row, column] = value
     at_once = refusal(RECORDING.write, path, swinging_leg, run_metadata)
     assert f"row {row}: found" in at_once
-    assert refusal(RECORDING.write_pieces, path, in_pieces(swinging_leg, 7), run_metadata) == at_once
+    assert (
+        refusal(RECORDING.write_pieces, path, in_pieces(swinging_leg, 7), run_metadata) == at_once
+    )
     assert not list(tmp_path.iterdir())
 
 
 def test_what_has_been_read_of_a_long_file_is_let_go(tmp_path, run_metadata):
     n, groups = 20_000, 40
     time = np.arange(n * groups) / 200.0
-    piece = {f"{joint}_{q}": np.sin(time[:n]) for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")}
+    piece = {
+        f"{joint}_{q}": np.sin(time[:n])
+        for joint in ("hip", "knee")
+        for q in ("angle_rad", "torque_nm")
+    }
     tables = (pa.table({"time_s": time[g * n : (g + 1) * n], **piece}) for g in range(groups))
     RECORDING.write_pieces(tmp_path / "long.parquet", tables, run_metadata)
     before, most, rows = pa.total_allocated_bytes(), 0, 0

@@ -1,4 +1,5 @@
-"""A verdict with a hole is refused before anything is computed with it, in words that name the hole."""
+"""A verdict with a hole is refused before anything is computed with it, in words that name the
+hole."""
 
 import json
 from copy import deepcopy
@@ -12,22 +13,32 @@ from tests.report.sessions import AXIS, LEG, decision_of, verdict_of
 NAN = float("nan")
 HOLES = {
     "baseline_rmse_nm.knee": lambda said: said["baseline_rmse_nm"].update(knee=None),
-    "extended_rmse_unmasked_nm.hip": lambda said: said["extended_rmse_unmasked_nm"].update(hip="0.3"),
+    "extended_rmse_unmasked_nm.hip": lambda said: said["extended_rmse_unmasked_nm"].update(
+        hip="0.3"
+    ),
     "noise_floor_nm.hip": lambda said: said["noise_floor_nm"].update(hip=0.0),
     "causes": lambda said: said.update(causes="x"),
     "causes[0].gain.ci95[1]": lambda said: said["causes"][0]["gain"].update(ci95=[0.1, NAN]),
     "causes[0].gain.joint": lambda said: said["causes"][0]["gain"].update(joint="ankle"),
-    "control.with.peak_torque_nm.hip": lambda said: said["control"]["with"]["peak_torque_nm"].update(hip=NAN),
-    "error_budget.hip.noise_floor": lambda said: said["error_budget"]["hip"].update(noise_floor=None),
+    "control.with.peak_torque_nm.hip": lambda said: said["control"]["with"][
+        "peak_torque_nm"
+    ].update(hip=NAN),
+    "error_budget.hip.noise_floor": lambda said: said["error_budget"]["hip"].update(
+        noise_floor=None
+    ),
     "unexplained": lambda said: said["unexplained"].pop("hip"),
     "units": lambda said: said.update(units={}),
     "torque_rms_nm": lambda said: said.update(torque_rms_nm={"knee": 12.0}),
     "findings[0].joint": lambda said: said["findings"][0].update(joint="ankle"),
-    "findings[0].path[1].probability": lambda said: said["findings"][0]["path"][1].update(probability=NAN),
+    "findings[0].path[1].probability": lambda said: said["findings"][0]["path"][1].update(
+        probability=NAN
+    ),
     "findings[0].causes[1].words": lambda said: said["findings"][0]["causes"][1].pop("words"),
     "findings[0].level": lambda said: said["findings"][0].update(level="guess"),
     "posterior.unlisted": lambda said: said["posterior"].update(unlisted=1.2),
-    "posterior.causes.cogging@knee": lambda said: said["posterior"]["causes"].update({"cogging@knee": "0.9"}),
+    "posterior.causes.cogging@knee": lambda said: said["posterior"]["causes"].update(
+        {"cogging@knee": "0.9"}
+    ),
     "router": lambda said: said["router"].pop("hip"),
     "router.knee.noise": lambda said: said["router"]["knee"].update(noise=None),
 }

@@ -22,9 +22,14 @@ from pipelines.settings.design import DesignSettings, JointBounds, NoiseSettings
 PAPER = datasets() / "paper"
 PAPERS_MEAN = (0.611, -0.925)
 
-# Best condition numbers found by six optimisers: 38.19, 31.52 and 10.83; log det 10.77. These are to be reached.
+# Best condition numbers found by six optimisers: 38.19, 31.52 and 10.83; log det 10.77. These are
+# to be reached.
 GOALS = [
-    pytest.param({"harmonics": 2, "theta0_rad": PAPERS_MEAN, "criterion": "condition"}, 38.6, id="2-fixed-condition"),
+    pytest.param(
+        {"harmonics": 2, "theta0_rad": PAPERS_MEAN, "criterion": "condition"},
+        38.6,
+        id="2-fixed-condition",
+    ),
     pytest.param({"harmonics": 2, "criterion": "condition"}, 32.0, id="2-free-condition"),
     pytest.param({"harmonics": 5, "criterion": "condition"}, 11.9, id="5-free-condition"),
     pytest.param({"harmonics": 5, "criterion": "log_det"}, 10.5, id="5-free-log_det"),
@@ -47,7 +52,8 @@ def published():
 
 def test_the_published_excitation_has_the_published_model_s_condition_numbers(published):
     found = quality(published, DesignSettings(), Geometry())
-    # DESIGN: 47.3 for 8 columns, 22.6 for the inertial ones, 5.8 scaled; recomputed from the printed coefficients.
+    # DESIGN: 47.3 for 8 columns, 22.6 for the inertial ones, 5.8 scaled; recomputed from the
+    # printed coefficients.
     assert f"{found.condition:.1f}" == "47.3"
     assert f"{found.inertial_condition:.1f}" == "22.6"
     assert f"{found.scaled_condition:.1f}" == "5.8"
@@ -80,7 +86,10 @@ def test_nine_seeds_of_ten_reach_the_goal_within_ten_seconds_of_one_core(setting
 
 def test_a_scaled_condition_number_below_the_published_one_is_found(published):
     found = design(DesignSettings(criterion="scaled_condition", seed=1))
-    assert found.quality.scaled_condition < 0.7 * quality(published, DesignSettings(), Geometry()).scaled_condition
+    assert (
+        found.quality.scaled_condition
+        < 0.7 * quality(published, DesignSettings(), Geometry()).scaled_condition
+    )
 
 
 def test_log_det_foretells_smaller_errors_of_inertia_than_the_published_excitation(published):
@@ -92,7 +101,9 @@ def test_log_det_foretells_smaller_errors_of_inertia_than_the_published_excitati
 
 @pytest.mark.parametrize("topology", ["ring", "global"])
 def test_equal_seeds_give_equal_designs_and_other_seeds_others(topology):
-    first, again, other = (design(quick(topology=topology, seed=seed)).trajectory for seed in (5, 5, 6))
+    first, again, other = (
+        design(quick(topology=topology, seed=seed)).trajectory for seed in (5, 5, 6)
+    )
     assert_allclose(first.a, again.a, rtol=0, atol=0)
     assert_allclose(first.theta0, again.theta0, rtol=0, atol=0)
     assert not np.allclose(first.a, other.a)
@@ -136,7 +147,9 @@ def test_a_design_survives_its_file(tmp_path):
     assert len(table.frame) == 2000
     assert table.metadata["criterion_value"] == found.quality.log_det
     assert set(table.metadata["standard_errors"]) == set(found.quality.standard_errors)
-    assert [m["margin"] for m in table.metadata["margins"]] == [m.margin for m in margins(again, JointBounds())]
+    assert [m["margin"] for m in table.metadata["margins"]] == [
+        m.margin for m in margins(again, JointBounds())
+    ]
 
 
 @pytest.mark.parametrize("correlation_s", [0.0, 0.05])
@@ -159,13 +172,17 @@ def test_expected_standard_errors_are_the_scatter_of_simulated_fits(published, c
         rows.append(torque)
         torque = rho * torque + np.sqrt(1 - rho**2) * rng.standard_normal((trials, 2))
     errors = np.stack(rows, axis=1).reshape(trials, -1) @ fit.T
-    assert_allclose(errors.std(axis=0), expected, rtol=0.08)  # the scatter of 1500 fits is known to 2 %
+    # The scatter of 1500 fits is known to 2 %.
+    assert_allclose(errors.std(axis=0), expected, rtol=0.08)
     covered = np.mean(np.abs(errors) < 1.96 * expected)
     assert 0.94 < covered < 0.96
 
 
 def test_longer_correlation_of_the_noise_means_larger_errors(published):
-    errors = [standard_errors(published, NoiseSettings(correlation_s=T), Geometry(), 200.0) for T in (0.0, 0.02, 0.1)]
+    errors = [
+        standard_errors(published, NoiseSettings(correlation_s=T), Geometry(), 200.0)
+        for T in (0.0, 0.02, 0.1)
+    ]
     assert np.all(errors[0] < errors[1]) and np.all(errors[1] < errors[2])
 
 
@@ -181,8 +198,12 @@ def test_other_joints_than_hip_and_knee_are_refused(published, tmp_path):
     frame = pd.DataFrame({"time_s": [0.0, 1.0]})
     for quantity in ("position_m", "velocity_m_s", "acceleration_m_s2"):
         frame[f"x_{quantity}"] = 0.0
-    TRAJECTORY.write(tmp_path / "t.parquet", frame, {"joints": [{"name": "x", "kind": "prismatic"}]})
-    with pytest.raises(InputError, match="the excitation moves the joints x, expected hip and knee"):
+    TRAJECTORY.write(
+        tmp_path / "t.parquet", frame, {"joints": [{"name": "x", "kind": "prismatic"}]}
+    )
+    with pytest.raises(
+        InputError, match="the excitation moves the joints x, expected hip and knee"
+    ):
         quality(read_trajectory(tmp_path / "t.parquet"), DesignSettings(), Geometry())
 
 
@@ -207,6 +228,8 @@ def test_impossible_settings_are_refused_in_one_line(changes, told):
 
 
 def test_the_model_of_the_design_has_the_paper_s_eight_parameters():
-    names = [(effect.joint, parameter.symbol) for effect, parameter in paper_model().linear_parameters]
+    names = [
+        (effect.joint, parameter.symbol) for effect, parameter in paper_model().linear_parameters
+    ]
     rigid = [(None, f"X{i}") for i in range(1, 5)]
     assert names == [*rigid, ("hip", "Ks"), ("hip", "Km"), ("knee", "Ks"), ("knee", "Km")]

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.design.fitness import CRITERIA, cost, expand, fill_columns, gram_matrix, move, problem, repair, workspace
+from pipelines.design.fitness import (
+    CRITERIA,
+    cost,
+    expand,
+    fill_columns,
+    gram_matrix,
+    move,
+    problem,
+    repair,
+    workspace,
+)
 from pipelines.design.quality import quality, regressor
 from pipelines.design.search import basis_of, spread_of
 from pipelines.design.sines import sines
@@ -65,8 +75,12 @@ def test_the_fitness_agrees_with_singular_values(criterion):
             of = a_problem(harmonics, criterion, theta0)
             candidate = random_candidate(of, seed)
             found = cost(candidate, of, workspace(of))
-            reference = quality(as_trajectory(candidate, of), DesignSettings(), Geometry()).value(criterion)
-            assert (-found if criterion == "log_det" else found) == pytest.approx(reference, rel=1e-6)
+            reference = quality(as_trajectory(candidate, of), DesignSettings(), Geometry()).value(
+                criterion
+            )
+            assert (-found if criterion == "log_det" else found) == pytest.approx(
+                reference, rel=1e-6
+            )
 
 
 @pytest.mark.parametrize("rest", [False, True])
@@ -94,7 +108,9 @@ def test_repair_gives_away_less_than_the_grid_cannot_see():
         candidate = random_candidate(of, seed, size=3.0)
         cost(candidate, of, workspace(of))
         reached, bounds = as_trajectory(candidate, of).extrema(), bounds_array(JointBounds())
-        nearest = np.min(np.abs(reached - bounds) / np.ptp(bounds, axis=-1)[..., np.newaxis], axis=(0, 2))
+        nearest = np.min(
+            np.abs(reached - bounds) / np.ptp(bounds, axis=-1)[..., np.newaxis], axis=(0, 2)
+        )
         assert np.all(nearest < 5e-4)  # some bound of each joint is all but touched
 
 

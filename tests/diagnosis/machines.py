@@ -28,7 +28,8 @@ def excitation(seed, size):
 
 
 def moved(reference, rate, kp, kd, acceleration, seconds):
-    """Return times, positions and drive torques of a machine under proportional and derivative feedback."""
+    """Return times, positions and drive torques of a machine under proportional and derivative
+    feedback."""
 
     def force(t, x, v):
         return kp * (reference(t)[0] - x) + kd * (rate(t)[0] - v)
@@ -38,13 +39,21 @@ def moved(reference, rate, kp, kd, acceleration, seconds):
         lambda t, s: [s[1], acceleration(s[0], s[1], force(t, *s))], (0, seconds),
         [reference(0.0)[0], rate(0.0)[0]], t_eval=time, method="RK23", rtol=1e-5, atol=1e-7, max_step=0.01,
     )  # fmt: skip
-    return time, path.y[0], np.array([force(t, x, v) for t, x, v in zip(time, *path.y, strict=True)])
+    return (
+        time,
+        path.y[0],
+        np.array([force(t, x, v) for t, x, v in zip(time, *path.y, strict=True)]),
+    )
 
 
 def table(time, position, torque, joint, purpose, **geometry):
     """Return a ``recording/1`` table of one joint, ``{"name": ..., "kind": ...}``."""
-    angle, force = ("position_m", "force_n") if joint["kind"] == "prismatic" else ("angle_rad", "torque_nm")
-    frame = pd.DataFrame({"time_s": time, f"{joint['name']}_{angle}": position, f"{joint['name']}_{force}": torque})
+    angle, force = (
+        ("position_m", "force_n") if joint["kind"] == "prismatic" else ("angle_rad", "torque_nm")
+    )
+    frame = pd.DataFrame(
+        {"time_s": time, f"{joint['name']}_{angle}": position, f"{joint['name']}_{force}": torque}
+    )
     metadata = {
         "contract": "recording/1", "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ,
         "period_s": PERIOD_S, "joints": [joint], "geometry": geometry,
@@ -65,11 +74,14 @@ def pendulum(purpose, seed, spring=0.0, asymmetry=0.0, seconds=25.0):
 
     time, q, torque = moved(reference, rate, 20.0, 0.6, acceleration, seconds)
     noise = np.random.default_rng(seed).normal(0, 0.01, len(time))
-    return table(time, q, torque + noise, {"name": "arm", "kind": "revolute"}, purpose, gravity_m_s2=9.81)
+    return table(
+        time, q, torque + noise, {"name": "arm", "kind": "revolute"}, purpose, gravity_m_s2=9.81
+    )
 
 
 def slide(purpose, seed, asymmetry=0.0, seconds=25.0):
-    """A ball screw: 90 kg, 200 N·s/m and so much more of it forwards than backwards, 20 N of dry friction."""
+    """A ball screw: 90 kg, 200 N·s/m and so much more of it forwards than backwards, 20 N of dry
+    friction."""
     reference, rate = excitation(seed, 0.06)
 
     def acceleration(x, v, force):
@@ -91,14 +103,22 @@ def lift(purpose, seed, spring=0.0, seconds=25.0):
 
     time, x, force = moved(reference, rate, 9000.0, 400.0, acceleration, seconds)
     noise = np.random.default_rng(seed).normal(0, 0.5, len(time))
-    return table(time, x, force + noise, {"name": "carriage", "kind": "prismatic"}, purpose, gravity_m_s2=9.81)
+    return table(
+        time,
+        x,
+        force + noise,
+        {"name": "carriage", "kind": "prismatic"},
+        purpose,
+        gravity_m_s2=9.81,
+    )
 
 
 def driven(purpose, seed, kind, more, seconds=40.0, news=0.1):
-    """Return what a drive exerts to take an arm of 0.6 kg·m, or a lift of 12 kg, along a path, and more than that.
+    """Return what a drive exerts to take an arm of 0.6 kg·m, or a lift of 12 kg, along a path, and
+    more than that.
 
-    ``more(t, q, dq, ddq, torque)`` is in N·m, or in 20 N at the lift, whose q is in 0.1 m. Noise lasts for some
-    samples; ``news`` is what each adds, in the same units.
+    ``more(t, q, dq, ddq, torque)`` is in N·m, or in 20 N at the lift, whose q is in 0.1 m. Noise
+    lasts for some samples; ``news`` is what each adds, in the same units.
     """
     draw = np.random.default_rng(seed)
     reference, rate = excitation(draw.integers(10**6), 0.6)
@@ -106,8 +126,18 @@ def driven(purpose, seed, kind, more, seconds=40.0, news=0.1):
     q, dq = reference(time), rate(time)
     ddq = (rate(time + 1e-5) - rate(time - 1e-5)) / 2e-5
     dry = 1.2 * np.tanh(dq / 0.01) + 0.8 * dq
-    own = 0.3 * ddq + 0.6 * 9.81 * np.sin(q) + dry if kind == "revolute" else 0.06 * ddq + 0.6 * 9.81 + dry
-    torque = own + more(time, q, dq, ddq, own) + lfilter([news], [1.0, -0.9], draw.normal(size=len(time)))
+    own = (
+        0.3 * ddq + 0.6 * 9.81 * np.sin(q) + dry
+        if kind == "revolute"
+        else 0.06 * ddq + 0.6 * 9.81 + dry
+    )
+    torque = (
+        own
+        + more(time, q, dq, ddq, own)
+        + lfilter([news], [1.0, -0.9], draw.normal(size=len(time)))
+    )
     if kind == "revolute":
         return table(time, q, torque, {"name": "arm", "kind": kind}, purpose, gravity_m_s2=9.81)
-    return table(time, 0.1 * q, 20.0 * torque, {"name": "carriage", "kind": kind}, purpose, gravity_m_s2=9.81)
+    return table(
+        time, 0.1 * q, 20.0 * torque, {"name": "carriage", "kind": kind}, purpose, gravity_m_s2=9.81
+    )

@@ -1,4 +1,5 @@
-"""A diagnosis as if the posterior had named given causes: for tests of what comes after the decision."""
+"""A diagnosis as if the posterior had named given causes: for tests of what comes after the
+decision."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -21,7 +22,8 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     assert selected.library is not None and selected.posterior is not None
     elements = [_best(d, label) for label in labels]
     named = tuple(
-        Named(element, PROBABILITY, PROBABILITY, ties if number == 0 else ()) for number, element in enumerate(elements)
+        Named(element, PROBABILITY, PROBABILITY, ties if number == 0 else ())
+        for number, element in enumerate(elements)
     )
     chosen = tuple(sorted(selected.posterior.elements.index(element) for element in elements))
     # Each is as likely with the others as without them.

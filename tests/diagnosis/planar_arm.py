@@ -45,13 +45,22 @@ def planar_arm(purpose, seed, spring=0.0, seconds=25.0):
     for k in range(round(seconds * RATE_HZ)):
         at = k / RATE_HZ
         asked, speed = (np.array([f(at)[0] for f in each]) for each in zip(*joints, strict=True))
-        torque = np.array([300.0, 100.0]) * (asked - data.qpos) + np.array([20.0, 6.0]) * (speed - data.qvel)
+        torque = np.array([300.0, 100.0]) * (asked - data.qpos) + np.array([20.0, 6.0]) * (
+            speed - data.qvel
+        )
         rows.append((at, *data.qpos, *torque))
         data.qfrc_applied[:] = torque
         for _ in range(every):
             mujoco.mj_step(model, data)
     frame = pd.DataFrame(
-        rows, columns=["time_s", "shoulder_angle_rad", "elbow_angle_rad", "shoulder_torque_nm", "elbow_torque_nm"]
+        rows,
+        columns=[
+            "time_s",
+            "shoulder_angle_rad",
+            "elbow_angle_rad",
+            "shoulder_torque_nm",
+            "elbow_torque_nm",
+        ],
     )
     noise = np.random.default_rng(seed).normal(0, 0.05, (len(frame), 2))
     frame[["shoulder_torque_nm", "elbow_torque_nm"]] += noise

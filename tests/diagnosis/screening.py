@@ -34,7 +34,9 @@ class Screening:
         """Set up the regression of some runs, as ``build_library`` does."""
         prepared = prepare(runs, baseline_of(runs))
         misfit = CRITERIA.form_misfit * prepared.slow_rms
-        regression = DecisionRegression.of(prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit)
+        regression = DecisionRegression.of(
+            prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit
+        )
         rows = CandidateRows(prepared.runs, prepared.baseline, regression)
         return cls(prepared, regression, rows, ShapeRefinement(rows, regression))
 

@@ -27,17 +27,21 @@ SLOW = replace(RICH, omega=0.5 * RICH.omega)
 
 
 def recordings(effect=None, joint=None, seed=1, seconds=40.0, trained=RICH, **values):
-    """Return four recordings of a leg with an effect hidden in it; the training runs follow ``trained``."""
+    """Return four recordings of a leg with an effect hidden in it; the training runs follow
+    ``trained``."""
     hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
     made = []
     for number, (run, purpose) in enumerate(RUNS):
         plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
-        made.append(Table(*record(plant, trained if purpose == "train" else RICH, seconds, purpose)))
+        made.append(
+            Table(*record(plant, trained if purpose == "train" else RICH, seconds, purpose))
+        )
     return made
 
 
 def banded(motions):
-    """Return motions of a leg with a band from the pelvis to the shank that is slack in a part of its range."""
+    """Return motions of a leg with a band from the pelvis to the shank that is slack in a part of
+    its range."""
     pulled = []
     for motion in motions:
         stretch = np.maximum(motion.q @ (0.8, -0.7) - 1.1, 0.0)
@@ -47,5 +51,8 @@ def banded(motions):
 
 def session(*args, **values):
     """Return the motions of these recordings, files named by their place."""
-    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in recordings(*args, **values)]
+    motions = [
+        motion_from_table(motion_table(table, FilterSettings()))
+        for table in recordings(*args, **values)
+    ]
     return [replace(m, file=f"run_{i}.parquet") for i, m in enumerate(motions)]

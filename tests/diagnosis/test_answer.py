@@ -62,7 +62,10 @@ def test_a_third_cause_beside_the_named_one_is_no_tie():
 
 def test_what_most_sets_have_is_named_though_the_most_probable_set_lacks_it():
     apart = weighed(_2=0.35, _02=0.3, _025=0.25, _=0.1)
-    assert [one.element.label for one in answer_of(apart).named] == ["quadratic_drag@hip", "parallel_spring@knee"]
+    assert [one.element.label for one in answer_of(apart).named] == [
+        "quadratic_drag@hip",
+        "parallel_spring@knee",
+    ]
     rare = weighed(_2=0.5, _02=0.2, _025=0.2, _=0.1)
     assert [one.element.label for one in answer_of(rare).named] == ["quadratic_drag@hip"]
 
@@ -136,7 +139,8 @@ def test_nothing_missing_has_no_findings():
 
 
 def after(posterior, ratios):
-    """Return what is selected after validation, given log likelihood ratios of named causes by label."""
+    """Return what is selected after validation, given log likelihood ratios of named causes by
+    label."""
     selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
     while harm := selected.worst_harm(ratios):
         selected = selected.judged(harm, harms=True)
@@ -170,7 +174,9 @@ def test_where_all_that_was_named_harms_nothing_may_be_missing():
 @pytest.mark.parametrize("harm", [-0.5, -1.0, -1.3, -2.0, -6.0])
 def test_what_is_named_and_the_findings_tell_the_same_probabilities_after_validation(harm):
     """Two causes that harm a little each are as doubtful as the path to them."""
-    selected = after(weighed(_02=0.9, _=0.1), {"parallel_spring@knee": harm, "quadratic_drag@hip": harm})
+    selected = after(
+        weighed(_02=0.9, _=0.1), {"parallel_spring@knee": harm, "quadratic_drag@hip": harm}
+    )
     assert bool(selected.answer.named) == (selected.answer.nothing < 0.5)
     told = [one for one in selected.findings if one.level == "cause"]
     assert [one.probability for one in told] == [one.probability for one in selected.answer.named]
@@ -183,7 +189,10 @@ ONCE, EVERY = (
     cause("encoder_offset", "hip", "angle"),
     replace(cause("encoder_offset", "hip", "angle"), each_run=True, sized_each_run=True),
 )
-TILT, WORN = cause("base_tilt", "hip", "angle"), replace(cause("base_tilt", "hip", "angle"), worn=True)
+TILT, WORN = (
+    cause("base_tilt", "hip", "angle"),
+    replace(cause("base_tilt", "hip", "angle"), worn=True),
+)
 
 
 def of(elements, **sets):
@@ -220,7 +229,9 @@ def test_sets_stay_in_the_order_of_their_probability():
 
 def test_what_takes_the_place_of_a_cause_that_harms_is_a_finding_and_its_ties_are_refuted_with_it():
     tied = after(weighed(_2=0.7, _3=0.2, _4=0.02, _=0.01), {"quadratic_drag@hip": -10.0})
-    assert tied.answer.named == () and tied.posterior.marginals["stribeck_friction@hip"] < 0.01, "ties do harm too"
+    assert tied.answer.named == () and tied.posterior.marginals["stribeck_friction@hip"] < 0.01, (
+        "ties do harm too"
+    )
     other = after(weighed(_2=0.7, _0=0.05, _4=0.02, _=0.01), {"quadratic_drag@hip": -10.0})
     assert other.answer.named == () and other.posterior.marginals["parallel_spring@knee"] > 0.6
     assert [one.joint for one in other.findings] == ["knee"]
@@ -269,15 +280,24 @@ def test_what_is_certain_stays_so_when_another_cause_is_refuted():
 def test_of_three_causes_the_two_that_do_no_harm_stay_named():
     posterior = weighed(_023=0.9, _02=1e-3, _0=1e-3, _2=1e-5, _3=0.05, _=0.01, _5=0.04)
     selected = after(posterior, {"stribeck_friction@hip": -40.0})
-    assert {one.element.label for one in selected.answer.named} == {"parallel_spring@knee", "quadratic_drag@hip"}
+    assert {one.element.label for one in selected.answer.named} == {
+        "parallel_spring@knee",
+        "quadratic_drag@hip",
+    }
     assert all(one.probability > 0.89 for one in selected.answer.named)
 
 
 def test_ties_that_are_likely_together_stay_named_though_none_is_as_probable_as_nothing():
     posterior = weighed(_2=0.3, _3=0.2, _0=0.18, _=0.25, _4=0.07)
     selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
-    assert selected.answer.named[0].members == {"quadratic_drag@hip", "stribeck_friction@hip", "parallel_spring@knee"}
-    judged = selected.judged({"quadratic_drag@hip": -0.4, "stribeck_friction@hip": 0.0, "parallel_spring@knee": 0.0})
+    assert selected.answer.named[0].members == {
+        "quadratic_drag@hip",
+        "stribeck_friction@hip",
+        "parallel_spring@knee",
+    }
+    judged = selected.judged(
+        {"quadratic_drag@hip": -0.4, "stribeck_friction@hip": 0.0, "parallel_spring@knee": 0.0}
+    )
     (named,) = judged.answer.named
     assert named.alone < judged.answer.nothing
     assert named.probability == pytest.approx(0.68, abs=0.01)
@@ -313,7 +333,8 @@ def test_two_causes_that_stand_for_one_are_no_ties_of_it():
 
 
 def test_equals_that_a_third_cause_may_join_stay_equals():
-    """What a set says of the named cause beside a third one, it says of the rival beside the third one."""
+    """What a set says of the named cause beside a third one, it says of the rival beside the third
+    one."""
     (named,) = answer_of(weighed(_2=0.3, _02=0.15, _3=0.25, _03=0.2, _=0.1)).named
     assert dict(named.ties) == pytest.approx({"stribeck_friction@hip": 0.45})
 

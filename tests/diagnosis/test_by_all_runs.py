@@ -1,4 +1,5 @@
-"""What training runs that move little do not show, and validation runs do, is sought on all runs."""
+"""What training runs that move little do not show, and validation runs do, is sought on all
+runs."""
 
 from dataclasses import replace
 
@@ -42,7 +43,8 @@ def test_its_amplitudes_are_fitted_to_the_training_runs_alone(found):
 
 
 def test_where_nothing_is_missing_all_runs_show_nothing_either():
-    """Values fitted to slow runs leave an error above the noise on fast ones: all runs are searched."""
+    """Values fitted to slow runs leave an error above the noise on fast ones: all runs are
+    searched."""
     searched = diagnose(session(seed=7, trained=POOR))
     assert searched.before.leaves_more_than_noise
     said = verdict(searched)
@@ -57,7 +59,10 @@ def test_a_payload_that_only_a_validation_run_carries_is_missing_and_not_named()
     said = verdict(diagnose([*runs[:3], loaded[3]]))
     assert (said["status"], said["causes"], said["sought_on"]) == ("unknown_cause", [], "all")
     refused = "it lowers the error on the validation runs too little, or raises it."
-    assert f"would explain all runs together, but fitted to the training runs alone, {refused}" in said["summary"]
+    assert (
+        f"would explain all runs together, but fitted to the training runs alone, {refused}"
+        in said["summary"]
+    )
     differs = [caveat for caveat in said["caveats"] if "no training run shows" in caveat]
     assert any(caveat.startswith("the knee's torque error is 1.3") for caveat in differs)
 

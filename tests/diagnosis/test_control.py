@@ -1,4 +1,5 @@
-"""What a diagnosis says of control: the adaptive loop on the model without and with the named causes."""
+"""What a diagnosis says of control: the adaptive loop on the model without and with the named
+causes."""
 
 from dataclasses import replace
 
@@ -26,7 +27,9 @@ SPRING = {"stiffness": 12.0, "rest_angle": -0.5}
 
 @pytest.fixture(scope="module")
 def sprung():
-    return naming(diagnose(session("parallel_spring", "knee", seed=4, **SPRING)), "parallel_spring@knee")
+    return naming(
+        diagnose(session("parallel_spring", "knee", seed=4, **SPRING)), "parallel_spring@knee"
+    )
 
 
 def true_loop():
@@ -36,7 +39,10 @@ def true_loop():
     spring = ParallelSpring("knee")
     terms = (
         Term(RigidBody(), np.add(leg.exo_inertial, leg.human_inertial)),
-        *(Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in friction),
+        *(
+            Term(Friction(joint), np.array([coulomb, viscous]))
+            for joint, coulomb, viscous in friction
+        ),
         Term(spring, spring.values_from(np.array(list(SPRING.values())))),
     )
     return track(make_plant(Model(terms), Geometry(), HIP_AND_KNEE, "with_human"), CASE, gait())
@@ -57,10 +63,14 @@ def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
 def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung):
     heavy = sprung.after.fit.values.copy()
     heavy[[p.name for p in RigidBody.linear].index("X3")] = 9.0
-    told = control(replace(sprung, after=replace(sprung.after, fit=replace(sprung.after.fit, values=heavy))))
+    told = control(
+        replace(sprung, after=replace(sprung.after, fit=replace(sprung.after.fit, values=heavy)))
+    )
     assert told["with"] is None
     assert told["without"] is not None
-    assert told["reason"].startswith("with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = ")
+    assert told["reason"].startswith(
+        "with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = "
+    )
     assert told["reason"].endswith("the mass matrix is not positive definite")
 
 

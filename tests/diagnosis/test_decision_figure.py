@@ -33,7 +33,9 @@ def test_the_bar_of_a_joint_is_cut_into_its_residuals_shares(drawn):
 
 def test_what_is_there_with_a_person_only_is_marked_at_the_end_of_what_repeats(drawn):
     marks = [bar for bar in drawn.axes[0].patches if not bar.get_fill()]
-    assert [(mark.get_x(), mark.get_width()) for mark in marks] == [(pytest.approx(0.9), pytest.approx(0.1))] * 2
+    assert [(mark.get_x(), mark.get_width()) for mark in marks] == [
+        (pytest.approx(0.9), pytest.approx(0.1))
+    ] * 2
 
 
 def test_bars_fall_and_with_that_of_all_others_they_add_up_to_one():

@@ -41,7 +41,9 @@ def fresh():
 
 def noise(runs, rng, rms=0.4):
     """Coloured noise of every output; a block resembles the one before it."""
-    return [rms * lfilter([0.6], [1, -0.8], rng.normal(size=run.measured.shape), axis=0) for run in runs]
+    return [
+        rms * lfilter([0.6], [1, -0.8], rng.normal(size=run.measured.shape), axis=0) for run in runs
+    ]
 
 
 LAWS = {
@@ -133,14 +135,17 @@ def test_a_law_learnt_on_one_excitation_lowers_the_error_on_another(runs, fresh)
         term = smooth_term(runs, with_law(runs, rng, law))
         before = with_law(fresh, rng, law)
         after = [e - term.torque(run) for run, e in zip(fresh, before, strict=True)]
-        # The other excitation reaches beyond what was learnt, where a curve stays at its last value.
+        # The other excitation reaches beyond what was learnt, where a curve stays at its last
+        # value.
         assert rms(fresh, after) < 0.9 * rms(fresh, before)
 
 
 def test_two_variables_are_named_where_neither_alone_foretells(runs):
     residuals = with_law(runs, np.random.default_rng(5), product)
     together = smooth_term(runs, residuals).together
-    text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR), together)
+    text = describe(
+        THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR), together
+    )
     assert "together with" in text
 
 

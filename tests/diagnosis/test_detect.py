@@ -1,4 +1,5 @@
-"""What a motion and a noise would reveal: the formula against simulated noise, and ties known beforehand."""
+"""What a motion and a noise would reveal: the formula against simulated noise, and ties known
+beforehand."""
 
 from dataclasses import replace
 
@@ -9,7 +10,13 @@ from scipy.signal import lfilter
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.detectability.detectability import POWER, Look, _alike, detectability, needed_noncentrality
+from pipelines.diagnosis.detectability.detectability import (
+    POWER,
+    Look,
+    _alike,
+    detectability,
+    needed_noncentrality,
+)
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
@@ -61,7 +68,9 @@ def rows_of(parts, runs, root):
     return np.concatenate([p[run.usable[:, :2]] for p, run in zip(scaled, runs, strict=True)])
 
 
-@pytest.mark.parametrize("label", ["coulomb_asymmetry@knee", "rotor_inertia@knee", "quadratic_drag@hip"])
+@pytest.mark.parametrize(
+    "label", ["coulomb_asymmetry@knee", "rotor_inertia@knee", "quadratic_drag@hip"]
+)
 def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     rms = np.array([2.0, 1.5])  # large enough that noise, not materiality, sets the size
     share = (1 - SLOW) / (1 + SLOW)
@@ -86,17 +95,21 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     for _ in range(trials):
         noise = rows_of([coloured(rng, rms, run.measured[:, :2].shape) for run in runs], runs, root)
         for factor in found:
-            gain = 0.5 * (left @ (factor * effect + noise)) ** 2  # what the fit's squared error drops by
+            # What the fit's squared error drops by.
+            gain = 0.5 * (left @ (factor * effect + noise)) ** 2
             found[factor] += gain > price
-    # Slow effects meet the noise at its strongest, where the integrated correlation is exact; fast ones fare better,
-    # and a likelihood that counts less than its rows do promises less than it holds.
+    # Slow effects meet the noise at its strongest, where the integrated correlation is exact; fast
+    # ones fare better, and a likelihood that counts less than its rows do promises less than it
+    # holds.
     assert POWER - 0.07 < found[1.0] / trials
     assert found[0.3] / trials < 0.1
 
 
 def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
     # z_a = sqrt(2 x 6.5) and z_b = 1.2816 for one column and a power of 90 %.
-    assert needed_noncentrality(1, 6.5, 0.9) == pytest.approx((np.sqrt(13.0) + 1.2816) ** 2, rel=1e-3)
+    assert needed_noncentrality(1, 6.5, 0.9) == pytest.approx(
+        (np.sqrt(13.0) + 1.2816) ** 2, rel=1e-3
+    )
 
 
 def test_where_anything_would_show_an_effect_must_be_some_times_what_a_good_rig_has():
@@ -104,7 +117,11 @@ def test_where_anything_would_show_an_effect_must_be_some_times_what_a_good_rig_
     found = []
     for rms in (0.05, 0.025):
         floor = Floor(np.array([rms, rms, np.nan, np.nan]), np.ones(4), from_periods=False)
-        found += [d for d in detectability(runs, baseline_of(runs), floor) if d.effect.label == "quadratic_drag@knee"]
+        found += [
+            d
+            for d in detectability(runs, baseline_of(runs), floor)
+            if d.effect.label == "quadratic_drag@knee"
+        ]
     assert [one.limited_by for one in found] == ["materiality"] * 2
     loud, quiet = (one.smallest_rms_nm / one.torque_rms_nm for one in found)
     assert 2.0 * CRITERIA.background_cause < loud < 8.0 * CRITERIA.background_cause
@@ -124,7 +141,9 @@ def test_structural_ties_are_never_apart(rich, one, other):
     assert one in rich[other].never_apart
 
 
-def test_one_kind_of_run_ties_a_mass_beside_the_axis_to_an_encoder_and_to_a_spring_and_two_part_them(rich):
+def test_one_kind_of_run_ties_a_mass_beside_the_axis_to_an_encoder_and_to_a_spring_and_two_part_them(
+    rich,
+):
     alone = looked_at(RICH, kinds=("exo_alone",))["mass_off_axis@knee"].tied_with
     parted = {"encoder_eccentricity@knee", "joint_elasticity@hip"}
     assert parted <= set(alone)
@@ -137,7 +156,9 @@ def test_causes_that_look_different_are_not_tied(rich):
 
 
 def test_a_single_sine_hides_a_spring_that_a_rich_motion_shows(rich):
-    published = looked_at(read_trajectory(datasets() / "paper" / "trajectory.toml"))["parallel_spring@hip"]
+    published = looked_at(read_trajectory(datasets() / "paper" / "trajectory.toml"))[
+        "parallel_spring@hip"
+    ]
     assert published.smallest_rms_nm > published.torque_rms_nm
     spring = rich["parallel_spring@hip"]
     assert spring.smallest_rms_nm < 0.1 * spring.torque_rms_nm
@@ -148,7 +169,9 @@ def test_twice_the_noise_hides_effects_twice_as_large():
     loud, louder = (looked_at(RICH, replace(floor, rms=times * floor.rms)) for times in (5.0, 10.0))
     for label in ("viscous_asymmetry@knee", "cogging@hip", "encoder_offset@hip"):
         assert loud[label].limited_by == louder[label].limited_by == "noise"
-        assert louder[label].smallest_rms_nm == pytest.approx(2 * loud[label].smallest_rms_nm, rel=0.1)
+        assert louder[label].smallest_rms_nm == pytest.approx(
+            2 * loud[label].smallest_rms_nm, rel=0.1
+        )
 
 
 def test_planned_noise_is_what_block_averages_of_coloured_noise_have():

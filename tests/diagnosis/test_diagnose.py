@@ -40,17 +40,35 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
 @pytest.mark.parametrize(
     ("effect", "joint", "values", "parameter"),
     [
-        ("stribeck_friction", "knee", {"stribeck_torque": 2.0, "stribeck_velocity": 0.15}, "stribeck_torque"),
+        (
+            "stribeck_friction",
+            "knee",
+            {"stribeck_torque": 2.0, "stribeck_velocity": 0.15},
+            "stribeck_torque",
+        ),
         pytest.param(
-            "load_dependent_friction", "hip", {"load_coefficient": 0.06}, "load_coefficient", marks=pytest.mark.slow
+            "load_dependent_friction",
+            "hip",
+            {"load_coefficient": 0.06},
+            "load_coefficient",
+            marks=pytest.mark.slow,
         ),
         ("cogging", "knee", {"amplitude": 1.0, "cycles_per_turn": 24.0, "phase": 0.3}, "amplitude"),
-        pytest.param("mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment", marks=pytest.mark.slow),
+        pytest.param(
+            "mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment", marks=pytest.mark.slow
+        ),
         pytest.param("torque_gain", "hip", {"gain": 1.08}, "gain", marks=pytest.mark.slow),
-        ("voluntary_torque", "hip", {"amplitude": 2.2, "frequency": 0.43, "phase": 0.4}, "frequency"),
+        (
+            "voluntary_torque",
+            "hip",
+            {"amplitude": 2.2, "frequency": 0.43, "phase": 0.4},
+            "frequency",
+        ),
     ],
 )
-def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor(effect, joint, values, parameter):
+def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor(
+    effect, joint, values, parameter
+):
     found = diagnose(session(effect, joint, seed=3, **values))
     said = verdict(found)
     assert said["status"] == "explained"
@@ -62,13 +80,18 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     np.testing.assert_allclose(found.after.errors.rms, found.floor_rms, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
     assert found.unrealizable == []
-    # A peak of friction and its level are told apart by how it falls with speed alone; the others stand for themselves.
-    assert ["knee coulomb" in sentence for sentence in found.collinear] == [True] * (effect == "stribeck_friction")
+    # A peak of friction and its level are told apart by how it falls with speed alone; the others
+    # stand for themselves.
+    assert ["knee coulomb" in sentence for sentence in found.collinear] == [True] * (
+        effect == "stribeck_friction"
+    )
 
 
 def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joints_speed():
     found = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
-    assert found.after.fit.rms[0] > 0.95 * found.before.fit.rms[0], "it is a twentieth of the error at most"
+    assert found.after.fit.rms[0] > 0.95 * found.before.fit.rms[0], (
+        "it is a twentieth of the error at most"
+    )
     (finding,) = found.selected.findings
     (speed,) = (p for level, value, p in finding.path if (level, value) == ("family", "speed"))
     assert (finding.joint, finding.family) == ("hip", "speed") and speed > 0.9
@@ -79,10 +102,14 @@ def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joint
     ("effect", "joint", "values", "tied"),
     [
         ("torque_offset", "knee", {"offset": 1.0}, ("coulomb_asymmetry", "knee")),
-        pytest.param("base_tilt", None, {"tilt": 0.04}, ("encoder_offset", "hip"), marks=pytest.mark.slow),
+        pytest.param(
+            "base_tilt", None, {"tilt": 0.04}, ("encoder_offset", "hip"), marks=pytest.mark.slow
+        ),
     ],
 )
-def test_what_no_data_of_a_kind_can_part_is_said_to_be_one_or_the_other(effect, joint, values, tied):
+def test_what_no_data_of_a_kind_can_part_is_said_to_be_one_or_the_other(
+    effect, joint, values, tied
+):
     first = verdict(diagnose(session(effect, joint, seed=5, **values)))["causes"][0]
     assert {(effect, joint), tied} <= labels(first)
     for tie in first["indistinguishable_from"]:
@@ -128,13 +155,25 @@ def test_the_command_writes_verdict_and_tables(tmp_path, capsys):
     from exoid_cli.app import run
 
     files = []
-    for number, table in enumerate(recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)):
+    for number, table in enumerate(
+        recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
+    ):
         files.append(tmp_path / f"run_{number}.parquet")
         RECORDING.write(files[-1], table.frame, table.metadata)
     assert run(["diagnose", *map(str, files), "--out", str(tmp_path / "d")]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert "parallel spring at the knee" in out
-    assert "tracking error and peak torque under adaptive control, without and with the causes" in out
-    for name in ("verdict.json", "parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json"):
+    assert (
+        "tracking error and peak torque under adaptive control, without and with the causes" in out
+    )
+    for name in (
+        "verdict.json",
+        "parameters.parquet",
+        "residuals.parquet",
+        "candidates.parquet",
+        "detectability.json",
+    ):
         assert (tmp_path / "d" / name).is_file()
-    assert (PARAMETERS.read(tmp_path / "d" / "parameters.parquet").frame["step"] == "extension").any()
+    assert (
+        PARAMETERS.read(tmp_path / "d" / "parameters.parquet").frame["step"] == "extension"
+    ).any()

@@ -1,4 +1,5 @@
-"""A joint that is zeroed anew at every start: each run has an offset of its own, and the verdict finds them all.
+"""A joint that is zeroed anew at every start: each run has an offset of its own, and the verdict
+finds them all.
 
 The hidden offsets are added to recorded angles, by no code of the effect's.
 """
@@ -21,12 +22,18 @@ from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import TorqueDrift, VoluntaryTorque
 from tests.diagnosis.sessions import session
 
-HIDDEN = {"run_0.parquet": 0.06, "run_1.parquet": -0.05, "run_2.parquet": -0.03, "run_3.parquet": 0.07}
+HIDDEN = {
+    "run_0.parquet": 0.06,
+    "run_1.parquet": -0.05,
+    "run_2.parquet": -0.03,
+    "run_3.parquet": 0.07,
+}
 """rad, at the knee; runs 1 and 3 are of those that no fit sees."""
 
 
 def zeroed(motion, offset):
-    """Return a motion whose knee was zeroed ``offset`` rad beside its zero: what is commanded is counted from there."""
+    """Return a motion whose knee was zeroed ``offset`` rad beside its zero: what is commanded is
+    counted from there."""
     shift = np.array([0.0, offset])
     angles = {name: getattr(motion, name) + shift for name in ("q", "measured_angle", "reference")}
     return replace(motion, **angles)
@@ -56,7 +63,9 @@ def test_figures_call_it_what_the_summary_calls_it(found):
 def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(anew):
     told = {one["file"]: one["values"]["offset"] for one in anew["causes"][0]["each_run"]}
     assert told == pytest.approx(HIDDEN, abs=0.01)
-    assert any("each run has its own offset" in sentence for sentence in anew["causes"][0]["evidence"])
+    assert any(
+        "each run has its own offset" in sentence for sentence in anew["causes"][0]["evidence"]
+    )
 
 
 def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others_have_none(anew):
@@ -65,17 +74,29 @@ def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others
     assert intervals["run_0.parquet"] == offset["ci95"]
     for file in ("run_0.parquet", "run_2.parquet"):
         low, high = intervals[file]
-        # 0.043 rad: what the model gets wrong repeats in every period, and more of them do not average it out.
+        # 0.043 rad: what the model gets wrong repeats in every period, and more of them do not
+        # average it out.
         assert low <= HIDDEN[file] <= high and high - low < 0.05
     assert intervals["run_1.parquet"] is intervals["run_3.parquet"] is None
 
 
 def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
-    hidden = {"run_0.parquet": 0.06, "run_1.parquet": -0.05, "run_2.parquet": 0.058, "run_3.parquet": -0.06}
+    hidden = {
+        "run_0.parquet": 0.06,
+        "run_1.parquet": -0.05,
+        "run_2.parquet": 0.058,
+        "run_3.parquet": -0.06,
+    }
     told = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=30.0)]))
     (cause,) = told["causes"]
-    assert (cause["effect"], cause["joint"], cause["fitted_on_validate"]) == ("encoder_offset", "knee", ["offset"])
-    assert {one["file"]: one["values"]["offset"] for one in cause["each_run"]} == pytest.approx(hidden, abs=0.01)
+    assert (cause["effect"], cause["joint"], cause["fitted_on_validate"]) == (
+        "encoder_offset",
+        "knee",
+        ["offset"],
+    )
+    assert {one["file"]: one["values"]["offset"] for one in cause["each_run"]} == pytest.approx(
+        hidden, abs=0.01
+    )
 
 
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
@@ -92,16 +113,26 @@ def test_a_leg_that_is_zeroed_once_needs_no_zero_of_its_own_in_any_run():
 
 
 def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_its_own():
-    pushed = session("voluntary_torque", "knee", seconds=20.0, amplitude=4.0, frequency=0.37, phase=1.0)
+    pushed = session(
+        "voluntary_torque", "knee", seconds=20.0, amplitude=4.0, frequency=0.37, phase=1.0
+    )
     runs = [observe(m) for m in pushed]
     baseline = baseline_of(runs)
-    pushes = [Candidate(VoluntaryTorque(joint="knee"), ((0.37,),) * 3), Candidate(TorqueDrift(joint="hip"), ((),) * 3)]
+    pushes = [
+        Candidate(VoluntaryTorque(joint="knee"), ((0.37,),) * 3),
+        Candidate(TorqueDrift(joint="hip"), ((),) * 3),
+    ]
     train, validate = (runs[0], runs[2], runs[3]), (runs[1],)
     made = fit(pushes, train, baseline, np.array([1.0, 1.0, 1.0, 1.0]))
     flat = Uncertainty(np.eye(len(made.values)), 2.0, (), np.eye(len(made.values)))
     told = values_of_each_run(made, baseline, flat, train, validate)
-    assert [one["file"] for one in told["voluntary_torque@knee"]] == ["run_2.parquet", "run_3.parquet"]
-    assert [one["file"] for one in told["torque_drift@hip"]] == [f"run_{k}.parquet" for k in (0, 2, 3, 1)]
+    assert [one["file"] for one in told["voluntary_torque@knee"]] == [
+        "run_2.parquet",
+        "run_3.parquet",
+    ]
+    assert [one["file"] for one in told["torque_drift@hip"]] == [
+        f"run_{k}.parquet" for k in (0, 2, 3, 1)
+    ]
     # A run alone, all else held, tells the same of itself as the fit of all does.
     for run in train:
         for term in settled(made, run, baseline):
@@ -115,8 +146,8 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_i
 
 
 def drawn(seed):
-    """Return offsets of four runs, those of the two training runs to opposite sides: of two that are nearly equal
-    no data tell that they are not one."""
+    """Return offsets of four runs, those of the two training runs to opposite sides: of two that
+    are nearly equal no data tell that they are not one."""
     draw = np.random.default_rng(seed)
     signs = draw.choice([-1.0, 1.0], 4)
     signs[2] = -signs[0]
@@ -128,11 +159,16 @@ def test_intervals_of_offsets_of_one_run_hold_the_truth_as_often_as_they_say():
     covered = []
     for seed in range(1, 41):
         hidden = drawn(seed)
-        told = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=20.0, seed=seed)]))
+        told = verdict(
+            diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=20.0, seed=seed)])
+        )
         for cause in told["causes"]:
-            if (cause["effect"], cause["joint"]) == ("encoder_offset", "knee") and cause["each_run"]:
+            if (cause["effect"], cause["joint"]) == ("encoder_offset", "knee") and cause[
+                "each_run"
+            ]:
                 low, high = cause["parameters"][0]["ci95"]
                 covered.append(low <= hidden["run_0.parquet"] <= high)
-    # Of intervals that hold the truth 95 % of the time so few of 30 or more would by chance in one of a hundred runs.
+    # Of intervals that hold the truth 95 % of the time so few of 30 or more would by chance in one
+    # of a hundred runs.
     assert len(covered) >= 30
     assert np.mean(covered) >= 0.82

@@ -88,8 +88,13 @@ def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
     drag = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 0.0])
     assert np.all(cuff_coherence([worn], [quiet + drag]) == 0.0)
     repeated = np.sin(2 * np.pi * 5 * worn.time / worn.motion.period_s)[:, np.newaxis]
-    assert np.all(cuff_coherence([worn], [quiet + repeated]) == 0.0), "a spring on the limb repeats with the motion"
-    silent = [cuff_coherence([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])]) for seed in range(20)]
+    assert np.all(cuff_coherence([worn], [quiet + repeated]) == 0.0), (
+        "a spring on the limb repeats with the motion"
+    )
+    silent = [
+        cuff_coherence([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])])
+        for seed in range(20)
+    ]
     assert np.all(np.array(silent) == 0.0)
 
 

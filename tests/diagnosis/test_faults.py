@@ -40,7 +40,9 @@ WITNESSES = ("hip_reference_rad", "knee_reference_rad", "sequence")
 
 
 def recordings(settings: PlantSettings, seed: int = 0) -> list[tuple[pd.DataFrame, dict]]:
-    return [record(Plant(settings, kind, seed=seed + i), RICH, 30.0) for i, kind in enumerate(KINDS)]
+    return [
+        record(Plant(settings, kind, seed=seed + i), RICH, 30.0) for i, kind in enumerate(KINDS)
+    ]
 
 
 def motion(frame: pd.DataFrame, metadata: dict, name: str) -> Motion:
@@ -58,19 +60,24 @@ def session(request, sound):
     copies = [(frame.copy(), dict(metadata)) for frame, metadata in sound]
     if not request.param:
         copies = [
-            (f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"}) for f, m in copies
+            (f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"})
+            for f, m in copies
         ]
     return copies
 
 
 def faults_of(session):
-    return find_faults([motion(*run, f"{kind}.parquet") for run, kind in zip(session, KINDS, strict=True)])
+    return find_faults(
+        [motion(*run, f"{kind}.parquet") for run, kind in zip(session, KINDS, strict=True)]
+    )
 
 
 def only_fault(session):
     """Return the one fault, which must be the spoiled run's."""
     found = faults_of(session)
-    assert [fault.file for fault in found] == ["with_human.parquet"], [fault.what for fault in found]
+    assert [fault.file for fault in found] == ["with_human.parquet"], [
+        fault.what for fault in found
+    ]
     return found[0]
 
 
@@ -100,14 +107,20 @@ def test_late_stamps_are_jitter_and_not_gaps(session):
     rng = np.random.default_rng(1)
     frame["time_s"] += np.minimum(rng.exponential(1e-3, len(frame)), 4.5e-3)
     fault = only_fault(session)
-    assert fault.what.startswith("clock jitter: irregular") and "only the stamps are wrong" in fault.what
+    assert (
+        fault.what.startswith("clock jitter: irregular")
+        and "only the stamps are wrong" in fault.what
+    )
 
 
 def uneven(frame, seed=3):
-    """Return the frame as it would be had its samples been taken up to a fifth of a period late, stamps and all."""
+    """Return the frame as it would be had its samples been taken up to a fifth of a period late,
+    stamps and all."""
     count = np.arange(len(frame))
     taken = count + np.random.default_rng(seed).uniform(0.0, 0.2, len(frame))
-    made = {name: np.interp(taken, count, frame[name]) for name in frame.columns if name != "sequence"}
+    made = {
+        name: np.interp(taken, count, frame[name]) for name in frame.columns if name != "sequence"
+    }
     return frame.assign(**made)
 
 
@@ -118,9 +131,13 @@ def test_samples_taken_unevenly_and_stamped_so_spoil_nothing(session):
     assert "the angles follow the stamps" in fault.what and not fault.spoils
 
 
-def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_suffer_from_it(session):
+def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_suffer_from_it(
+    session,
+):
     frame, metadata = session[SPOILED]
-    coarse = {name: np.round(frame[name] / 0.02) * 0.02 for name in ("hip_angle_rad", "knee_angle_rad")}
+    coarse = {
+        name: np.round(frame[name] / 0.02) * 0.02 for name in ("hip_angle_rad", "knee_angle_rad")
+    }
     late = frame["time_s"] + np.random.default_rng(4).uniform(0.0, 1e-3, len(frame))
     session[SPOILED] = frame.assign(**coarse, time_s=late), metadata
     fault = next(f for f in faults_of(session) if f.channel == "time_s")
@@ -130,7 +147,10 @@ def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_su
 def test_stamps_that_are_wrong_by_less_than_the_angles_noise_spoil_nothing(session):
     frame, metadata = session[SPOILED]
     rng = np.random.default_rng(6)
-    shaken = {name: frame[name] + rng.normal(0.0, 5e-4, len(frame)) for name in ("hip_angle_rad", "knee_angle_rad")}
+    shaken = {
+        name: frame[name] + rng.normal(0.0, 5e-4, len(frame))
+        for name in ("hip_angle_rad", "knee_angle_rad")
+    }
     late = frame["time_s"] + np.minimum(rng.exponential(4e-4, len(frame)), 4.5e-3)
     session[SPOILED] = frame.assign(**shaken, time_s=late), metadata
     fault = next(f for f in faults_of(session) if f.channel == "time_s")
@@ -154,7 +174,10 @@ def test_a_clock_five_percent_slow_is_named_with_the_true_rate(session):
 def test_a_rate_that_changes_within_the_run_is_no_wrong_clock(session):
     """Two thirds of the samples 5 % closer than the mean, the others further apart."""
     frame, metadata = session[SPOILED]
-    steps = np.where(np.arange(len(frame)) < 2 * len(frame) // 3, 0.95, 1.1) / metadata["sample_rate_hz"]
+    steps = (
+        np.where(np.arange(len(frame)) < 2 * len(frame) // 3, 0.95, 1.1)
+        / metadata["sample_rate_hz"]
+    )
     session[SPOILED] = (
         frame.drop(columns="sequence", errors="ignore").assign(time_s=np.cumsum(steps) - steps[0]),
         metadata,
@@ -162,7 +185,9 @@ def test_a_rate_that_changes_within_the_run_is_no_wrong_clock(session):
     assert not any("another rate" in fault.what for fault in faults_of(session))
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.26, False), (1 / (2 * np.pi), True), (np.pi / 180, True)])
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.26, False), (1 / (2 * np.pi), True), (np.pi / 180, True)]
+)
 def test_a_drive_that_follows_weakly_is_in_no_other_unit(sound, share, told):
     frame, metadata = sound[SPOILED]
     weak = frame.assign(hip_angle_rad=frame["hip_reference_rad"] * share)
@@ -175,7 +200,11 @@ def test_a_joint_that_rests_on_its_friction_while_its_set_point_goes_is_in_no_ot
     frame, metadata = sound[SPOILED]
     creeps = frame.assign(hip_angle_rad=0.4 + np.radians(frame["hip_reference_rad"]))
     session = [(creeps, metadata) if number == SPOILED else run for number, run in enumerate(sound)]
-    assert not any("in another unit" in fault.what for fault in faults_of(session) if fault.channel == "hip_angle_rad")
+    assert not any(
+        "in another unit" in fault.what
+        for fault in faults_of(session)
+        if fault.channel == "hip_angle_rad"
+    )
 
 
 def test_a_counter_that_starts_anew_is_named(sound):
@@ -236,7 +265,11 @@ def test_a_clipped_torque_is_saturated_at_its_limit(session):
     limit = round(float(frame["hip_torque_nm"].abs().quantile(0.9)), 2)
     frame["hip_torque_nm"] = frame["hip_torque_nm"].clip(-limit, limit)
     fault = only_fault(session)
-    assert fault.channel == "hip_torque_nm" and "saturated" in fault.what and f"{limit:.4g} N·m" in fault.what
+    assert (
+        fault.channel == "hip_torque_nm"
+        and "saturated" in fault.what
+        and f"{limit:.4g} N·m" in fault.what
+    )
     assert (frame["hip_torque_nm"].abs()[fault.samples] == limit).all()
 
 
@@ -248,7 +281,8 @@ def rounded(session, step):
 
 @pytest.mark.parametrize("step", [0.5, 2.0, 6.0])
 def test_a_torque_that_is_rounded_to_coarse_steps_is_no_fault(session, step):
-    """It stands still for up to a second, comes back to its extremes, and often repeats while the angle does."""
+    """It stands still for up to a second, comes back to its extremes, and often repeats while the
+    angle does."""
     rounded(session, step)
     assert faults_of(session) == []
 
@@ -304,7 +338,8 @@ def test_a_torque_in_another_unit_is_named_with_the_unit(session, joint, factor,
 
 
 def test_drag_at_a_hip_that_hides_its_shank_is_no_other_unit(tmp_path):
-    """Drag leaves so much freedom that the hip may carry no shank at all; it carries one as well."""
+    """Drag leaves so much freedom that the hip may carry no shank at all; it carries one as
+    well."""
     hidden, folders = case(160_008, "single", 8), Folders(tmp_path)
     prepare(hidden, folders)
     assert hidden.hidden == (("quadratic_drag", 0),)
@@ -320,7 +355,10 @@ def test_an_angle_in_degrees_is_named(session):
 
 def test_one_run_at_four_times_the_scale_of_its_like_is_named_without_any_other_witness():
     session = [record(Plant(PlantSettings(), "exo_alone", seed=i), RICH, 30.0) for i in range(2)]
-    session = [(f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"}) for f, m in session]
+    session = [
+        (f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"})
+        for f, m in session
+    ]
     session[SPOILED][0][["hip_torque_nm", "knee_torque_nm"]] *= 4.0
     found = faults_of(session)
     assert [fault.channel for fault in found] == ["hip_torque_nm", "knee_torque_nm"]
@@ -371,7 +409,9 @@ def test_what_physics_can_do_to_a_torque_is_no_fault(session, spoil):
     ids=lambda t: f"{t.effect.name}@{t.effect.joint}",
 )
 def test_no_effect_of_the_catalogue_is_taken_for_a_fault(term):
-    made = [record(Plant(PlantSettings(), kind, i, (term,)), RICH, 30.0) for i, kind in enumerate(KINDS)]
+    made = [
+        record(Plant(PlantSettings(), kind, i, (term,)), RICH, 30.0) for i, kind in enumerate(KINDS)
+    ]
     assert [fault.what for fault in faults_of(made)] == []
 
 

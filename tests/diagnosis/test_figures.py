@@ -23,9 +23,12 @@ from tests.diagnosis.sessions import session
 
 
 def humming(motion):
-    """Add a hum at the knee that comes 54 degrees later in each period, of a phase of its own: in no catalogue."""
+    """Add a hum at the knee that comes 54 degrees later in each period, of a phase of its own: in
+    no catalogue."""
     extra = np.zeros_like(motion.torque)
-    extra[:, 1] = 1.2 * np.sin(2 * np.pi * 7.615 * motion.time + len(motion.file + motion.run + motion.purpose))
+    extra[:, 1] = 1.2 * np.sin(
+        2 * np.pi * 7.615 * motion.time + len(motion.file + motion.run + motion.purpose)
+    )
     return replace(motion, torque=motion.torque + extra)
 
 
@@ -77,7 +80,12 @@ def test_a_spring_takes_the_error_at_its_joint_down_to_the_floor(diagnosed):
     found, said = diagnosed("explained")
     assert found.causes == ("parallel_spring@knee",)
     knee = said["error_budget"]["knee"]
-    assert list(knee) == ["noise_floor", "parallel_spring@knee", "repeatable_unexplained", "not_repeatable"]
+    assert list(knee) == [
+        "noise_floor",
+        "parallel_spring@knee",
+        "repeatable_unexplained",
+        "not_repeatable",
+    ]
     assert knee["parallel_spring@knee"] > 0.9 * said["baseline_rmse_nm"]["knee"] ** 2
     assert knee["repeatable_unexplained"] < 0.1 * knee["noise_floor"]
 
@@ -103,7 +111,9 @@ def test_what_repeats_is_no_scatter_and_what_wanders_is():
     np.testing.assert_allclose(scatter_between_periods([run], [noise + repeats]), 0.3**2, rtol=0.1)
     steps = 0.5 * (-1.0) ** np.floor(run.time / run.motion.period_s)[:, np.newaxis]
     # Four periods of +0.5, -0.5, ...: variance 0.25 x 4 / 3.
-    np.testing.assert_allclose(scatter_between_periods([run], [noise + steps]), 0.3**2 + 0.25 * 4 / 3, rtol=0.1)
+    np.testing.assert_allclose(
+        scatter_between_periods([run], [noise + steps]), 0.3**2 + 0.25 * 4 / 3, rtol=0.1
+    )
 
 
 def test_two_causes_that_overlap_share_what_either_would_take():
@@ -127,12 +137,18 @@ def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
     found, said = diagnosed(name)
     bars = drawing.DRAWN_BY["verdict"](found, said).axes[0].patches
     drawn = [bar.get_width() for bar in bars]
-    wanted = [100 * s / sum(shares.values()) for shares in said["error_budget"].values() for s in shares.values()]
+    wanted = [
+        100 * s / sum(shares.values())
+        for shares in said["error_budget"].values()
+        for s in shares.values()
+    ]
     np.testing.assert_allclose(drawn, wanted)
 
 
 @pytest.mark.parametrize("name", ["explained", "one kind, no periods", "unknown", "nothing"])
-def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_probabilities_of_sets(diagnosed, name):
+def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_probabilities_of_sets(
+    diagnosed, name
+):
     found, said = diagnosed(name)
     shares, _, sets = drawing.DRAWN_BY["decision"](found, said).axes
     parts = [
@@ -143,12 +159,16 @@ def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_pr
     # A hatched bar without a fill marks the person's part.
     drawn = [bar.get_width() for bar in shares.patches if bar.get_fill()]
     np.testing.assert_allclose(drawn, parts)
-    assert sum(drawn) == pytest.approx(len(found.baseline.joints), abs=1e-9), "each joint's add up to one"
+    assert sum(drawn) == pytest.approx(len(found.baseline.joints), abs=1e-9), (
+        "each joint's add up to one"
+    )
     likely = sorted(found.selected.posterior.by_labels.values(), reverse=True)
     bars = list(dict.fromkeys(bar.get_width() for bar in sets.patches))
     shown = sum(p >= 0.01 for p in likely[:6])
     np.testing.assert_allclose(bars[:shown], likely[:shown])
-    np.testing.assert_allclose(bars[shown:], [1.0 - sum(likely[:shown])] * (len(bars) > shown), atol=1e-9)
+    np.testing.assert_allclose(
+        bars[shown:], [1.0 - sum(likely[:shown])] * (len(bars) > shown), atol=1e-9
+    )
 
 
 def test_no_set_is_weighed_where_acquisition_is_at_fault(diagnosed):
@@ -168,7 +188,9 @@ def test_what_the_residual_goes_with_most_is_drawn_first(diagnosed):
     drawn = drawing.DRAWN_BY["dependence"](found, said)
     first = next(axis for axis in drawn.axes if axis.get_ylabel() == "knee residual, N·m")
     assert first.get_xlabel().startswith(f"knee {ranking[0]['variable']}, ")
-    assert first.get_title() == f"{ranking[0]['share_before']:.0%} → {ranking[0]['share_after']:.0%}"
+    assert (
+        first.get_title() == f"{ranking[0]['share_before']:.0%} → {ranking[0]['share_after']:.0%}"
+    )
 
 
 def test_a_named_cause_leaves_nothing_that_goes_with_its_variable(diagnosed):
@@ -183,7 +205,12 @@ def test_a_tone_is_folded_onto_its_crest(diagnosed):
         e + 2.0 * np.cos(2 * np.pi * 3.137 * run.time + phase)[:, np.newaxis]
         for phase, (run, e) in enumerate(zip(found.validate, found.before.residuals, strict=True))
     ]
-    seen = against("tone", replace(found, before=replace(found.before, residuals=humming)), "knee", ("with_human",))
+    seen = against(
+        "tone",
+        replace(found, before=replace(found.before, residuals=humming)),
+        "knee",
+        ("with_human",),
+    )
     assert "3.14 Hz" in seen.label
     x, mean = binned_mean(seen.x, seen.before, seen.x.min(), seen.x.max())
     np.testing.assert_allclose(mean, 2.0 * np.cos(2 * np.pi * x), atol=0.35)
@@ -192,9 +219,14 @@ def test_a_tone_is_folded_onto_its_crest(diagnosed):
 def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
     found, _ = diagnosed("explained")
     fit = found.after.fit
-    errors = [replay(model_of_run(fit, found.baseline, run), run.motion, 1.0, 1.0).error for run in found.validate]
+    errors = [
+        replay(model_of_run(fit, found.baseline, run), run.motion, 1.0, 1.0).error
+        for run in found.validate
+    ]
     pooled = np.concatenate([error.reshape(-1, 2) for error in errors])
-    np.testing.assert_allclose(np.sqrt(np.mean(pooled**2, axis=0)), found.simulation_error["extended"], rtol=1e-6)
+    np.testing.assert_allclose(
+        np.sqrt(np.mean(pooled**2, axis=0)), found.simulation_error["extended"], rtol=1e-6
+    )
 
 
 def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypatch):

@@ -52,7 +52,9 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE, has_periods=True):
     labels = tuple(one.element.label for one in selected.answer.named)
     return SimpleNamespace(
         selected=selected,
-        baseline=SimpleNamespace(machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)),
+        baseline=SimpleNamespace(
+            machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)
+        ),
         effects={label: effect_labelled(label) for label in labels},
         effect_of=effect_labelled,
         causes=labels,
@@ -119,7 +121,9 @@ def test_an_unlisted_law_is_said_in_words_with_the_closest_listed_cause():
     (unlisted,) = found["laws"]
     assert unlisted["words"] == "a law of the knee's angle"
     assert unlisted["probability"] == pytest.approx(0.7)
-    assert [(one["words"], one["dropped"]) for one in found["causes"]] == [("cogging at the knee", False)]
+    assert [(one["words"], one["dropped"]) for one in found["causes"]] == [
+        ("cogging at the knee", False)
+    ]
 
 
 def test_a_joint_that_slides_has_a_law_of_its_position_and_a_force():

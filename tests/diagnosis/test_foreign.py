@@ -1,4 +1,5 @@
-"""What no cause of exoid's makes: said to be unknown, and no cause is named that takes next to nothing of it."""
+"""What no cause of exoid's makes: said to be unknown, and no cause is named that takes next to
+nothing of it."""
 
 from dataclasses import replace
 
@@ -15,14 +16,16 @@ from tests.diagnosis.machines import driven
 
 def told(kind, more):
     tables = [
-        driven(purpose, seed, kind, more, news=0.02) for seed, purpose in ((1, "train"), (2, "train"), (3, "validate"))
+        driven(purpose, seed, kind, more, news=0.02)
+        for seed, purpose in ((1, "train"), (2, "train"), (3, "validate"))
     ]
     motions = [motion_from_table(motion_table(made, FilterSettings())) for made in tables]
     return verdict(diagnose([replace(m, file=f"{i}.parquet") for i, m in enumerate(motions)]))
 
 
 def rough_on_one_side(t, q, dq, ddq, own):
-    """A bearing that is worn beyond 0.1 rad: loud where the load changes sign, too, as play would be."""
+    """A bearing that is worn beyond 0.1 rad: loud where the load changes sign, too, as play would
+    be."""
     return 1.0 * (q > 0.1) * np.tanh(dq / 0.02)
 
 
@@ -40,7 +43,8 @@ def off_by_a_little(share, own):
 
 
 def gripped_beyond_a_speed(t, q, dq, ddq, own):
-    """A damper with a dead zone. Over a Coulomb friction that gives energy Stribeck's law bends so, too."""
+    """A damper with a dead zone. Over a Coulomb friction that gives energy Stribeck's law bends so,
+    too."""
     return 20.0 * np.sign(dq) * np.maximum(np.abs(dq) - 1.0, 0.0)
 
 
@@ -53,17 +57,23 @@ PEAK = "a Stribeck peak of probability 0.50 is named beside a drag of another ex
 
 
 @pytest.mark.parametrize(
-    "kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.xfail(strict=True, reason=PEAK))]
+    "kind",
+    ["revolute", pytest.param("prismatic", marks=pytest.mark.xfail(strict=True, reason=PEAK))],
 )
 def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind):
     said = told(kind, steeper_than_squared)
     (joint,) = said["unexplained"]
-    assert said["status"] == "explained" and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
+    assert (
+        said["status"] == "explained"
+        and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
+    )
     assert said["residual"]["depends_on"][0]["variable"] == "speed"
     assert f"of what is left at the {joint} depends on the {joint}'s speed" in said["summary"]
 
 
-@pytest.mark.xfail(strict=True, reason="a wide Stribeck peak is named where friction falls away from nought")
+@pytest.mark.xfail(
+    strict=True, reason="a wide Stribeck peak is named where friction falls away from nought"
+)
 @pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
 def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
     said = told(kind, gripped_beyond_a_speed)
@@ -80,18 +90,24 @@ def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
 
 
 def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
-    """Of the whole force it is within what a good rig leaves, for most of it is a weight that never changes."""
+    """Of the whole force it is within what a good rig leaves, for most of it is a weight that never
+    changes."""
     said = told("prismatic", held_back)
-    error, floor, force = (said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm"))
+    error, floor, force = (
+        said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm")
+    )
     assert np.sqrt(error**2 - floor**2) < 0.015 * force
     assert said["status"] == "unknown_cause"
     assert "depends on the force that the carriage passes on" in said["summary"]
 
 
 @pytest.mark.parametrize(
-    ("share", "status", "words"), [(0.015, "nothing_missing", []), (0.03, "unknown_cause", ["a law of the arm's load"])]
+    ("share", "status", "words"),
+    [(0.015, "nothing_missing", []), (0.03, "unknown_cause", ["a law of the arm's load"])],
 )
-def test_a_reading_off_by_some_percent_is_a_law_of_the_load_and_half_of_it_is_as_on_a_good_rig(share, status, words):
+def test_a_reading_off_by_some_percent_is_a_law_of_the_load_and_half_of_it_is_as_on_a_good_rig(
+    share, status, words
+):
     said = told("revolute", lambda t, q, dq, ddq, own: off_by_a_little(share, own))
     assert (said["status"], said["causes"]) == (status, [])
     assert [finding["words"] for finding in said["findings"]] == words

@@ -1,4 +1,5 @@
-"""A gear that ripples at several lines beside friction that builds up over a travel: both are named."""
+"""A gear that ripples at several lines beside friction that builds up over a travel: both are
+named."""
 
 from dataclasses import replace
 
@@ -23,29 +24,39 @@ def level_joint(seed, lines=LINES, friction=5.4, travel=0.02):
     waves = ((1, 0.53, 0.79), (2, 0.05, 0.02), (3, 0.1, -0.02), (5, -0.01, 0.07))
     q = sum(a * np.sin(k * w * time) + b * np.cos(k * w * time) for k, a, b in waves)
     v = sum(k * w * (a * np.cos(k * w * time) - b * np.sin(k * w * time)) for k, a, b in waves)
-    torque = 3.0 * np.gradient(v) * RATE_HZ + 0.6 * v + 0.7 + 0.6 * q + built_up(q, friction, travel)
+    torque = (
+        3.0 * np.gradient(v) * RATE_HZ + 0.6 * v + 0.7 + 0.6 * q + built_up(q, friction, travel)
+    )
     torque += sum(size * np.sin(cycles * q + phase) for size, cycles, phase in lines)
     draw = np.random.default_rng(seed)
     angle, torque = q + draw.normal(0.0, 1e-4, len(q)), torque + draw.normal(0.0, 0.35, len(q))
     cut = int(0.7 * len(time))
     parts = {"train": slice(None, cut), "validate": slice(cut, None)}
-    return [motion(time[s] - time[s][0], angle[s], torque[s], purpose) for purpose, s in parts.items()]
+    return [
+        motion(time[s] - time[s][0], angle[s], torque[s], purpose) for purpose, s in parts.items()
+    ]
 
 
 def built_up(angle, friction, travel):
     """Return friction that turns over within a travel after each reversal (Dahl), N·m."""
     held = np.zeros(len(angle))
     for i, step in enumerate(np.diff(angle), 1):
-        grown = held[i - 1] + step * friction / travel * (1.0 - np.sign(step) * held[i - 1] / friction)
+        grown = held[i - 1] + step * friction / travel * (
+            1.0 - np.sign(step) * held[i - 1] / friction
+        )
         held[i] = np.clip(grown, -friction, friction)
     return held
 
 
 def motion(time, angle, torque, purpose):
-    recording = table(time, angle, torque, {"name": "joint", "kind": "revolute"}, purpose, gravity_m_s2=0.0)
+    recording = table(
+        time, angle, torque, {"name": "joint", "kind": "revolute"}, purpose, gravity_m_s2=0.0
+    )
     timing = {"sample_rate_hz": RATE_HZ, "period_s": PERIOD_S}
     recording = replace(recording, metadata=recording.metadata | timing)
-    return replace(motion_from_table(motion_table(recording, FilterSettings())), file=f"{purpose}.parquet")
+    return replace(
+        motion_from_table(motion_table(recording, FilterSettings())), file=f"{purpose}.parquet"
+    )
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])

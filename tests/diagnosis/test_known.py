@@ -1,4 +1,5 @@
-"""What drawings show of a machine is part of the model that everything is held against, and is searched for no more."""
+"""What drawings show of a machine is part of the model that everything is held against, and is
+searched for no more."""
 
 import pytest
 
@@ -14,7 +15,9 @@ from tests.diagnosis.sessions import session
     ("label", "values"),
     [
         ("rotor_inertia@knee", {"inertia": 0.12}),
-        pytest.param("parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5}, marks=pytest.mark.slow),
+        pytest.param(
+            "parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
@@ -33,8 +36,12 @@ def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
 
 
 def test_beside_what_is_known_something_else_is_found_all_the_same():
-    said = verdict(diagnose(session("torque_gain", "hip", seed=3, gain=1.08), known=["rotor_inertia@knee"]))
-    assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [("torque_gain", "hip")]
+    said = verdict(
+        diagnose(session("torque_gain", "hip", seed=3, gain=1.08), known=["rotor_inertia@knee"])
+    )
+    assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [
+        ("torque_gain", "hip")
+    ]
     low, high = said["known"][0]["parameters"][0]["ci95"]
     assert low < 0.0 < high  # this leg has none
 
@@ -49,6 +56,10 @@ def test_beside_what_is_known_something_else_is_found_all_the_same():
         ("torque_offset@hip", " or "),
     ],
 )
-def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(label, goes_on):
-    with pytest.raises(InputError, match=f"diagnose.known: found {label}, expected rotor_inertia@knee{goes_on}"):
+def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(
+    label, goes_on
+):
+    with pytest.raises(
+        InputError, match=f"diagnose.known: found {label}, expected rotor_inertia@knee{goes_on}"
+    ):
         diagnose(session(seconds=10.0), known=[label])

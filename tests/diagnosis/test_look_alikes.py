@@ -28,18 +28,31 @@ def test_a_look_alike_takes_from_the_cause_for_an_unlisted_law_of_its_family_and
     assert sum(after.by_labels.values()) == pytest.approx(1.0)
     assert after.nothing == pytest.approx(before.nothing)
     assert after.marginals["spring@hip"] == pytest.approx(kept)
-    assert after.marginals["law:unlisted_angle@hip"] == pytest.approx(before.marginals["spring@hip"] - kept)
+    assert after.marginals["law:unlisted_angle@hip"] == pytest.approx(
+        before.marginals["spring@hip"] - kept
+    )
     for other in ("drag@hip", "ripple@hip", "law:speed@hip"):
         assert after.marginals[other] == pytest.approx(before.marginals[other])
-    family = [any(e.family == "angle" for e in map(after.elements.__getitem__, chosen)) for chosen in after.sets]
+    family = [
+        any(e.family == "angle" for e in map(after.elements.__getitem__, chosen))
+        for chosen in after.sets
+    ]
     assert after.probabilities[family].sum() == pytest.approx(
-        sum(p for labels, p in before.by_labels.items() if labels & {"spring@hip", "drag@hip", "ripple@hip"})
+        sum(
+            p
+            for labels, p in before.by_labels.items()
+            if labels & {"spring@hip", "drag@hip", "ripple@hip"}
+        )
     )
 
 
 def test_what_a_smooth_law_has_in_its_place_already_is_not_taken_from_the_cause_again():
-    """A law of the hip's angle as probable as the spring: the look-alike would have a third of the spring's."""
-    elements = (cause("spring", [0]), Element("law:angle@hip", "angle", "hip", "angle", True, [1], [1.0]))
+    """A law of the hip's angle as probable as the spring: the look-alike would have a third of the
+    spring's."""
+    elements = (
+        cause("spring", [0]),
+        Element("law:angle@hip", "angle", "hip", "angle", True, [1], [1.0]),
+    )
     even = Posterior(elements, ((0,), (1,), ()), np.array([5.0, 5.0, 0.0]))
     removed = {frozenset({"spring@hip"}): 0.2}
     assert kept_share(0.2) < 0.7
@@ -55,7 +68,11 @@ def test_a_spring_that_removes_little_is_an_unlisted_law_of_the_angle(stuck, rem
     selected = naming(stuck, LABEL).selected.with_look_alikes({LABEL: removed})
     assert list(selected.answer.labels) == named
     (finding,) = selected.findings
-    assert (finding.level, finding.joint, finding.family) == ("cause" if named else "family", "knee", "angle")
+    assert (finding.level, finding.joint, finding.family) == (
+        "cause" if named else "family",
+        "knee",
+        "angle",
+    )
     assert selected.shows_unlisted == (not named)
 
 

@@ -1,4 +1,5 @@
-"""Machines that are no leg: what a servo or a ball screw hides is named, in its own units and at its own scale."""
+"""Machines that are no leg: what a servo or a ball screw hides is named, in its own units and at
+its own scale."""
 
 import re
 from dataclasses import replace
@@ -40,7 +41,10 @@ def motions(machine, **hidden):
 
 
 def labels(machine):
-    return {effect.label for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))}
+    return {
+        effect.label
+        for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))
+    }
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +57,9 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
     found = diagnose(motions(pendulum, spring=0.8))
     said = verdict(found)
     (cause,) = said["causes"]
-    assert "parallel_spring@arm" in {cause_label(one) for one in (cause, *cause["indistinguishable_from"])}
+    assert "parallel_spring@arm" in {
+        cause_label(one) for one in (cause, *cause["indistinguishable_from"])
+    }
     assert said["status"] == "explained"
     (spring,) = verdict(naming(found, "parallel_spring@arm"))["causes"]
     stiffness, rest = spring["parameters"]
@@ -63,7 +69,8 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
 
 
 def test_of_ties_the_one_that_predicts_the_validation_run_is_named():
-    """A weak spring and a torque offset explain one training run about alike, and not another motion."""
+    """A weak spring and a torque offset explain one training run about alike, and not another
+    motion."""
     found = diagnose(motions(pendulum, spring=0.4))
     (trained,) = answer_of(found.selected.searched).named
     assert {"torque_offset@arm", "parallel_spring@arm"} <= trained.members
@@ -78,7 +85,9 @@ def test_too_little_to_validate_on_is_told_with_the_fault_that_leaves_it_out():
     train, validate = motions(pendulum)
     torque = validate.torque.copy()
     torque[len(torque) // 10 :] = torque[len(torque) // 10]
-    with pytest.raises(InputError, match=r"too few in a row to tell noise from error.*torque is stuck"):
+    with pytest.raises(
+        InputError, match=r"too few in a row to tell noise from error.*torque is stuck"
+    ):
         diagnose([train, replace(validate, torque=torque)])
 
 
@@ -103,14 +112,19 @@ def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newton
 
 
 def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_named():
-    """A spring is added to the training run alone, beside friction that differs with direction in both."""
+    """A spring is added to the training run alone, beside friction that differs with direction in
+    both."""
     train, validate = motions(slide, asymmetry=-80.0)
     found = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
     both = naming(found, "viscous_asymmetry@axis", "parallel_spring@axis")
     assert both.causes == ("viscous_asymmetry@axis",)
     tried = candidates(both)
     spring = tried[tried["causes"].map(lambda causes: list(causes) == ["parallel_spring@axis"])]
-    assert spring["reason"].str.contains("the validation runs speak against parallel_spring@axis").all()
+    assert (
+        spring["reason"]
+        .str.contains("the validation runs speak against parallel_spring@axis")
+        .all()
+    )
 
 
 def test_what_is_rejected_is_told_with_its_probability_and_its_odds_against_nothing(screw):
@@ -162,7 +176,10 @@ def test_nobody_is_asked_for_runs_with_a_person_in_a_ball_screw(screw):
 
 def test_the_extended_model_simulates_the_screw_further_than_the_baseline(screw):
     said = screw[1]
-    assert said["extended_simulation_rmse_rad"]["axis"] < 0.5 * said["baseline_simulation_rmse_rad"]["axis"]
+    assert (
+        said["extended_simulation_rmse_rad"]["axis"]
+        < 0.5 * said["baseline_simulation_rmse_rad"]["axis"]
+    )
 
 
 def test_a_pendulum_and_a_screw_are_identified_without_exoid_knowing_their_size():
@@ -191,11 +208,19 @@ def test_only_what_a_machine_can_have_and_show_is_a_candidate():
     lift = machine_of([Joint("lift", "prismatic")], Geometry())
     assert {"base_tilt", "mass_off_axis@arm", "encoder_offset@arm", "backlash@arm"} <= labels(arm)
     assert not {"torque_gain@arm", "rotor_inertia@arm"} & labels(arm)
-    gone = {"base_tilt", "mass_off_axis@table", "payload_change@table", "encoder_offset@table", "backlash@table"}
+    gone = {
+        "base_tilt",
+        "mass_off_axis@table",
+        "payload_change@table",
+        "encoder_offset@table",
+        "backlash@table",
+    }
     assert not gone & labels(turntable)
     assert not {"torque_offset@lift", "coulomb_asymmetry@lift"} & labels(lift)
     assert "payload_change@lift" in labels(lift)
-    crane = Machine(replace(LEG, kinds=("prismatic", "revolute")), (Joint("trolley", "prismatic"), Joint("rod")))
+    crane = Machine(
+        replace(LEG, kinds=("prismatic", "revolute")), (Joint("trolley", "prismatic"), Joint("rod"))
+    )
     assert "base_tilt" not in labels(crane)
     elbow = machine_of([Joint("shoulder"), Joint("elbow")], Geometry(0.3))
     renamed = {label.replace("shoulder", "hip").replace("elbow", "knee") for label in labels(elbow)}
@@ -204,12 +229,17 @@ def test_only_what_a_machine_can_have_and_show_is_a_candidate():
 
 def test_ranges_go_with_the_machine_and_a_leg_keeps_its_own():
     (arm, _), (axis, _) = (on_one_scale(motions(machine)) for machine in (pendulum, slide))
-    by_label = {e.label: e for e in proposals(Baseline(("exo_alone",), axis.machine, cuffs=False), ("exo_alone",))}
+    by_label = {
+        e.label: e
+        for e in proposals(Baseline(("exo_alone",), axis.machine, cuffs=False), ("exo_alone",))
+    }
     low, high = by_label["parallel_spring@axis"].linear[0].typical
     assert by_label["parallel_spring@axis"].linear[0].unit == "N/m"
     assert low > 20.0 and high / low == pytest.approx(20.0)
     assert arm.machine.scale("arm").torque < 0.1 and arm.machine.scale("arm").travel == 1.0
-    assert on_one_scale([replace(arm, metadata={}, joints=("hip", "knee"), scales=())])[0].scales == ()
+    assert (
+        on_one_scale([replace(arm, metadata={}, joints=("hip", "knee"), scales=())])[0].scales == ()
+    )
 
 
 def test_a_faster_machine_needs_less_of_a_run_and_a_slower_one_no_more():
@@ -220,15 +250,21 @@ def test_a_faster_machine_needs_less_of_a_run_and_a_slower_one_no_more():
 
 def test_play_of_another_machine_is_not_simulated_with_an_exoskeletons_teeth():
     machine = machine_of([Joint("arm")], Geometry())
-    terms = [Term(effect, np.ones(len(effect.linear))) for effect in baseline(machine, ("exo_alone",))]
+    terms = [
+        Term(effect, np.ones(len(effect.linear))) for effect in baseline(machine, ("exo_alone",))
+    ]
     play = Term(Backlash("arm", on=machine), np.array([0.01]))
-    with pytest.raises(InputError, match=r"backlash@arm: the teeth that a simulation has are those of an exoskeleton"):
+    with pytest.raises(
+        InputError,
+        match=r"backlash@arm: the teeth that a simulation has are those of an exoskeleton",
+    ):
         assemble(Model((*terms, play)), Geometry(), ["arm"])
 
 
 @pytest.mark.parametrize("form", [0, 1])
 def test_teeth_are_hard_or_soft_by_the_measure_of_their_own_joint(form):
-    """The link hangs on hard teeth at the motor's speed; soft ones it strikes, and has a speed of its own."""
+    """The link hangs on hard teeth at the motor's speed; soft ones it strikes, and has a speed of
+    its own."""
     (motion, _) = on_one_scale(motions(pendulum))
     (joint,), body = motion.joints, np.ones(len(motion.machine.mechanism.parameters))
     play = Backlash(joint, on=motion.machine)

@@ -45,7 +45,9 @@ def test_a_law_has_the_evidence_of_its_gaussian_model():
     (size,) = weigh.sizes((2,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
     plain = background_covariance(X)
-    with_law = plain + amplitude**2 * (0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4]))
+    with_law = plain + amplitude**2 * (
+        0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4])
+    )
     ratio = multivariate_normal.logpdf(y, cov=with_law) - multivariate_normal.logpdf(y, cov=plain)
     assert weigh((2,)) == pytest.approx(
         ratio - np.log(len(CRITERIA.amplitudes)) + CRITERIA.law + CRITERIA.base_rate, abs=1e-8
@@ -58,7 +60,11 @@ def test_a_cause_may_differ_by_its_shape():
     (size,) = weigh.sizes((0,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
     plain = background_covariance(X)
-    named = plain + amplitude**2 * np.outer(X[:, 0], X[:, 0]) + CRITERIA.shape_sd**2 * np.outer(X[:, 2], X[:, 2])
+    named = (
+        plain
+        + amplitude**2 * np.outer(X[:, 0], X[:, 0])
+        + CRITERIA.shape_sd**2 * np.outer(X[:, 2], X[:, 2])
+    )
     ratio = multivariate_normal.logpdf(y, cov=named) - multivariate_normal.logpdf(y, cov=plain)
     expected = ratio - np.log(len(CRITERIA.amplitudes)) + CRITERIA.cause + CRITERIA.base_rate
     assert weigh((0,)) == pytest.approx(expected, abs=1e-7)
@@ -71,7 +77,9 @@ def test_a_forbidden_sign_counts_as_half_of_the_prior_that_is_not_there(strength
     one_way = replace(cause, amplitudes=[[1.0]])
     both = replace(evidence, elements=(cause, *evidence.elements[1:]))
     signed = replace(evidence, elements=(one_way, *evidence.elements[1:]))
-    difference = MarginalLikelihood(signed, CRITERIA)((0,)) - MarginalLikelihood(both, CRITERIA)((0,))
+    difference = MarginalLikelihood(signed, CRITERIA)((0,)) - MarginalLikelihood(both, CRITERIA)(
+        (0,)
+    )
     # By sampling the same posterior.
     (size,) = MarginalLikelihood(both, CRITERIA).sizes((0,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
@@ -102,11 +110,15 @@ def test_a_cause_that_leaves_friction_negative_is_as_improbable_as_that_friction
     alone, variance = B @ y / (B @ B), 1.0 / (B @ B)
     never = Nonnegative(np.array([alone]), np.array([[variance, 0.0]]), imitated[np.newaxis])
     known = Evidence(gram, right, (cause,), (), {}, np.zeros(2), never)
-    weigh, free = (MarginalLikelihood(e, CRITERIA) for e in (known, replace(known, nonnegative=None)))
+    weigh, free = (
+        MarginalLikelihood(e, CRITERIA) for e in (known, replace(known, nonnegative=None))
+    )
     (size,) = weigh.sizes((0,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
     together = np.column_stack([B, A, D])
-    covariance = np.linalg.inv(together.T @ together + np.diag([0.0, amplitude**-2, CRITERIA.shape_sd**-2]))
+    covariance = np.linalg.inv(
+        together.T @ together + np.diag([0.0, amplitude**-2, CRITERIA.shape_sd**-2])
+    )
     with_cause = norm.logcdf((covariance @ together.T @ y)[0] / np.sqrt(covariance[0, 0]))
     without = norm.logcdf(alone / np.sqrt(variance))
     assert weigh((0,)) - free((0,)) == pytest.approx(with_cause - without, abs=1e-8)
@@ -139,7 +151,9 @@ def test_noise_alone_explains_nothing_beyond_what_noise_does():
     X = rng.normal(size=(4000, 8))
     noise = [explained(X.T @ X, X.T @ rng.normal(size=4000), *NO_CURVES) for _ in range(50)]
     assert np.mean(noise) < 5.0
-    assert explained(X.T @ X, X.T @ (X[:, 0] + rng.normal(size=4000)), *NO_CURVES) == pytest.approx(4000, rel=0.1)
+    assert explained(X.T @ X, X.T @ (X[:, 0] + rng.normal(size=4000)), *NO_CURVES) == pytest.approx(
+        4000, rel=0.1
+    )
 
 
 def test_slow_noise_counts_for_one_a_coefficient_and_what_it_cannot_follow_in_full():
@@ -179,7 +193,9 @@ def test_a_strong_cause_is_found_and_a_set_that_cannot_be_weighed_is_left_out():
 def test_evidence_survives_being_packed():
     _, _, evidence = problem(strength=0.2)
     rng = np.random.default_rng(4)
-    friction = Nonnegative(np.array([0.3, 0.1]), rng.random((2, 2)), rng.normal(size=(2, evidence.gram.shape[1])))
+    friction = Nonnegative(
+        np.array([0.3, 0.1]), rng.random((2, 2)), rng.normal(size=(2, evidence.gram.shape[1]))
+    )
     evidence = replace(evidence, nonnegative=friction)
     again = Evidence.unpacked(evidence.packed())
     np.testing.assert_allclose(again.gram, evidence.gram, rtol=1e-6)

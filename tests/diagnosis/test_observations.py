@@ -69,8 +69,11 @@ def test_a_validation_run_has_no_cuffs_where_training_had_none(motions):
     assert like_trained(validated, baseline_of([validated])) is validated
 
 
-def test_torque_that_obeys_the_model_obeys_it_behind_the_low_pass_and_not_along_a_motion_filtered_so_low(motions):
-    """Friction turns round at once, centrifugal torque is a square: a filtered motion has them bent."""
+def test_torque_that_obeys_the_model_obeys_it_behind_the_low_pass_and_not_along_a_motion_filtered_so_low(
+    motions,
+):
+    """Friction turns round at once, centrifugal torque is a square: a filtered motion has them
+    bent."""
     motion = motions[0]
     baseline = baseline_of([observe(motion)])
     values = np.linspace(1.0, 3.0, baseline.size)

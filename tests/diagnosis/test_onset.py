@@ -1,4 +1,5 @@
-"""When something begins in a run: found wherever it is, and its interval holds it as often as it says.
+"""When something begins in a run: found wherever it is, and its interval holds it as often as it
+says.
 
 The arms are none of exoid's equations: a path that is known, and what torque takes it there.
 """
@@ -31,14 +32,17 @@ HANDED = 0.27
 
 
 def handed(purpose, seed, instant, mass=HANDED, kind="revolute"):
-    """Return an arm or a lift to which a mass (kg) is handed at an instant, 0.3 m from the axis where there is one."""
+    """Return an arm or a lift to which a mass (kg) is handed at an instant, 0.3 m from the axis
+    where there is one."""
 
     def more(t, q, dq, ddq, own):
         arm = 0.3 * mass * (0.3 * ddq + 9.81 * np.sin(q))
         return (t >= instant) * (arm if kind == "revolute" else mass * (0.1 * ddq + 9.81) / 20.0)
 
     made = driven(purpose, seed, kind, more, SECONDS)
-    return replace(motion_from_table(motion_table(made, FilterSettings())), file=f"{purpose}_{seed}.parquet")
+    return replace(
+        motion_from_table(motion_table(made, FilterSettings())), file=f"{purpose}_{seed}.parquet"
+    )
 
 
 def observed(*motions):
@@ -46,14 +50,18 @@ def observed(*motions):
 
 
 def fitted(runs, begun):
-    """Return the fit of a load that is handed over, sought from the instants that it may have been ``begun`` at."""
+    """Return the fit of a load that is handed over, sought from the instants that it may have been
+    ``begun`` at."""
     baseline = baseline_of(runs)
-    cause = Candidate(PayloadChange(joint="arm", on=baseline.machine), tuple((t, 0.3) for t in begun))
+    cause = Candidate(
+        PayloadChange(joint="arm", on=baseline.machine), tuple((t, 0.3) for t in begun)
+    )
     return Refinement(runs, baseline, np.array([1.0, 0.0]))([cause]), baseline
 
 
 def onset_of(run, noise, pull, instant):
-    """Return the onset of what pulls so much, (m,) N·m, from an instant on, in noise (m, O) of known size."""
+    """Return the onset of what pulls so much, (m,) N·m, from an instant on, in noise (m, O) of
+    known size."""
     torque = np.zeros_like(noise)
     torque[:, 0] = pull
     gate = (run.time >= instant)[:, np.newaxis]
@@ -78,7 +86,8 @@ def test_intervals_hold_the_instant_as_often_as_they_say_in_noise_that_lasts(run
         low, high = onset.interval(run, np.zeros(2))
         held.append(low <= instant <= high)
         widths.append(high - low)
-    # Of 400 that hold it 95 % of the time fewer than 368 would by chance in one of two hundred; and they must tell.
+    # Of 400 that hold it 95 % of the time fewer than 368 would by chance in one of two hundred; and
+    # they must tell.
     assert np.mean(held) >= 0.92
     assert np.median(widths) < 2.0
 
@@ -93,7 +102,10 @@ def test_what_never_came_and_what_was_always_there_needs_no_coincidence(run):
         onset = onset_of(run, noise, pull, instant)
         low, high = onset.interval(run, np.zeros(2))
         told.append(onset.likeliest == instant)
-        assert not told[-1] or (high if instant == NEVER else low) == onset.instants[-2 if instant == NEVER else 1]
+        assert (
+            not told[-1]
+            or (high if instant == NEVER else low) == onset.instants[-2 if instant == NEVER else 1]
+        )
     assert np.mean(told) >= 0.92
 
 
@@ -126,10 +138,14 @@ def test_a_load_that_is_handed_over_is_named_with_its_size_and_when_in_every_run
     (cause,) = verdict(diagnose(motions))["causes"]
     assert cause["effect"] == "payload_change"
     amount = cause["parameters"][0]
-    assert amount["ci95"][0] < of_all < amount["ci95"][1] and amount["value"] == pytest.approx(of_all, rel=0.1)
+    assert amount["ci95"][0] < of_all < amount["ci95"][1] and amount["value"] == pytest.approx(
+        of_all, rel=0.1
+    )
     assert amount["unit"] == ("kg·m" if kind == "revolute" else "kg")
     told = {one["file"]: one for one in cause["each_run"]}
-    assert {file: one["values"]["time"] for file, one in told.items()} == pytest.approx(hidden, abs=0.5)
+    assert {file: one["values"]["time"] for file, one in told.items()} == pytest.approx(
+        hidden, abs=0.5
+    )
     for file in ("train_1.parquet", "train_2.parquet"):
         low, high = told[file]["ci95"]["time"]
         assert low <= hidden[file] <= high and high - low < 2.0
@@ -146,7 +162,9 @@ def test_intervals_of_a_diagnosis_hold_amplitude_and_instants_as_often_as_they_s
         mass = draw.uniform(0.1, 0.4)
         motions = [
             handed(purpose, seed * 10 + k, at, mass)
-            for k, (purpose, at) in enumerate(zip(("train", "train", "validate"), begun, strict=True))
+            for k, (purpose, at) in enumerate(
+                zip(("train", "train", "validate"), begun, strict=True)
+            )
         ]
         for cause in verdict(diagnose(motions))["causes"]:
             if cause["effect"] == "payload_change":

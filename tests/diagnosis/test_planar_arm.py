@@ -1,4 +1,5 @@
-"""A level arm of two links: what gravity alone would show is asked of no motion, all else is as of a leg."""
+"""A level arm of two links: what gravity alone would show is asked of no motion, all else is as of
+a leg."""
 
 from dataclasses import replace
 
@@ -61,7 +62,20 @@ def test_nothing_is_missing_of_it_and_a_spring_at_its_elbow_is_named_with_its_si
 
 def test_what_turns_gravity_is_no_candidate_and_what_turns_the_elbow_is_one(arm):
     machine = arm[0].machine
-    tried = {effect.label for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))}
-    assert not {"base_tilt", "mass_off_axis@shoulder", "encoder_offset@shoulder", "backlash@shoulder"} & tried
-    assert {"encoder_offset@elbow", "backlash@elbow", "mass_off_axis@elbow", "payload_change@elbow"} <= tried
-    assert all(effect.possible(machine) for effect in EFFECTS if effect.name in ("rigid_body", "friction"))
+    tried = {
+        effect.label
+        for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))
+    }
+    assert (
+        not {"base_tilt", "mass_off_axis@shoulder", "encoder_offset@shoulder", "backlash@shoulder"}
+        & tried
+    )
+    assert {
+        "encoder_offset@elbow",
+        "backlash@elbow",
+        "mass_off_axis@elbow",
+        "payload_change@elbow",
+    } <= tried
+    assert all(
+        effect.possible(machine) for effect in EFFECTS if effect.name in ("rigid_body", "friction")
+    )

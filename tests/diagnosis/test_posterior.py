@@ -15,7 +15,9 @@ NAMES = ("spring", "drag", "ripple")
 
 
 def cause(name: str, columns: list[int]) -> Element:
-    return Element(f"{name}@hip", name, "hip", "angle", False, columns, [1.0 / len(columns)] * len(columns))
+    return Element(
+        f"{name}@hip", name, "hip", "angle", False, columns, [1.0 / len(columns)] * len(columns)
+    )
 
 
 def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], **more) -> Evidence:
@@ -26,7 +28,8 @@ def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], *
 
 
 def problem(seed: int = 0, strength: float = 0.0, noise_columns: int = 0) -> Evidence:
-    """Return three causes and a law, of which the first is there with a strength, and causes of pure noise."""
+    """Return three causes and a law, of which the first is there with a strength, and causes of
+    pure noise."""
     rng = np.random.default_rng(seed)
     X = rng.normal(size=(ROWS, 5)) * 10.0
     y = rng.normal(size=ROWS) + X[:, 0] * strength
@@ -78,7 +81,9 @@ def test_the_order_of_columns_changes_nothing():
         evidence,
         gram=evidence.gram[:, order[:, np.newaxis], order],
         right=evidence.right[:, order],
-        elements=tuple(replace(e, columns=[place[c] for c in e.columns]) for e in evidence.elements),
+        elements=tuple(
+            replace(e, columns=[place[c] for c in e.columns]) for e in evidence.elements
+        ),
         background=tuple((place[c], *sizes) for c, *sizes in evidence.background),
     )
     ours, theirs = (by_labels(posterior(one, CRITERIA)) for one in (evidence, moved))
@@ -93,7 +98,8 @@ def test_causes_of_pure_noise_hardly_lower_the_true_causes_probability(seed):
 
 
 def test_a_cause_that_was_refined_beside_others_counts_once_on_its_own():
-    """Its shape in the set is there for the set: many such sets make it no likelier that it is there alone."""
+    """Its shape in the set is there for the set: many such sets make it no likelier that it is
+    there alone."""
     evidence = problem(strength=0.08)
     again = [replace(evidence.elements[0], context=number) for number in range(10)]
     count = len(evidence.elements)
@@ -107,7 +113,9 @@ def test_a_cause_that_was_refined_beside_others_counts_once_on_its_own():
     assert theirs[alone] / theirs[nothing] == pytest.approx(ours[alone] / ours[nothing])
 
 
-@pytest.mark.parametrize("criteria", [CRITERIA, Criteria(), replace(CRITERIA, cause=-2.0, law=-2.0, further=0.0)])
+@pytest.mark.parametrize(
+    "criteria", [CRITERIA, Criteria(), replace(CRITERIA, cause=-2.0, law=-2.0, further=0.0)]
+)
 def test_probabilities_of_sets_add_up_and_no_set_holds_a_label_twice(criteria):
     weighed = posterior(problem(strength=0.1, noise_columns=3), criteria)
     assert weighed.probabilities.sum() == pytest.approx(1.0)

@@ -1,4 +1,5 @@
-"""A torque reported in coarse steps: the step is found below noise, and called something in the sensor."""
+"""A torque reported in coarse steps: the step is found below noise, and called something in the
+sensor."""
 
 from dataclasses import replace
 
@@ -15,7 +16,8 @@ LABEL = "law:quantisation@hip"
 
 
 def reported_in_steps(step, seed, noise=0.5):
-    """Return a session whose hip's torque is rounded before its noise comes, as a drive's coarse current loop does."""
+    """Return a session whose hip's torque is rounded before its noise comes, as a drive's coarse
+    current loop does."""
     motions = session(seed=seed)
     rng = np.random.default_rng(seed)
     reported = []
@@ -34,11 +36,16 @@ def test_rounding_takes_a_torque_to_the_nearest_multiple():
 
 @pytest.mark.parametrize("step", [1.5, 3.0, 7.0])
 def test_the_step_is_found_below_noise_that_came_after_it(step):
-    """No value lies on a grid, and the noise is as large as what rounding adds to the smallest step."""
+    """No value lies on a grid, and the noise is as large as what rounding adds to the smallest
+    step."""
     rng = np.random.default_rng(1)
-    torque = 12.0 * np.sin(np.linspace(0.0, 40.0, 8000)) + 4.0 * np.sin(np.linspace(0.0, 91.0, 8000))
+    torque = 12.0 * np.sin(np.linspace(0.0, 40.0, 8000)) + 4.0 * np.sin(
+        np.linspace(0.0, 91.0, 8000)
+    )
     residual = rounding(torque, step) + rng.normal(0.0, 0.45, len(torque))
-    found = coarse_step([torque[:4000], torque[4000:]], [residual[:4000], residual[4000:]], float(np.std(torque)))
+    found = coarse_step(
+        [torque[:4000], torque[4000:]], [residual[:4000], residual[4000:]], float(np.std(torque))
+    )
     assert found == pytest.approx(step, rel=0.02)
 
 
@@ -77,7 +84,8 @@ def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
 
 
 def test_steps_that_the_noise_covers_are_nothing():
-    """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding adds."""
+    """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding
+    adds."""
     said = verdict(diagnose(reported_in_steps(1.5, seed=11, noise=3.0)))
     assert said["status"] == "nothing_missing"
     assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05

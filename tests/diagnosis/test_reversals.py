@@ -1,4 +1,5 @@
-"""At reversals: friction that builds up over a travel is told from one that sticks, on the plant of the blind test."""
+"""At reversals: friction that builds up over a travel is told from one that sticks, on the plant of
+the blind test."""
 
 from dataclasses import replace
 
@@ -38,7 +39,9 @@ def test_dahls_friction_changes_sides_over_its_travel_whatever_the_time_that_it_
     turned = np.linspace(0.1, 0.1 - travel * np.log(2.0), 50)
     for back in (turned, np.sort(np.repeat(turned, 7))[::-1]):
         side = dahl(np.concatenate([forth, back]), 0.0, travel)
-        assert side[len(forth) - 1] == pytest.approx(1.0) and side[-1] == pytest.approx(0.0, abs=1e-6)
+        assert side[len(forth) - 1] == pytest.approx(1.0) and side[-1] == pytest.approx(
+            0.0, abs=1e-6
+        )
 
 
 def test_an_encoder_that_flickers_between_two_counts_has_not_moved():
@@ -50,7 +53,8 @@ def test_an_encoder_that_flickers_between_two_counts_has_not_moved():
 
 
 def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
-    """Diagnose two minutes of a rig whose dry friction gives way over ``travel`` rad, or sticks where that is None."""
+    """Diagnose two minutes of a rig whose dry friction gives way over ``travel`` rad, or sticks
+    where that is None."""
     rng = np.random.default_rng(seed)
     person = random_person(rng)
     machine = replace(random_machine(rng, person.thigh_length), counts=np.full(2, float(counts)))
@@ -62,13 +66,23 @@ def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
             plan.torque(smooth.DAHL, j, level, travel)
         plan.channel.delay_s[:] = late
         runs.append(record(rig, random_excitation(rng), plan, run, rng))
-    write(Session(case(seed, "none", 0, plain=True), rig, [], runs), folder / "recordings", folder / "truth.json")
-    return diagnose(read_motions(sorted((folder / "recordings").glob("*.parquet")), FilterSettings(), Geometry()))
+    write(
+        Session(case(seed, "none", 0, plain=True), rig, [], runs),
+        folder / "recordings",
+        folder / "truth.json",
+    )
+    return diagnose(
+        read_motions(
+            sorted((folder / "recordings").glob("*.parquet")), FilterSettings(), Geometry()
+        )
+    )
 
 
-# The knee of the last turns round so gently that friction 60 ms late does nearly as well on the run to validate on.
+# The knee of the last turns round so gently that friction 60 ms late does nearly as well on the run
+# to validate on.
 @pytest.mark.parametrize(
-    ("seed", "travel", "joints"), [(900_001, 0.001, JOINTS), (900_002, 0.002, JOINTS), (900_003, 0.004, ("hip",))]
+    ("seed", "travel", "joints"),
+    [(900_001, 0.001, JOINTS), (900_002, 0.002, JOINTS), (900_003, 0.004, ("hip",))],
 )
 def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, travel, joints):
     found = diagnosed(tmp_path, seed, travel)
@@ -79,7 +93,9 @@ def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, tra
         assert one.over_travel < one.otherwise <= one.at_once
         assert one.over_travel < 0.7 * one.at_once
     said = verdict(found)
-    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [(joint, "rad") for joint in joints]
+    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [
+        (joint, "rad") for joint in joints
+    ]
     assert sum("changes sign over about" in caveat for caveat in said["caveats"]) == len(joints)
 
 
@@ -104,7 +120,9 @@ def test_friction_that_alone_is_late_is_given_no_travel(faultless, late):
         level = [value for (_, parameter), value in friction if parameter.name == "coulomb"]
         return replace(run, motion=replace(motion, torque=motion.torque + level * (then - side)))
 
-    train, validate = ([moved(run) for run in some] for some in (faultless.train, faultless.validate))
+    train, validate = (
+        [moved(run) for run in some] for some in (faultless.train, faultless.validate)
+    )
     assert built_up(made, baseline, train, validate) == []
 
 
@@ -117,7 +135,9 @@ def test_of_a_joint_whose_play_is_named_nothing_more_is_told(bristles):
     runs, baseline = bristles.train, bristles.baseline
     play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
     made = fit((play,), runs, baseline, bristles.prepared.weights)
-    assert [one.joint for one in built_up(made, baseline, bristles.train, bristles.validate)] == ["knee"]
+    assert [one.joint for one in built_up(made, baseline, bristles.train, bristles.validate)] == [
+        "knee"
+    ]
 
 
 def slower(motion):
@@ -128,11 +148,16 @@ def slower(motion):
 
 
 def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_tells_none(bristles):
-    slow = [[replace(run, motion=slower(run.motion)) for run in some] for some in (bristles.train, bristles.validate)]
+    slow = [
+        [replace(run, motion=slower(run.motion)) for run in some]
+        for some in (bristles.train, bristles.validate)
+    ]
     assert built_up(bristles.after.fit, bristles.baseline, *slow) == []
 
 
-def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_and_is_not_told(tmp_path):
+def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_and_is_not_told(
+    tmp_path,
+):
     assert diagnosed(tmp_path, 900_001, 0.002, counts=2**13).reversals == ()
 
 

@@ -33,16 +33,21 @@ def imported(motion):
 @pytest.mark.parametrize("work", [diagnose, detectability_of_recorded])
 def test_a_joint_that_never_moves_is_named(motions, work):
     with pytest.raises(
-        InputError, match=r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to train"
+        InputError,
+        match=r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to train",
     ):
         work([standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions])
 
 
 def test_who_moved_a_joint_that_seems_to_stand_is_told_to_look_at_its_units(motions):
     standing = [standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions]
-    with pytest.raises(InputError, match=r"its encoder, and the units of angle and time in the rig file$"):
+    with pytest.raises(
+        InputError, match=r"its encoder, and the units of angle and time in the rig file$"
+    ):
         diagnose(standing)
-    with pytest.raises(InputError, match=r"its encoder, and the units of angle and time in the map$"):
+    with pytest.raises(
+        InputError, match=r"its encoder, and the units of angle and time in the map$"
+    ):
         diagnose([imported(m) for m in standing])
 
 
@@ -58,9 +63,12 @@ def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
 @pytest.mark.parametrize("value", [0.0, -3.2])
 def test_a_torque_that_is_one_number_all_along_is_told_as_that(motions, value):
     with pytest.raises(InputError) as refused:
-        diagnose([imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions])
-    assert f": the torque of the knee is {value:.4g} N·m in every row, expected what a drive exerts" in str(
-        refused.value
+        diagnose(
+            [imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions]
+        )
+    assert (
+        f": the torque of the knee is {value:.4g} N·m in every row, expected what a drive exerts"
+        in str(refused.value)
     )
     assert str(refused.value).endswith("check that it was on, and which channel the map reads")
 
@@ -80,7 +88,9 @@ def test_joints_that_hold_one_angle_between_them_are_refused(motions, times):
 
 
 def test_a_session_of_imported_recordings_lacks_a_purpose_in_their_map(motions):
-    with pytest.raises(InputError, match=r'give one of them purpose = "validate" in a \[\[recording\]\] of the map'):
+    with pytest.raises(
+        InputError, match=r'give one of them purpose = "validate" in a \[\[recording\]\] of the map'
+    ):
         diagnose([imported(m) for m in motions if m.purpose == "train"])
 
 
@@ -89,7 +99,8 @@ def test_two_seconds_with_the_human_are_not_made_up_for_by_a_long_run_without(mo
     short = replace(short, valid=short.valid & (short.time < 2.0))
     rest = [m for m in motions if m.file != short.file]
     with pytest.raises(
-        InputError, match=rf"{short.file}: the hip moves for [01]\.\d s .* in the with_human runs to train"
+        InputError,
+        match=rf"{short.file}: the hip moves for [01]\.\d s .* in the with_human runs to train",
     ):
         diagnose([*rest, short])
 
@@ -97,7 +108,9 @@ def test_two_seconds_with_the_human_are_not_made_up_for_by_a_long_run_without(mo
 def test_a_run_is_not_validated_on_itself(motions):
     train = [m for m in motions if m.purpose == "train"]
     again = [replace(m, purpose="validate", file=f"copy_of_{m.file}") for m in train]
-    with pytest.raises(InputError, match=rf"copy_of_{train[0].file} \(exo_alone, validate\) holds the same torques"):
+    with pytest.raises(
+        InputError, match=rf"copy_of_{train[0].file} \(exo_alone, validate\) holds the same torques"
+    ):
         diagnose([*train, *again])
 
 
@@ -112,30 +125,45 @@ def test_joints_that_take_turns_are_never_scored_and_refused(motions):
 
 
 def test_mechanisms_that_exoid_does_not_know_are_refused(motions):
-    telescope = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "knee", "kind": "prismatic"}]}
+    telescope = {
+        "joints": [{"name": "hip", "kind": "revolute"}, {"name": "knee", "kind": "prismatic"}]
+    }
     strange = [replace(m, metadata=m.metadata | telescope) for m in motions]
     with pytest.raises(
-        InputError, match=r"has joints hip \(revolute\), knee \(prismatic\) and gravity 9\.8 m/s², expected those"
+        InputError,
+        match=r"has joints hip \(revolute\), knee \(prismatic\) and gravity 9\.8 m/s², expected those",
     ):
         diagnose(strange)
 
 
 def test_runs_whose_joints_have_other_names_are_of_several_machines(motions):
     ankle = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "ankle", "kind": "revolute"}]}
-    with pytest.raises(InputError, match=r"run_1.parquet has joints hip, ankle, run_0.parquet has hip, knee"):
-        diagnose([motions[0], replace(motions[1], metadata=motions[1].metadata | ankle), *motions[2:]])
+    with pytest.raises(
+        InputError, match=r"run_1.parquet has joints hip, ankle, run_0.parquet has hip, knee"
+    ):
+        diagnose(
+            [motions[0], replace(motions[1], metadata=motions[1].metadata | ankle), *motions[2:]]
+        )
 
 
 def test_runs_of_two_machines_are_refused(motions):
     longer = replace(motions[1], geometry=replace(motions[1].geometry, thigh_length_m=0.5))
-    with pytest.raises(InputError, match=r"run_1.parquet has thigh_length_m 0.5, run_0.parquet has 0.38952"):
+    with pytest.raises(
+        InputError, match=r"run_1.parquet has thigh_length_m 0.5, run_0.parquet has 0.38952"
+    ):
         diagnose([motions[0], longer, *motions[2:]])
 
 
 def test_a_gap_is_left_out_and_does_not_forbid_to_speak_of_physics(motions):
     kept = (motions[1].time < 8.0) | (motions[1].time > 15.0)
-    rows = {name: getattr(motions[1], name)[kept] for name in ("time", "q", "dq", "ddq", "torque", "valid", "sequence")}
-    rows |= {name: getattr(motions[1], name)[kept] for name in ("measured_angle", "reference", "temperature")}
+    rows = {
+        name: getattr(motions[1], name)[kept]
+        for name in ("time", "q", "dq", "ddq", "torque", "valid", "sequence")
+    }
+    rows |= {
+        name: getattr(motions[1], name)[kept]
+        for name in ("measured_angle", "reference", "temperature")
+    }
     gap = replace(motions[1], **rows, segment=np.where(rows["time"] < 8.0, 0, 1))
     (fault,) = find_faults([motions[0], gap, *motions[2:]])
     assert fault.file == "run_1.parquet" and "1 gap" in fault.what
@@ -143,8 +171,13 @@ def test_a_gap_is_left_out_and_does_not_forbid_to_speak_of_physics(motions):
 
 
 def test_a_run_thinned_out_on_purpose_has_no_gaps(motions):
-    thin = {name: getattr(motions[0], name)[::2] for name in ("time", "q", "dq", "ddq", "torque", "valid", "segment")}
-    thin |= {name: getattr(motions[0], name)[::2] for name in ("sequence", "measured_angle", "reference")}
+    thin = {
+        name: getattr(motions[0], name)[::2]
+        for name in ("time", "q", "dq", "ddq", "torque", "valid", "segment")
+    }
+    thin |= {
+        name: getattr(motions[0], name)[::2] for name in ("sequence", "measured_angle", "reference")
+    }
     assert find_faults([replace(motions[0], **thin, temperature=None, sample_rate_hz=100.0)]) == []
 
 
@@ -161,7 +194,11 @@ def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(m
     torque[:, 1] = 3.0
     stuck = replace(motions[0], file="stuck.parquet", torque=torque)
     (fault,) = find_faults([*motions, stuck])
-    assert fault.file == "stuck.parquet" and fault.what.endswith("; this run is left out") and not fault.spoils
+    assert (
+        fault.file == "stuck.parquet"
+        and fault.what.endswith("; this run is left out")
+        and not fault.spoils
+    )
     with_it, without = diagnose([*motions, stuck]), diagnose(motions)
     assert with_it.causes == without.causes and with_it.status == without.status
     assert {run.motion.file for run in with_it.train} == {run.motion.file for run in without.train}
@@ -178,7 +215,9 @@ def test_a_period_much_longer_than_its_recording_is_none(period_s, taken):
 
 
 def test_a_period_of_less_than_four_samples_is_refused():
-    with pytest.raises(InputError, match=r"period_s is 0.001 s, at \d+ Hz less than 4 samples, expected the period"):
+    with pytest.raises(
+        InputError, match=r"period_s is 0.001 s, at \d+ Hz less than 4 samples, expected the period"
+    ):
         motion_from_table(recorded(0.001))
 
 

@@ -1,4 +1,5 @@
-"""A reversed sign at a machine of one joint is told as acquisition; a machine wired as it should be never is."""
+"""A reversed sign at a machine of one joint is told as acquisition; a machine wired as it should be
+never is."""
 
 from dataclasses import replace
 from functools import cache
@@ -28,20 +29,32 @@ def motions(machine, spoil=lambda frame: frame, **hidden):
     made = []
     for number, purpose in enumerate(("train", "validate")):
         table = recorded(machine, purpose, number + 1, **hidden)
-        made.append(motion_from_table(motion_table(replace(table, frame=spoil(table.frame)), FilterSettings())))
+        made.append(
+            motion_from_table(
+                motion_table(replace(table, frame=spoil(table.frame)), FilterSettings())
+            )
+        )
     return on_one_scale([replace(m, file=f"{m.purpose}.parquet") for m in made])
 
 
 def reversed_in(endings):
     def spoil(frame):
-        return frame.assign(**{name: -frame[name] for name in frame.columns if name.endswith(endings)})
+        return frame.assign(
+            **{name: -frame[name] for name in frame.columns if name.endswith(endings)}
+        )
 
     return spoil
 
 
 def late_by(samples):
     def spoil(frame):
-        return frame.assign(**{name: np.roll(frame[name], samples) for name in frame.columns if name.endswith(EFFORT)})
+        return frame.assign(
+            **{
+                name: np.roll(frame[name], samples)
+                for name in frame.columns
+                if name.endswith(EFFORT)
+            }
+        )
 
     return spoil
 
@@ -53,12 +66,17 @@ def test_a_reversed_sign_is_named_in_each_run_of_a_machine_of_one_joint(machine,
     assert [fault.file for fault in found] == ["train.parquet", "validate.parquet"]
     for fault in found:
         assert fault.spoils and fault.channel.endswith(EFFORT)
-        assert f"the sign of {fault.channel} is reversed" in fault.what and "mirror image" in fault.what
+        assert (
+            f"the sign of {fault.channel} is reversed" in fault.what
+            and "mirror image" in fault.what
+        )
 
 
 def test_a_reversed_sign_in_one_run_of_two_is_named_there_alone():
     first, second = motions(slide)
-    assert [f.file for f in find_faults([first, replace(second, torque=-second.torque)])] == ["validate.parquet"]
+    assert [f.file for f in find_faults([first, replace(second, torque=-second.torque)])] == [
+        "validate.parquet"
+    ]
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -82,4 +100,6 @@ def test_a_torque_that_comes_late_is_no_reversed_sign(machine):
 def test_no_physics_is_blamed_for_a_reversed_sign():
     said = verdict(diagnose(motions(slide, reversed_in(EFFORT), asymmetry=-80.0)))
     assert said["acquisition_at_fault"] and said["causes"] == []
-    assert said["summary"].startswith("Acquisition, not physics: train.parquet, axis_force_n: the sign of axis_force_n")
+    assert said["summary"].startswith(
+        "Acquisition, not physics: train.parquet, axis_force_n: the sign of axis_force_n"
+    )

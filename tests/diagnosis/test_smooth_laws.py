@@ -1,4 +1,5 @@
-"""What stretches over two joints pulls at both as one elastic energy says, and is found as one law."""
+"""What stretches over two joints pulls at both as one elastic energy says, and is found as one
+law."""
 
 from dataclasses import replace
 
@@ -51,7 +52,8 @@ def test_a_part_is_of_order_one_at_the_joint_where_it_is_larger(prepared):
 
 
 def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
-    """A band from the pelvis to the shank that is slack in a part of its range: no spring of either joint."""
+    """A band from the pelvis to the shank that is slack in a part of its range: no spring of either
+    joint."""
     said = verdict(diagnose(banded(session(seed=5))))
     assert said["status"] == "unknown_cause"
     (finding,) = said["findings"]
@@ -62,6 +64,8 @@ def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
 
 
 def test_a_spring_of_one_joint_is_none():
-    said = verdict(diagnose(session("parallel_spring", "knee", seed=5, stiffness=10.0, rest_angle=-0.9)))
+    said = verdict(
+        diagnose(session("parallel_spring", "knee", seed=5, stiffness=10.0, rest_angle=-0.9))
+    )
     assert said["causes"][0]["effect"] == "parallel_spring"
     assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05

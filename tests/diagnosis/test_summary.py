@@ -1,4 +1,5 @@
-"""The summary: two sentences that say what is missing, what naming it gains, and where more is left."""
+"""The summary: two sentences that say what is missing, what naming it gains, and where more is
+left."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -38,7 +39,9 @@ STRIBECK = SPRING | {"effect": "stribeck_friction", "joint": "hip"}
 def stuck():
     """A spring at the knee; in one run to validate on the hip's encoder stands for five seconds."""
     motions = []
-    for number, table in enumerate(recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)):
+    for number, table in enumerate(
+        recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
+    ):
         frame = table.frame.copy()
         if number == 1:
             frame.loc[1600:2600, "hip_angle_rad"] = frame.loc[1600, "hip_angle_rad"]
@@ -54,13 +57,19 @@ def errors(rms):
 
 def with_errors(d, floor, baseline, extended):
     """Return the diagnosis with another noise floor and other errors, N·m at hip and knee each."""
-    before, after = (replace(made, errors=errors(rms)) for made, rms in ((d.before, baseline), (d.after, extended)))
+    before, after = (
+        replace(made, errors=errors(rms))
+        for made, rms in ((d.before, baseline), (d.after, extended))
+    )
     wide = np.append(floor, [np.nan, np.nan])
-    return replace(d, floor=replace(d.floor, rms=wide), before=before, after=after, without={LABEL: before})
+    return replace(
+        d, floor=replace(d.floor, rms=wide), before=before, after=after, without={LABEL: before}
+    )
 
 
 def without_gain(d, times):
-    """Return the diagnosis whose cause, left out, leaves so many times the squared error that it leaves named."""
+    """Return the diagnosis whose cause, left out, leaves so many times the squared error that it
+    leaves named."""
     less = replace(d.after, errors=replace(d.after.errors, squares=times * d.after.errors.squares))
     return replace(d, without={LABEL: less})
 
@@ -69,7 +78,10 @@ def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
     told = verdict(stuck)
     said = told["summary"]
     assert said.startswith("Missing from the simulation: parallel spring at the knee")
-    assert "Faults of acquisition were found as well: run_1.parquet, hip_angle_rad: the hip's angle is stuck" in said
+    assert (
+        "Faults of acquisition were found as well: run_1.parquet, hip_angle_rad: the hip's angle is stuck"
+        in said
+    )
     assert said.startswith(told["finding"])
     assert "acquisition" not in told["finding"]
 
@@ -83,7 +95,9 @@ def test_faults_that_the_summary_does_not_tell_are_counted_in_words(stuck):
 
 
 def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck):
-    said = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.56, 0.305]), [SPRING], None)
+    said = finding_in_words(
+        with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.56, 0.305]), [SPRING], None
+    )
     assert said == (
         "Missing from the simulation: parallel spring at the knee (probability 0.97). With it the knee's torque error "
         "falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m, which is noise; "
@@ -92,9 +106,12 @@ def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck)
 
 
 def test_the_gain_is_told_where_it_is_made_and_not_where_the_error_is_largest(stuck):
-    said = finding_in_words(with_errors(stuck, [0.3, 0.3], [0.9, 0.4], [0.9, 0.305]), [SPRING], None)
+    said = finding_in_words(
+        with_errors(stuck, [0.3, 0.3], [0.9, 0.4], [0.9, 0.305]), [SPRING], None
+    )
     assert (
-        "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m, which is noise; " in said
+        "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m, which is noise; "
+        in said
     )
     assert said.endswith("the hip's is then 0.90 N·m, 3.00 times its floor.")
 
@@ -122,7 +139,8 @@ def without_a_period(run):
 
 
 def nothing_missing(d, share, from_periods):
-    """A diagnosis whose noise floor is so much of each joint's torque, and of which nothing stands out."""
+    """A diagnosis whose noise floor is so much of each joint's torque, and of which nothing stands
+    out."""
     floor = share * d.torque_rms
     noise = Floor(np.append(floor, [np.nan, np.nan]), d.floor.independent_share, from_periods)
     made = replace(d.before, errors=errors(floor))
@@ -133,7 +151,10 @@ def test_an_estimated_floor_that_is_most_of_the_torque_is_said_to_hide_what_may_
     told = verdict(nothing_missing(stuck, 0.87, from_periods=False))
     assert told["status"] == "nothing_missing"
     assert "but the floor itself is 87% of the torque: little could show." in told["finding"]
-    assert any("the noise floor of the hip is estimated as 87% of its torque" in caveat for caveat in told["caveats"])
+    assert any(
+        "the noise floor of the hip is estimated as 87% of its torque" in caveat
+        for caveat in told["caveats"]
+    )
 
 
 @pytest.mark.parametrize(("share", "from_periods"), [(0.05, False), (0.87, True)])
@@ -145,7 +166,9 @@ def test_a_floor_that_is_measured_or_a_small_share_is_taken_as_it_is(stuck, shar
 
 
 @pytest.mark.parametrize(("times", "told"), [(1.35, False), (1.5, True)])
-def test_where_nothing_is_likely_to_be_missing_most_of_an_error_that_is_not_noise_is_told(stuck, times, told):
+def test_where_nothing_is_likely_to_be_missing_most_of_an_error_that_is_not_noise_is_told(
+    stuck, times, told
+):
     silent = nothing_missing(stuck, 0.05, from_periods=True)
     after = replace(silent.after, errors=errors(silent.floor_rms * [times, 1.0]))
     said = verdict(replace(silent, before=after, after=after))
@@ -171,22 +194,28 @@ def test_the_torque_that_an_error_is_of_is_told_on_the_samples_of_the_error(stuc
 
 
 def odds_in_words(d, rival):
-    """Say how much less likely a torque offset is that has this probability, beside a spring that has the rest."""
+    """Say how much less likely a torque offset is that has this probability, beside a spring that
+    has the rest."""
     elements = d.selected.posterior.elements
     spring = elements.index(d.named[0].element)
     offset = next(i for i, element in enumerate(elements) if element.label == "torque_offset@knee")
     log_odds = np.array([0.0, np.log(rival) - np.log1p(-rival) if rival else -np.inf])
     weighed = Posterior(elements, ((spring,), (offset,)), log_odds)
     named = replace(d.named[0], probability=1.0 - rival)
-    selected = replace(d.selected, posterior=weighed, answer=replace(d.selected.answer, named=(named,)))
+    selected = replace(
+        d.selected, posterior=weighed, answer=replace(d.selected.answer, named=(named,))
+    )
     told = cause_evidence(replace(d, selected=selected), named)
     return [one for one in told if "less likely" in one]
 
 
 @pytest.mark.parametrize(
-    ("rival", "said"), [(0.024390, "40 times"), (0.2, "4 times"), (1e-4, "over 1000 times"), (0.6, "no"), (0.0, None)]
+    ("rival", "said"),
+    [(0.024390, "40 times"), (0.2, "4 times"), (1e-4, "over 1000 times"), (0.6, "no"), (0.0, None)],
 )
-def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_not_told_by_a_figure(stuck, rival, said):
+def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_not_told_by_a_figure(
+    stuck, rival, said
+):
     told = odds_in_words(stuck, rival)
     wanted = f"the next listed cause in its place, torque offset at the knee, is {said} less likely"
     assert told == ([wanted] if said else [])
@@ -196,10 +225,14 @@ def test_a_gain_is_what_the_cause_takes_of_the_error_that_the_others_leave(stuck
     told = verdict(stuck)
     gain = told["causes"][0]["gain"]
     taken, left = gain["rmse_reduction_nm"], told["extended_rmse_nm"][gain["joint"]]
-    said = f"it removes {taken:.2f} of {left + taken:.2f} N·m of torque error at the {gain['joint']}"
+    said = (
+        f"it removes {taken:.2f} of {left + taken:.2f} N·m of torque error at the {gain['joint']}"
+    )
     assert told["causes"][0]["evidence"][0] == f"{said} on the validation runs"
     two = replace(stuck.selected.answer, named=stuck.named * 2)
-    beside = cause_evidence(replace(stuck, selected=replace(stuck.selected, answer=two)), stuck.named[0])[0]
+    beside = cause_evidence(
+        replace(stuck, selected=replace(stuck.selected, answer=two)), stuck.named[0]
+    )[0]
     assert beside == f"{said} that the other causes leave on the validation runs"
 
 
@@ -214,7 +247,9 @@ def test_a_gain_that_may_be_chance_is_told_as_that(stuck):
     assert "may be chance" not in verdict(stuck)["summary"]
     told = verdict(without_gain(stuck, 1.0))
     assert "whose gain may be chance. With it" in told["summary"]
-    assert "that gain may be chance: its 95 % interval includes zero" in told["causes"][0]["evidence"]
+    assert (
+        "that gain may be chance: its 95 % interval includes zero" in told["causes"][0]["evidence"]
+    )
 
 
 def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
@@ -252,7 +287,11 @@ def test_ties_are_one_answer_with_one_probability():
 
 @pytest.mark.parametrize(
     ("names", "length", "said"),
-    [(("shoulder", "elbow"), None, True), (("shoulder", "elbow"), 0.3, False), (("hip", "knee"), None, False)],
+    [
+        (("shoulder", "elbow"), None, True),
+        (("shoulder", "elbow"), 0.3, False),
+        (("hip", "knee"), None, False),
+    ],
 )
 def test_an_arm_whose_length_nobody_told_is_said_to_have_an_exoskeletons(names, length, said):
     geometry = Geometry() if length is None else Geometry(thigh_length_m=length)
@@ -261,7 +300,9 @@ def test_an_arm_whose_length_nobody_told_is_said_to_have_an_exoskeletons(names, 
     found = SimpleNamespace(baseline=SimpleNamespace(machine=machine), train=[run])
     told = _default_length(found)
     assert bool(told) == said
-    assert not said or "0.38952 m is assumed, an exoskeleton's: set geometry.thigh_length_m" in told[0]
+    assert (
+        not said or "0.38952 m is assumed, an exoskeleton's: set geometry.thigh_length_m" in told[0]
+    )
 
 
 def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
@@ -275,18 +316,27 @@ def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
 
     assert told(0.2) == []
     (caveat,) = told(least)
-    assert f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad" in caveat
+    assert (
+        f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad"
+        in caveat
+    )
 
 
 @pytest.mark.parametrize(("times", "is_told"), [(1.0, False), (1e6, True)])
 def test_a_size_that_may_be_zero_is_said_not_to_be_determined(stuck, times, is_told):
     wide = replace(stuck.uncertainty, covariance=times * stuck.uncertainty.covariance)
-    told = [caveat for caveat in caveats(replace(stuck, uncertainty=wide)) if "do not determine" in caveat]
+    told = [
+        caveat
+        for caveat in caveats(replace(stuck, uncertainty=wide))
+        if "do not determine" in caveat
+    ]
     said = "the training runs do not determine the size of parallel spring at the knee: its 95 % interval includes zero"
     assert told == [said] * is_told
 
 
-@pytest.mark.parametrize(("extended", "status"), [(0.514, "explained"), (0.525, "partly_explained")])
+@pytest.mark.parametrize(
+    ("extended", "status"), [(0.514, "explained"), (0.525, "partly_explained")]
+)
 def test_an_error_that_ends_as_noise_is_explained_however_little_there_was(stuck, extended, status):
     """Of a hip's error of 1.06 times its floor, 45 % or 83 % of what was systematic is left."""
     assert with_errors(stuck, [0.5, 0.3], [0.53, 2.4], [extended, 0.3]).status == status
@@ -296,5 +346,10 @@ def test_an_error_that_ends_as_noise_is_explained_however_little_there_was(stuck
 def test_beside_a_likely_unlisted_law_named_causes_explain_a_part(stuck, unlisted, status):
     """Even where they leave little: what is left need not show in the validation runs' error."""
     answer = replace(stuck.selected.answer, unlisted=unlisted)
-    d = with_errors(replace(stuck, selected=replace(stuck.selected, answer=answer)), [0.5, 0.3], [0.6, 2.4], [0.5, 0.3])
+    d = with_errors(
+        replace(stuck, selected=replace(stuck.selected, answer=answer)),
+        [0.5, 0.3],
+        [0.6, 2.4],
+        [0.5, 0.3],
+    )
     assert d.status == status

@@ -1,4 +1,5 @@
-"""A torque sensor that is tared at every start: each run has an offset of its own, and no drift is claimed.
+"""A torque sensor that is tared at every start: each run has an offset of its own, and no drift is
+claimed.
 
 What is hidden is added to recorded torques, by no code of the effects'.
 """
@@ -20,13 +21,16 @@ EVERY = dict.fromkeys(HIDDEN, 1.0)
 
 
 def misread(motion, offset, rate=0.0):
-    """Return a motion whose knee torque was read ``offset`` N·m too high, and by ``rate`` N·m/s more as it went on."""
+    """Return a motion whose knee torque was read ``offset`` N·m too high, and by ``rate`` N·m/s
+    more as it went on."""
     more = offset + rate * (motion.time - motion.time[0])
     return replace(motion, torque=motion.torque + more[:, np.newaxis] * np.array([0.0, 1.0]))
 
 
 def found(offsets, rate=0.0, seed=1):
-    return verdict(diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)]))
+    return verdict(
+        diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -34,21 +38,27 @@ def tared():
     return found(HIDDEN)
 
 
-def test_a_sensor_tared_anew_at_each_start_is_named_and_nothing_but_a_drift_that_hardly_grows_is_its_tie(tared):
+def test_a_sensor_tared_anew_at_each_start_is_named_and_nothing_but_a_drift_that_hardly_grows_is_its_tie(
+    tared,
+):
     assert tared["status"] == "explained"
     (cause,) = tared["causes"]
     names = {cause_label(one) for one in (cause, *cause["indistinguishable_from"])}
     assert "torque_offset@knee" in names and names <= {"torque_offset@knee", "torque_drift@knee"}
     assert "per-run torque offset at the knee" in tared["summary"]
     rates = [p for p in cause["parameters"] if p["name"] == "rate"]
-    assert all(p["ci95"][0] < 0.0 < p["ci95"][1] for p in rates), "a drift that does not grow is an offset of each run"
+    assert all(p["ci95"][0] < 0.0 < p["ci95"][1] for p in rates), (
+        "a drift that does not grow is an offset of each run"
+    )
     assert cause["fitted_on_validate"] == (["level"] if rates else ["offset"])
 
 
 def test_each_run_s_own_offset_is_recovered_and_its_interval_holds_it(tared):
     (cause,) = tared["causes"]
     (own,) = cause["fitted_on_validate"]
-    assert {one["file"]: one["values"][own] for one in cause["each_run"]} == pytest.approx(HIDDEN, abs=0.08)
+    assert {one["file"]: one["values"][own] for one in cause["each_run"]} == pytest.approx(
+        HIDDEN, abs=0.08
+    )
     for one in cause["each_run"]:
         if one["purpose"] == "train":
             low, high = one["ci95"][own]
@@ -65,7 +75,9 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
 
 
 @pytest.mark.parametrize(
-    "levels", [HIDDEN, pytest.param(dict.fromkeys(HIDDEN, 0.0), marks=pytest.mark.slow)], ids=["tared", "settled"]
+    "levels",
+    [HIDDEN, pytest.param(dict.fromkeys(HIDDEN, 0.0), marks=pytest.mark.slow)],
+    ids=["tared", "settled"],
 )
 def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     told = found(levels, rate=0.03)
@@ -76,7 +88,9 @@ def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     assert rate["ci95"][0] <= 0.03 <= rate["ci95"][1]
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(more, marks=pytest.mark.slow) for more in range(3, 20))])
+@pytest.mark.parametrize(
+    "seed", [2, *(pytest.param(more, marks=pytest.mark.slow) for more in range(3, 20))]
+)
 def test_of_a_sensor_that_is_right_nothing_is_named(seed):
     told = found(dict.fromkeys(HIDDEN, 0.0), seed=seed)
     assert told["status"] == "nothing_missing" and told["causes"] == []
@@ -97,12 +111,16 @@ def set_at_each_start(told):
     ("spoil", "offsets", "names"),
     [
         (misread, (1.1, -0.8), {"torque_offset", "torque_drift"}),
-        pytest.param(misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow),
+        pytest.param(
+            misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow
+        ),
         (zeroed, (0.07, -0.06), {"encoder_offset"}),
     ],
     ids=["tared", "validation run only", "zeroed"],
 )
-def test_of_two_runs_whose_zeros_differ_each_has_its_own_though_one_training_run_cannot_show_it(spoil, offsets, names):
+def test_of_two_runs_whose_zeros_differ_each_has_its_own_though_one_training_run_cannot_show_it(
+    spoil, offsets, names
+):
     told = two_runs(spoil, offsets)
     (cause,) = told["causes"]
     assert told["sought_on"] == "all"

@@ -15,14 +15,19 @@ RATE_HZ = 1000.0
 
 @pytest.fixture(scope="module")
 def fast():
-    """A motion between whose samples four more are put, on the lines that join them; noise is on the torque alone."""
+    """A motion between whose samples four more are put, on the lines that join them; noise is on
+    the torque alone."""
     slow = session(seconds=20.0)[3]
     time = np.arange(5 * len(slow)) / RATE_HZ
     at = {
-        name: np.column_stack([np.interp(time, slow.time, column) for column in getattr(slow, name).T])
+        name: np.column_stack(
+            [np.interp(time, slow.time, column) for column in getattr(slow, name).T]
+        )
         for name in ("q", "dq", "ddq")
     }
-    torque = np.repeat(slow.torque, 5, axis=0) + np.random.default_rng(0).normal(size=(len(time), 2))
+    torque = np.repeat(slow.torque, 5, axis=0) + np.random.default_rng(0).normal(
+        size=(len(time), 2)
+    )
     forces = np.repeat(slow.forces, 5, axis=0)
     blocks = {**slow.metadata["regression_filter"], "decimation": 25}
     return replace(

@@ -1,4 +1,5 @@
-"""A load behind a soft or loose transmission swings, and its mass has to be known: that of the fit beside it."""
+"""A load behind a soft or loose transmission swings, and its mass has to be known: that of the fit
+beside it."""
 
 from dataclasses import replace
 
@@ -21,7 +22,9 @@ def soft():
 
 
 def test_a_soft_spring_is_found_from_a_stiffer_one(soft):
-    start = soft.alone.fit(Candidate(JointElasticity("knee"), ((1.2 * SOFT, 0.0),) * len(soft.prepared.runs)))
+    start = soft.alone.fit(
+        Candidate(JointElasticity("knee"), ((1.2 * SOFT, 0.0),) * len(soft.prepared.runs))
+    )
     settled, _ = soft.alone.refined(start)
     assert settled.candidate.shapes[0][0] == pytest.approx(SOFT, rel=0.15)
     assert settled.gain_as_is > 1.5 * start.gain_as_is
@@ -38,7 +41,9 @@ def test_the_bodies_behind_a_soft_spring_come_to_rest(soft):
 
 
 def test_a_spring_at_the_other_joint_explains_nothing_with_any_bodies(soft):
-    start = soft.alone.fit(Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs)))
+    start = soft.alone.fit(
+        Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs))
+    )
     settled, _ = soft.alone.refined(start)
     assert settled.gain_as_is < 0.0
 
@@ -56,7 +61,9 @@ def test_a_spring_that_hardens_is_found_in_its_own_form(hardening):
     assert hardening[0] == pytest.approx(SOFT, rel=2.0 * JointElasticity.known_to)
 
 
-@pytest.mark.xfail(strict=True, reason="the damping added to the swing makes a soft spring come out 14 % too stiff")
+@pytest.mark.xfail(
+    strict=True, reason="the damping added to the swing makes a soft spring come out 14 % too stiff"
+)
 def test_a_spring_that_hardens_is_found_within_a_tenth(hardening):
     assert hardening[0] == pytest.approx(SOFT, rel=0.1)
 
@@ -80,8 +87,11 @@ def test_bodies_are_the_candidates_own(soft):
 
 
 def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds():
-    """With the baseline's, a quarter away, the fit explains more of the training runs and predicts others badly."""
-    prepared = Screening.of(session("joint_elasticity", "hip", stiffness=150.0, hardening=HARDENING)).prepared
+    """With the baseline's, a quarter away, the fit explains more of the training runs and predicts
+    others badly."""
+    prepared = Screening.of(
+        session("joint_elasticity", "hip", stiffness=150.0, hardening=HARDENING)
+    ).prepared
     baseline, runs = prepared.baseline, prepared.runs
     spring = Candidate(JointElasticity("hip"), ((180.0, 0.0),) * len(runs))
     made = Refinement(runs, baseline, prepared.weights)([spring])

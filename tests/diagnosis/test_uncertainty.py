@@ -17,7 +17,9 @@ NOISE = np.array([0.3, 0.2])
 
 def error_of_stiffness(seconds: float, imperfect: float) -> float:
     """Return the standard error of a spring at the knee after periods of 10 s, N·m/rad."""
-    motions = session("parallel_spring", "knee", seed=4, seconds=seconds, stiffness=10.0, rest_angle=-0.9)
+    motions = session(
+        "parallel_spring", "knee", seed=4, seconds=seconds, stiffness=10.0, rest_angle=-0.9
+    )
     runs = [observe(motion) for motion in motions if motion.purpose == "train"]
     baseline = baseline_of(runs)
     effect = ParallelSpring("knee", on=baseline.machine)
@@ -28,14 +30,21 @@ def error_of_stiffness(seconds: float, imperfect: float) -> float:
     return float(np.sqrt(known.covariance[place, place]))
 
 
-@pytest.mark.parametrize(("imperfect", "ratio"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 1.0)])
-def test_four_times_as_many_periods_halve_what_noise_leaves_in_doubt_and_no_misfit(imperfect, ratio):
-    assert error_of_stiffness(80.0, imperfect) / error_of_stiffness(20.0, imperfect) == pytest.approx(ratio, rel=0.2)
+@pytest.mark.parametrize(
+    ("imperfect", "ratio"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 1.0)]
+)
+def test_four_times_as_many_periods_halve_what_noise_leaves_in_doubt_and_no_misfit(
+    imperfect, ratio
+):
+    assert error_of_stiffness(80.0, imperfect) / error_of_stiffness(
+        20.0, imperfect
+    ) == pytest.approx(ratio, rel=0.2)
 
 
 @pytest.mark.parametrize("critical", [1.96, 2.6])
 def test_a_joint_region_includes_zero_95_times_in_100_where_the_truth_is_zero(critical):
-    """Two correlated amplitudes; few independent samples, a larger ``critical``, make it wider by as much."""
+    """Two correlated amplitudes; few independent samples, a larger ``critical``, make it wider by
+    as much."""
     covariance = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
     known = Uncertainty((1.96 / critical) ** 2 * covariance, critical, (), np.eye(3))
     values = np.random.default_rng(5).multivariate_normal(np.zeros(3), covariance, 2000)

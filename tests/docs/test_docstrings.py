@@ -1,4 +1,5 @@
-"""What every public name of pipelines says of itself: that it is there ruff sees to, here it is what must be in it."""
+"""What every public name of pipelines says of itself: that it is there ruff sees to, here it is
+what must be in it."""
 
 import inspect
 import re
@@ -19,7 +20,8 @@ RAISED = re.compile(r"^\s*raise (\w+)\(", flags=re.MULTILINE)
 
 
 def functions_of(module):
-    """Yield each public function and method that a module defines, with where it is, its doc and the class it is of."""
+    """Yield each public function and method that a module defines, with where it is, its doc and
+    the class it is of."""
     for name, value in vars(module).items():
         if name.startswith("_") or getattr(value, "__module__", None) != module.__name__:
             continue
@@ -29,7 +31,11 @@ def functions_of(module):
             for own, member in vars(value).items():
                 function = getattr(member, "fget", None) or getattr(member, "__func__", member)
                 if not own.startswith("_") and inspect.isfunction(function):
-                    docs = [inspect.getdoc(vars(base)[own]) or "" for base in value.__mro__ if own in vars(base)]
+                    docs = [
+                        inspect.getdoc(vars(base)[own]) or ""
+                        for base in value.__mro__
+                        if own in vars(base)
+                    ]
                     yield f"{module.__name__}.{name}.{own}", function, "\n".join(docs)
 
 
@@ -48,14 +54,22 @@ def test_what_takes_or_returns_arrays_tells_their_shape():
 
 
 def test_what_raises_an_error_tells_that_it_does():
-    raising = [(name, set(RAISED.findall(inspect.getsource(f))) & ERRORS, doc) for name, f, doc in EVERY]
+    raising = [
+        (name, set(RAISED.findall(inspect.getsource(f))) & ERRORS, doc) for name, f, doc in EVERY
+    ]
     raising = [(name, errors, doc) for name, errors, doc in raising if errors]
     assert len(raising) > 40
-    silent = [name for name, errors, doc in raising if not re.search("|".join(("[Rr]aise", "[Rr]efuse", *errors)), doc)]
+    silent = [
+        name
+        for name, errors, doc in raising
+        if not re.search("|".join(("[Rr]aise", "[Rr]efuse", *errors)), doc)
+    ]
     assert silent == []
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda estimator: estimator.name)
 def test_an_estimator_names_its_source(estimator):
     """Author and year; effects have a field for it, and a test of their own."""
-    assert re.search(r"[A-Z]\w+.*\b(19|20)\d\d\b", import_module(estimator.__module__).__doc__, flags=re.DOTALL)
+    assert re.search(
+        r"[A-Z]\w+.*\b(19|20)\d\d\b", import_module(estimator.__module__).__doc__, flags=re.DOTALL
+    )

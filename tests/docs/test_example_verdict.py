@@ -1,4 +1,5 @@
-"""What the pages show of a verdict is what ``exoid diagnose`` prints, put where a page asks for it."""
+"""What the pages show of a verdict is what ``exoid diagnose`` prints, put where a page asks for
+it."""
 
 import sys
 from pathlib import Path
@@ -20,7 +21,9 @@ def example(monkeypatch):
 def test_every_part_that_a_page_asks_for_is_there(example):
     for page in example.PAGES:
         asked = [
-            name for _, names, _ in example.MARK.findall(page.read_text(encoding="utf-8")) for name in names.split()
+            name
+            for _, names, _ in example.MARK.findall(page.read_text(encoding="utf-8"))
+            for name in names.split()
         ]
         assert asked
         assert set(asked) <= set(example.PARTS)
@@ -28,7 +31,9 @@ def test_every_part_that_a_page_asks_for_is_there(example):
 
 def test_parts_are_told_by_how_they_begin_and_long_sentences_are_broken(example):
     sentence = "Missing from the simulation: " + "a cause and " * 10
-    parts = example.paragraphs(f"{sentence.strip()}\n\nis anything missing?   probability\nnothing   0.00\n\nother\n")
+    parts = example.paragraphs(
+        f"{sentence.strip()}\n\nis anything missing?   probability\nnothing   0.00\n\nother\n"
+    )
     assert set(parts) == {"summary", "missing"}
     assert max(map(len, parts["summary"].splitlines())) <= 80
     assert parts["missing"] == "is anything missing?   probability\nnothing   0.00\n"

@@ -1,4 +1,5 @@
-"""The scripts of docs/examples run as they stand and find what they say; the notebook runs with the site."""
+"""The scripts of docs/examples run as they stand and find what they say; the notebook runs with the
+site."""
 
 import runpy
 from pathlib import Path

@@ -17,7 +17,8 @@ def signature_of(monkeypatch):
     from signatures import signature
 
     def of(name):
-        """Return what is left, the angle and the speed of the joint that the figure shows, where they are usable."""
+        """Return what is left, the angle and the speed of the joint that the figure shows, where
+        they are usable."""
         made = signature(effect_named(name))
         usable = made.regression.usable[:, made.joint]
         q, dq, _ = made.regression.state
@@ -48,4 +49,6 @@ def test_spasticity_is_a_ramp_beyond_a_speed_one_way_only(signature_of):
 
 def mean_in(bins, x, y):
     place = np.digitize(x, bins)
-    return np.array([y[place == k].mean() if np.sum(place == k) > 4 else np.nan for k in range(1, len(bins))])
+    return np.array(
+        [y[place == k].mean() if np.sum(place == k) > 4 else np.nan for k in range(1, len(bins))]
+    )

@@ -1,4 +1,5 @@
-"""The site of docs/ builds without a warning, holds every page, and asks no network for anything."""
+"""The site of docs/ builds without a warning, holds every page, and asks no network for
+anything."""
 
 import re
 import subprocess
@@ -15,11 +16,23 @@ DRAWN = "cogging"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """Return the site as `make docs` makes it, with the signature of one effect only: all of them take a minute."""
+    """Return the site as `make docs` makes it, with the signature of one effect only: all of them
+    take a minute."""
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going", "-c", DOCS / "site"]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "--quiet",
+        "--fail-on-warning",
+        "--keep-going",
+        "-c",
+        DOCS / "site",
+    ]
     drawn = ["-D", f"gallery_effects={DRAWN}", "-d", folder / "doctrees"]
-    done = subprocess.run([*command, *drawn, DOCS, folder / "html"], capture_output=True, text=True, cwd=ROOT)
+    done = subprocess.run(
+        [*command, *drawn, DOCS, folder / "html"], capture_output=True, text=True, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
     return folder / "html"
 

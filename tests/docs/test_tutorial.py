@@ -1,7 +1,9 @@
-"""docs/tutorial.md does what it says: every command of it runs, and the whole of it says what is printed there.
+"""docs/tutorial.md does what it says: every command of it runs, and the whole of it says what is
+printed there.
 
-A ``console`` block is a session: ``$ exoid ...`` is run, what follows is what it prints, ``...`` stands for anything. A
-``toml`` block that begins with ``# in FILE`` or ``# at the end of FILE`` is an edit of that file.
+A ``console`` block is a session: ``$ exoid ...`` is run, what follows is what it prints, ``...``
+stands for anything. A ``toml`` block that begins with ``# in FILE`` or ``# at the end of FILE`` is
+an edit of that file.
 """
 
 import re
@@ -51,7 +53,9 @@ class Edit:
         for line in self.text.splitlines():
             key, equals, _ = line.partition(" = ")
             if equals:
-                before, times = re.subn(rf"^{re.escape(key)} = .*$", line, before, flags=re.MULTILINE)
+                before, times = re.subn(
+                    rf"^{re.escape(key)} = .*$", line, before, flags=re.MULTILINE
+                )
                 assert times == 1, f"{self.file} has {times} lines with {key}"
         path.write_text(before, encoding="utf-8")
 
@@ -79,7 +83,9 @@ def do_all(exoid, monkeypatch, changes) -> Iterator[tuple[Command, str]]:
         if program == "cd":
             monkeypatch.chdir(Path(arguments[0]))
             continue
-        assert program == "exoid", f"the tutorial runs {program}, which a user on Windows may not have"
+        assert program == "exoid", (
+            f"the tutorial runs {program}, which a user on Windows may not have"
+        )
         outcome = exoid(*arguments)
         assert outcome.code == 0, f"{step.line}: {outcome.err}"
         if arguments[0] == "init":
@@ -111,12 +117,16 @@ def test_the_tutorial_prints_what_stands_in_it(exoid, monkeypatch, tmp_path):
 
 
 def alike(wanted: str, found: str) -> bool:
-    """Compare words as they are, numbers to 5 % and blanks not at all; ``...`` in the page stands for anything."""
-    numbers = [value(number) for word in wanted.split() if word != "..." for number in NUMBER.findall(word)]
+    """Compare words as they are, numbers to 5 % and blanks not at all; ``...`` in the page stands
+    for anything."""
+    numbers = [
+        value(number) for word in wanted.split() if word != "..." for number in NUMBER.findall(word)
+    ]
     pattern = r"\s*".join(r".*?" if word == "..." else pattern_of(word) for word in wanted.split())
     match = re.fullmatch(pattern, found.strip(), flags=re.DOTALL)
     return match is not None and all(
-        abs(value(x) - number) <= 0.05 * abs(number) + 0.02 for x, number in zip(match.groups(), numbers, strict=True)
+        abs(value(x) - number) <= 0.05 * abs(number) + 0.02
+        for x, number in zip(match.groups(), numbers, strict=True)
     )
 
 

@@ -33,7 +33,12 @@ def record(model: Model, seconds: float = 12.0) -> Motion:
     )
     a = assemble(model, GEOMETRY)
     drives = make_drives(
-        np.array([1500.0, 600.0]), np.array([120.0, 40.0]), np.array([200.0] * 2), np.zeros(2), 1000.0, RATE_HZ
+        np.array([1500.0, 600.0]),
+        np.array([120.0, 40.0]),
+        np.array([200.0] * 2),
+        np.zeros(2),
+        1000.0,
+        RATE_HZ,
     )
     angle, _, torque, _ = follow(a, drives, loop_at_rest(a, reference[0]), reference, 0.0)
     q = low_pass(angle, RATE_HZ, CUTOFF_HZ)

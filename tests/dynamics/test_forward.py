@@ -9,7 +9,17 @@ from numpy.testing import assert_allclose
 
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
-from pipelines.dynamics.forward import DQ, DTHETA, THETA, Q, memory_size, resting_state, stages, step, workspace
+from pipelines.dynamics.forward import (
+    DQ,
+    DTHETA,
+    THETA,
+    Q,
+    memory_size,
+    resting_state,
+    stages,
+    step,
+    workspace,
+)
 from pipelines.dynamics.mobility import masses
 from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
@@ -45,7 +55,16 @@ class Swing:
 
     def go(self, seconds):
         for _ in range(round(seconds / self.h)):
-            step(self.a, *self.scratch, self.t, self.h, self.state, self.memory, self.load, self.torque)
+            step(
+                self.a,
+                *self.scratch,
+                self.t,
+                self.h,
+                self.state,
+                self.memory,
+                self.load,
+                self.torque,
+            )
             self.t += self.h
         return self
 
@@ -76,7 +95,12 @@ def _slides(at, state, values, geometry, joint, out):
 
 
 def test_a_machine_of_three_joints_goes_as_far_as_newton_has_it():
-    mechanism = replace(LEG, kinds=("prismatic",) * 3, parameters=LEG.parameters[:1], reactions={"rigid_body": _slides})
+    mechanism = replace(
+        LEG,
+        kinds=("prismatic",) * 3,
+        parameters=LEG.parameters[:1],
+        reactions={"rigid_body": _slides},
+    )
     machine = Machine(mechanism, tuple(Joint(name, "prismatic") for name in "xyz"))
     a = assemble(Model((Term(RigidBody(on=machine), np.array([2.0])),)), GEOMETRY, machine.names)
     assert_allclose(masses(a)[0], np.broadcast_to(2.0 * COUPLED, (500, 3, 3)))
@@ -124,7 +148,13 @@ def test_the_step_converges_with_its_fourth_power():
 
 def test_a_stiff_spring_is_nearly_no_spring():
     rigid = Swing(BODY, *friction(1.0, 2.0), q=(0.8, -0.8)).go(0.5)
-    stiff = Swing(BODY, *friction(1.0, 2.0), Term(JointElasticity("knee"), np.array([1e5])), q=(0.8, -0.8), h=5e-5)
+    stiff = Swing(
+        BODY,
+        *friction(1.0, 2.0),
+        Term(JointElasticity("knee"), np.array([1e5])),
+        q=(0.8, -0.8),
+        h=5e-5,
+    )
     stiff.go(0.5)
     # The motor's inertia, which the rigid leg has not, slows the knee a little.
     assert_allclose(stiff.state[Q], rigid.state[Q], atol=0.05)
@@ -137,11 +167,14 @@ def test_a_spring_at_rest_twists_by_the_load_over_its_stiffness():
     swing = Swing(BODY, *friction(40.0, 1.0), spring, q=(0.3, -0.8)).go(8.0)
     twist = swing.state[THETA, 1] - swing.state[Q, 1]
     assert_allclose(swing.state[DTHETA], 0.0, atol=1e-6)
-    assert twist == pytest.approx(LEG.gravity_torque(swing.state[Q], X, GEOMETRY)[1] / 500.0, rel=1e-3)
+    assert twist == pytest.approx(
+        LEG.gravity_torque(swing.state[Q], X, GEOMETRY)[1] / 500.0, rel=1e-3
+    )
 
 
 def test_presliding_holds_like_a_spring_before_it_slides():
-    """Dahl: a small push bends the contact by travel x push / F to first order, and it stays there."""
+    """Dahl: a small push bends the contact by travel x push / F to first order, and it stays
+    there."""
     push, level, travel = 0.4, 4.0, 0.02
     dahl = Term(PreslidingHysteresis("knee"), np.array([level, travel]))
     hip_locked = Term(Friction("hip"), np.array([50.0, 0.0]))
@@ -155,5 +188,7 @@ def test_presliding_holds_like_a_spring_before_it_slides():
 
 def test_two_transmissions_at_one_joint_are_refused():
     spring = Term(JointElasticity("knee"), np.array([500.0]))
-    with pytest.raises(InputError, match="knee: joint_elasticity is a second transmission; a joint has one at most"):
+    with pytest.raises(
+        InputError, match="knee: joint_elasticity is a second transmission; a joint has one at most"
+    ):
         assemble(Model((BODY, spring, spring)), GEOMETRY)

@@ -29,7 +29,9 @@ def body(*more: Term, coulomb=0.0) -> Model:
 
 
 def controller(**changes) -> RbfController:
-    return RbfController(10.0, 200.0, 500.0, 0.0, 1e4, np.linspace(-1.5, 1.5, 7), 10.0)._replace(**changes)
+    return RbfController(10.0, 200.0, 500.0, 0.0, 1e4, np.linspace(-1.5, 1.5, 7), 10.0)._replace(
+        **changes
+    )
 
 
 def wave(t):
@@ -42,7 +44,9 @@ def follow(model: Model, c: RbfController, seconds=2.0, encoder=IDEAL, substeps=
     half_steps = np.arange(2 * round(seconds / PERIOD) * substeps + 1) * PERIOD / (2 * substeps)
     reference = np.array([wave(t) for t in half_steps])
     push = np.outer(push_nm * np.sin(2 * half_steps), [1, 1])
-    return follow_with_rbf(assemble(model, GEOMETRY), c, encoder, reference, push, PERIOD, np.zeros(2), substeps)
+    return follow_with_rbf(
+        assemble(model, GEOMETRY), c, encoder, reference, push, PERIOD, np.zeros(2), substeps
+    )
 
 
 def by_scipy(c: RbfController, seconds: float):
@@ -54,17 +58,25 @@ def by_scipy(c: RbfController, seconds: float):
         e, de = qd - q, dqd - dq
         r = de + c.error_gain * e
         inputs = np.stack([e, de, qd, dqd, ddqd], axis=1)
-        H = np.exp(-((inputs[:, np.newaxis] - c.nodes[:, np.newaxis]) ** 2).sum(axis=2) / c.width**2)
+        H = np.exp(
+            -((inputs[:, np.newaxis] - c.nodes[:, np.newaxis]) ** 2).sum(axis=2) / c.width**2
+        )
         return q, dq, r, H, (W * H).sum(axis=1) + c.feedback_gain * r
 
     def rates(t, state):
         q, dq, r, H, torque = parts(t, state)
-        rest = LEG.coriolis_matrix(q, dq, X, GEOMETRY) @ dq + LEG.gravity_torque(q, X, GEOMETRY) + 5.0 * dq
+        rest = (
+            LEG.coriolis_matrix(q, dq, X, GEOMETRY) @ dq
+            + LEG.gravity_torque(q, X, GEOMETRY)
+            + 5.0 * dq
+        )
         ddq = np.linalg.solve(LEG.mass_matrix(q, X, GEOMETRY), torque - 2 * np.sin(2 * t) - rest)
         return np.concatenate([dq, ddq, (c.adaptation_gain * H * r[:, np.newaxis]).ravel()])
 
     at = np.arange(round(seconds / PERIOD) + 1) * PERIOD
-    found = solve_ivp(rates, (0, at[-1]), np.zeros(4 + 2 * len(c.nodes)), "DOP853", at, rtol=1e-10, atol=1e-10)
+    found = solve_ivp(
+        rates, (0, at[-1]), np.zeros(4 + 2 * len(c.nodes)), "DOP853", at, rtol=1e-10, atol=1e-10
+    )
     return found.y.T, np.array([parts(t, y)[4] for t, y in zip(at, found.y.T, strict=True)])
 
 
@@ -133,7 +145,10 @@ def test_mobility_is_the_inverse_of_the_mass_where_joints_are_rigid():
 @pytest.mark.parametrize("substeps", [2, 4])
 def test_more_integration_steps_change_nothing_that_matters(substeps):
     rough = controller(robust_gain=0.3, limit=200.0)
-    once, often = follow(body(coulomb=3.0), rough), follow(body(coulomb=3.0), rough, substeps=substeps)
+    once, often = (
+        follow(body(coulomb=3.0), rough),
+        follow(body(coulomb=3.0), rough, substeps=substeps),
+    )
     assert_allclose(once.angle, often.angle, atol=2e-4)
 
 

@@ -34,7 +34,9 @@ def test_a_leg_five_per_cent_too_heavy_leaves_it_a_thousand_times_farther(leg, r
     ],
     ids=lambda x: getattr(x, "name", None),
 )
-def test_an_effect_that_the_leg_has_is_needed_to_stay_on_the_recording(leg, record, effect, values, largest_rmse):
+def test_an_effect_that_the_leg_has_is_needed_to_stay_on_the_recording(
+    leg, record, effect, values, largest_rmse
+):
     whole = Model((*leg.terms, Term(effect, np.array(values))))
     motion = record(whole)
     assert np.all(replay(whole, motion).rmse < largest_rmse)
@@ -61,7 +63,10 @@ def test_no_window_holds_a_gap_or_a_bad_sample(leg, recorded):
 
 
 def test_terms_of_another_kind_of_run_are_left_out(leg, recorded):
-    of_the_wearer = Term(RigidBody(run="with_human"), np.ones(4)), Term(Friction("hip", run="with_human"), np.ones(2))
+    of_the_wearer = (
+        Term(RigidBody(run="with_human"), np.ones(4)),
+        Term(Friction("hip", run="with_human"), np.ones(2)),
+    )
     more = Model((*leg.terms, *of_the_wearer))
     assert_allclose(replay(more, recorded).rmse, replay(leg, recorded).rmse)
 

@@ -1,4 +1,5 @@
-"""One plausible size of each effect: values of ``parameters`` by joint where they differ, for every test here."""
+"""One plausible size of each effect: values of ``parameters`` by joint where they differ, for every
+test here."""
 
 import numpy as np
 
@@ -59,4 +60,6 @@ def sized(effect, joint):
     return Term(bound, bound.values_from(np.array(sizes[effect.name])))
 
 
-TERMS = [sized(effect, joint) for effect in EFFECTS if effect.name in SIZES for joint in places(effect)]
+TERMS = [
+    sized(effect, joint) for effect in EFFECTS if effect.name in SIZES for joint in places(effect)
+]

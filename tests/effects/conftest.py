@@ -6,7 +6,8 @@ import pytest
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.motion import Motion
 
-# Three harmonics that move both joints both ways through most of their range, from no design program.
+# Three harmonics that move both joints both ways through most of their range, from no design
+# program.
 RICH = FourierTrajectory(
     omega=0.2 * np.pi,
     theta0=np.array([0.45, -0.93]),
@@ -17,7 +18,8 @@ RICH = FourierTrajectory(
 
 @pytest.fixture(scope="session")
 def with_human():
-    """One period with exact derivatives, under a torque that changes sign and from motors that warm."""
+    """One period with exact derivatives, under a torque that changes sign and from motors that
+    warm."""
     time = np.arange(0.0, 10.0, 0.005)
     q, dq, ddq = RICH.at(time)
     torque = 25.0 * np.sin(q) + 4.0 * ddq

@@ -76,13 +76,16 @@ def test_an_eccentricity_is_recovered_from_a_simulated_motion(with_human):
 
 
 def test_its_candidates_have_a_column_for_each_sine_and_cosine_which_add_up_to_it():
-    """Each column's amplitude times the error that the column was made with is the hidden error's part."""
+    """Each column's amplitude times the error that the column was made with is the hidden error's
+    part."""
     hidden = {"amplitude": 0.05, "phase": 0.4}
     look = Screening.of(session("encoder_eccentricity", "hip", seconds=20.0, **hidden))
     fits = look.fits(EncoderEccentricity("hip"))
     assert sorted(fitted.columns.shape[1] for fitted in fits) == [2, 4]
     once = next(fitted for fitted in fits if fitted.columns.shape[1] == 2)
-    assert_allclose(look.refined(once), [0.05 * np.cos(0.4), 0.05 * np.sin(0.4), 0.0, 0.0], atol=0.01)
+    assert_allclose(
+        look.refined(once), [0.05 * np.cos(0.4), 0.05 * np.sin(0.4), 0.0, 0.0], atol=0.01
+    )
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])

@@ -40,13 +40,17 @@ def test_every_effect_says_what_it_is_and_how_to_make_sure(effect):
     for parameter in effect().fitted + effect().parameters:
         assert parameter.name and parameter.unit and parameter.meaning and parameter.symbol
         assert parameter.typical[0] < parameter.typical[1]
-        assert parameter.default is None or parameter.default in (parameter.forms or (parameter.default,))
+        assert parameter.default is None or parameter.default in (
+            parameter.forms or (parameter.default,)
+        )
     defaults = [parameter.default is not None for parameter in effect().fitted]
     assert defaults == sorted(defaults), "values that may be left out come last"
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_every_effect_states_its_family_the_laws_that_contain_it_and_how_the_real_one_differs(effect):
+def test_every_effect_states_its_family_the_laws_that_contain_it_and_how_the_real_one_differs(
+    effect,
+):
     assert "family" in vars(effect) and isinstance(effect.family, Family)
     assert effect.resembles and set(effect.resembles) <= set(LAWS)
     assert len(set(effect.resembles)) == len(effect.resembles)
@@ -72,7 +76,11 @@ def test_an_effect_that_states_no_family_has_that_of_its_side(side, family, laws
 @every(TERMS)
 def test_torque_is_linear_in_the_linear_parameters(term, with_human):
     twice = np.append(2.0 * term.linear, term.shape)
-    assert_allclose(term.effect.torque(with_human, twice), 2.0 * term.effect.torque(with_human, term.values), atol=1e-9)
+    assert_allclose(
+        term.effect.torque(with_human, twice),
+        2.0 * term.effect.torque(with_human, term.values),
+        atol=1e-9,
+    )
     assert_allclose(
         term.effect.columns(with_human, term.shape) @ term.linear,
         term.effect.torque(with_human, term.values),
@@ -96,14 +104,21 @@ def test_a_dissipative_effect_never_feeds_energy_into_the_joint(term, with_human
 
 
 @every(
-    t for t in TERMS if t.effect.joint and (t.effect.side is not Side.STRUCTURE or t.effect.name == "parallel_spring")
+    t
+    for t in TERMS
+    if t.effect.joint
+    and (t.effect.side is not Side.STRUCTURE or t.effect.name == "parallel_spring")
 )
 def test_an_effect_at_a_joint_touches_no_other(term, with_human):
     other = 1 - with_human.joint_index(term.effect.joint)
     assert not term.effect.columns(with_human, term.shape)[:, other].any()
     torques = np.stack([with_human.torque, -with_human.torque], axis=2)
-    assert_allclose(term.effect.observed(torques, with_human, term.shape)[:, other], torques[:, other])
-    assert_allclose(term.effect.corrected(with_human, term.shape).q[:, other], with_human.q[:, other])
+    assert_allclose(
+        term.effect.observed(torques, with_human, term.shape)[:, other], torques[:, other]
+    )
+    assert_allclose(
+        term.effect.corrected(with_human, term.shape).q[:, other], with_human.q[:, other]
+    )
 
 
 @every(t for t in TERMS if t.effect.joint == "hip" and t.effect.inertial)
@@ -117,15 +132,20 @@ def test_a_human_effect_is_not_there_without_the_human(term, exo_alone, with_hum
     assert_allclose(model.torque(exo_alone), Model((BODY, *FRICTION)).torque(exo_alone))
     assert len(model.for_run("exo_alone").terms) == 3
     body = Term(RigidBody(run="with_human"), BODY.values)
-    changed = Model((body, *FRICTION, term)).torque(with_human) - Model((body, *FRICTION)).torque(with_human)
+    changed = Model((body, *FRICTION, term)).torque(with_human) - Model((body, *FRICTION)).torque(
+        with_human
+    )
     assert np.abs(changed).max() > 0.05
 
 
 @every(
-    t for t in TERMS if t.effect.reaction and not t.effect.states and t.effect.name not in ("rigid_body", "friction")
+    t
+    for t in TERMS
+    if t.effect.reaction and not t.effect.states and t.effect.name not in ("rigid_body", "friction")
 )
 def test_forward_dynamics_undo_inverse_dynamics(term, with_human):
-    """Columns and plant evaluate the same kernel: the predicted torque leads back to the acceleration."""
+    """Columns and plant evaluate the same kernel: the predicted torque leads back to the
+    acceleration."""
     model = Model((BODY, *FRICTION, term))
     torque, load = model.torque(with_human), with_human.transmitted[0]
     a, w = assemble(model, with_human.geometry), workspace(2)
@@ -134,7 +154,9 @@ def test_forward_dynamics_undo_inverse_dynamics(term, with_human):
         q, dq = with_human.q[k], with_human.dq[k]
         state = np.array([q, dq, q, dq])
         a.temperature[:] = with_human.motor_temperature[k]
-        accelerations(a, w, with_human.time[k], state, memory, np.sign(dq), load[k], torque[k], rates)
+        accelerations(
+            a, w, with_human.time[k], state, memory, np.sign(dq), load[k], torque[k], rates
+        )
         assert_allclose(rates[[DQ, DTHETA]], [with_human.ddq[k]] * 2, atol=1e-8)
 
 
@@ -155,7 +177,8 @@ def test_what_the_drives_delivered_can_be_told_from_what_was_measured(term, with
     true, measured = body.torque(with_human), model.torque(with_human)
     assert np.abs(measured - true)[50:].max() > 0.2
     found = model.delivered(replace(with_human, torque=measured))
-    # At the very end a late channel has not yet told what was delivered; sgn steps it draws out over a sample.
+    # At the very end a late channel has not yet told what was delivered; sgn steps it draws out
+    # over a sample.
     close = np.abs(found - true) < 0.02
     assert close[:-10].mean() > 0.99
 
@@ -175,7 +198,9 @@ def test_values_left_out_have_their_defaults(with_human):
     (term,) = (t for t in TERMS if t.effect.label == "stribeck_friction@knee")
     short = Term(term.effect, term.values[:2])
     assert_allclose(short.values, [*term.values[:2], 2.0])
-    assert_allclose(term.effect.columns(with_human, (0.15,)), term.effect.columns(with_human, (0.15, 2.0)))
+    assert_allclose(
+        term.effect.columns(with_human, (0.15,)), term.effect.columns(with_human, (0.15, 2.0))
+    )
 
 
 def test_sensors_act_on_what_comes_before_them_and_not_on_the_measured_torque(with_human):
@@ -188,7 +213,12 @@ def test_sensors_act_on_what_comes_before_them_and_not_on_the_measured_torque(wi
 
 def test_a_columns_place_in_the_regressor_is_its_terms(with_human):
     by_name = {t.effect.label: t for t in TERMS}
-    terms = (by_name["torque_offset@hip"], BODY, by_name["torque_gain@knee"], by_name["parallel_spring@knee"])
+    terms = (
+        by_name["torque_offset@hip"],
+        BODY,
+        by_name["torque_gain@knee"],
+        by_name["parallel_spring@knee"],
+    )
     model = Model(terms)
     names = [parameter.name for _, parameter in model.linear_parameters]
     regressor = model.regressor(with_human)
@@ -212,12 +242,17 @@ def test_a_delay_starts_anew_after_a_gap(with_human):
 
 
 def test_a_mass_across_the_axis_is_one_along_it_a_right_angle_ahead(with_human):
-    """The shank with moments X3 along and Y3 across is a shank with moment R along, turned by atan(Y3 / X3)."""
+    """The shank with moments X3 along and Y3 across is a shank with moment R along, turned by
+    atan(Y3 / X3)."""
     across = next(t.effect for t in TERMS if t.effect.label == "mass_off_axis@knee")
     X3, Y3 = 1.5, 0.4
     turn = np.arctan2(Y3, X3)
-    found = Model((Term(RigidBody(), np.array([0, 0, X3, 0.0])), Term(across, np.array([Y3])))).torque(with_human)
-    turned = with_human.with_state(with_human.q + np.array([0.0, turn]), with_human.dq, with_human.ddq)
+    found = Model(
+        (Term(RigidBody(), np.array([0, 0, X3, 0.0])), Term(across, np.array([Y3])))
+    ).torque(with_human)
+    turned = with_human.with_state(
+        with_human.q + np.array([0.0, turn]), with_human.dq, with_human.ddq
+    )
     expected = Model((Term(RigidBody(), np.array([0, 0, np.hypot(X3, Y3), 0.0])),)).torque(turned)
     assert_allclose(found, expected, atol=1e-12)
 
@@ -227,7 +262,9 @@ def test_a_payload_is_a_point_mass(with_human):
     payload = next(t.effect for t in TERMS if t.effect.label == "payload_change@knee")
     m, r, L = 0.9, 0.25, with_human.geometry.thigh_length_m
     X = np.array([m * (L**2 + r**2), m * r**2, m * r, m * L])
-    found = Term(payload, np.array([m * r, 5.0, r])).effect.torque(with_human, np.array([m * r, 5.0, r]))
+    found = Term(payload, np.array([m * r, 5.0, r])).effect.torque(
+        with_human, np.array([m * r, 5.0, r])
+    )
     late = with_human.time >= 5.0
     assert not found[~late].any()
     assert_allclose(found[late], RigidBody().torque(with_human, X)[late], atol=1e-12)
@@ -240,6 +277,10 @@ def test_how_to_make_sure_of_it_is_told_in_no_unit_of_one_kind_and_size_of_machi
 
 def test_of_a_spring_where_gravity_is_out_a_level_is_asked_for_and_nothing_laid_on_its_side():
     """An axis that leans lets gravity do nearly what a spring does."""
-    turntable, pendulum = (machine_of([Joint("axis")], Geometry(gravity_m_s2=g)) for g in (0.0, 9.81))
-    assert ParallelSpring("axis", on=turntable).confirm.startswith("put a spirit level on the axis first")
+    turntable, pendulum = (
+        machine_of([Joint("axis")], Geometry(gravity_m_s2=g)) for g in (0.0, 9.81)
+    )
+    assert ParallelSpring("axis", on=turntable).confirm.startswith(
+        "put a spirit level on the axis first"
+    )
     assert ParallelSpring("axis", on=pendulum).confirm == ParallelSpring.confirm

@@ -22,14 +22,17 @@ LISTED = "from pipelines.model import BY_NAME; print(list(BY_NAME)[-1], len(BY_N
 
 @pytest.fixture
 def python_with(tmp_path):
-    """Run Python with a package installed whose entry point is ``cables.tendon_slack:TendonSlack``."""
+    """Run Python with a package installed whose entry point is
+    ``cables.tendon_slack:TendonSlack``."""
 
     def run(module, *arguments):
         (tmp_path / "cables").mkdir()
         (tmp_path / "cables" / "tendon_slack.py").write_text(module, encoding="utf-8")
         installed = tmp_path / "cables-1.0.dist-info"
         installed.mkdir()
-        (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: cables\nVersion: 1.0\n", encoding="utf-8")
+        (installed / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: cables\nVersion: 1.0\n", encoding="utf-8"
+        )
         entry = "[exoid.effects]\n" + ENTRY.replace('"', "") + "\n"
         (installed / "entry_points.txt").write_text(entry, encoding="utf-8")
         path = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
@@ -57,7 +60,9 @@ def test_an_effect_of_another_package_is_one_of_exoids(python_with):
 def test_a_broken_effect_is_one_line_that_names_its_package(python_with, module, message):
     done = python_with(module, "from exoid_cli.app import run; sys.exit(run(['effects']))")
     assert done.returncode == 2
-    assert done.stderr.startswith("exoid: effect tendon_slack (cables.tendon_slack:TendonSlack) of package cables")
+    assert done.stderr.startswith(
+        "exoid: effect tendon_slack (cables.tendon_slack:TendonSlack) of package cables"
+    )
     assert message in done.stderr
     assert "uninstall cables" in done.stderr
     assert done.stderr.count("\n") == 1

@@ -19,7 +19,8 @@ def rows(term, run=None):
     names = [parameter.name for parameter in effect.parameters]
     given = {"effect": effect.name, "joint": effect.joint, "run": run}
     return [
-        given | {"name": name, "value": value} for name, value in zip(names, effect.physical(term.values), strict=True)
+        given | {"name": name, "value": value}
+        for name, value in zip(names, effect.physical(term.values), strict=True)
     ]
 
 
@@ -36,7 +37,9 @@ def test_a_model_survives_its_file(term, with_human):
     written = Model((body, term))
     if term.effect.at_cuff:
         # Machine and limb move apart, so each has its own body.
-        written = Model((Term(RigidBody(), MACHINE), Term(RigidBody(run="with_human"), PERSON), term))
+        written = Model(
+            (Term(RigidBody(), MACHINE), Term(RigidBody(run="with_human"), PERSON), term)
+        )
     read = model_from_parameters(table(term), "with_human")
     assert_allclose(read.torque(with_human), written.torque(with_human), atol=1e-9)
 
@@ -45,7 +48,8 @@ def test_a_parameter_too_few_is_refused_with_the_names_that_belong_there():
     (spring,) = (t for t in TERMS if t.effect.label == "parallel_spring@knee")
     frame = table(spring)
     with pytest.raises(
-        InputError, match="parallel_spring@knee has values stiffness, expected stiffness, rest_angle; correct them"
+        InputError,
+        match="parallel_spring@knee has values stiffness, expected stiffness, rest_angle; correct them",
     ):
         model_from_parameters(frame[frame["name"] != "rest_angle"], "with_human")
 
@@ -53,5 +57,7 @@ def test_a_parameter_too_few_is_refused_with_the_names_that_belong_there():
 def test_a_mistyped_parameter_is_told_what_it_may_be():
     (spring,) = (t for t in TERMS if t.effect.label == "parallel_spring@knee")
     frame = table(spring).replace({"name": {"stiffness": "stifness"}})
-    with pytest.raises(InputError, match=r"has values stifness, rest_angle, expected .*; did you mean stiffness\?"):
+    with pytest.raises(
+        InputError, match=r"has values stifness, rest_angle, expected .*; did you mean stiffness\?"
+    ):
         model_from_parameters(frame, "with_human")

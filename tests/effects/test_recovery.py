@@ -25,10 +25,15 @@ from pipelines.settings.plant import CuffSettings, PlantSettings, TemperatureSet
 from tests.effects.catalogue import TERMS
 from tests.effects.conftest import RICH
 
-IDEAL = PlantSettings(ripple_nm=(0.0, 0.0), counts_per_turn=(0.0, 0.0), cuff=CuffSettings(noise_n=0.0))
-WARMING = IDEAL.model_copy(update={"temperature": TemperatureSettings(heating_c_nm2=0.05, time_constant_s=5.0)})
+IDEAL = PlantSettings(
+    ripple_nm=(0.0, 0.0), counts_per_turn=(0.0, 0.0), cuff=CuffSettings(noise_n=0.0)
+)
+WARMING = IDEAL.model_copy(
+    update={"temperature": TemperatureSettings(heating_c_nm2=0.05, time_constant_s=5.0)}
+)
 FRICTION = tuple(
-    Term(Friction(joint), np.array([IDEAL.coulomb_nm[j], IDEAL.viscous_nm_s_rad[j]])) for j, joint in enumerate(JOINTS)
+    Term(Friction(joint), np.array([IDEAL.coulomb_nm[j], IDEAL.viscous_nm_s_rad[j]]))
+    for j, joint in enumerate(JOINTS)
 )
 MACHINE = Term(RigidBody(), np.array(IDEAL.exo_inertial))
 PERSON = Term(RigidBody(run="with_human"), np.array(IDEAL.human_inertial))
@@ -51,7 +56,8 @@ def scored(motion, model):
 
 
 def fitted(motion, *terms):
-    """Return the linear values that fit best, and the RMSE that they leave, N·m over both joints."""
+    """Return the linear values that fit best, and the RMSE that they leave, N·m over both
+    joints."""
     regressor, torque = scored(motion, Model(terms))
     A, b = regressor.reshape(-1, regressor.shape[2]), torque.reshape(-1)
     values = np.linalg.lstsq(A, b)[0]
@@ -69,7 +75,8 @@ BEGIN = LEAD_S + 0.5 / IDEAL.sample_rate_hz
 
 
 def since_the_recording_began(term):
-    """Return the terms as the recording has them, whose clock starts in the middle of its first sample.
+    """Return the terms as the recording has them, whose clock starts in the middle of its first
+    sample.
 
     The plant's runs from rest: a gain that drifts is no longer 1 when the recording begins.
     """
@@ -82,7 +89,9 @@ def since_the_recording_began(term):
         values[1] += BEGIN * values[0]
     if effect.name == "voluntary_torque":
         amplitude, frequency, phase, bias = effect.physical(values)
-        values = effect.values_from(np.array([amplitude, frequency, phase + 2 * np.pi * frequency * BEGIN, bias]))
+        values = effect.values_from(
+            np.array([amplitude, frequency, phase + 2 * np.pi * frequency * BEGIN, bias])
+        )
     if effect.name == "gain_drift":
         at_first = 1.0 + values[0] * BEGIN
         values[0] /= at_first
@@ -90,7 +99,9 @@ def since_the_recording_began(term):
     return (Term(effect, values),)
 
 
-HIDDEN = [t for t in TERMS if t.effect.name not in ("rigid_body", "friction") and t.effect.spring is None]
+HIDDEN = [
+    t for t in TERMS if t.effect.name not in ("rigid_body", "friction") and t.effect.spring is None
+]
 
 
 @pytest.mark.parametrize("hidden", HIDDEN, ids=lambda term: term.effect.label)
@@ -126,9 +137,13 @@ def test_play_is_seen_through_away_from_where_the_load_changes_sign():
     motion = moved("with_human", Term(hidden.effect, np.array([0.01])))
     motion = replace(motion, load=Model((MACHINE, PERSON)).torque(motion))
     terms = (MACHINE, PERSON, *FRICTION, rotor)
-    near = np.convolve(np.abs(motion.load[:, 0]) < 5.0 * CROSSING_TORQUE, np.ones(61), mode="same") > 0
+    near = (
+        np.convolve(np.abs(motion.load[:, 0]) < 5.0 * CROSSING_TORQUE, np.ones(61), mode="same") > 0
+    )
     motion = replace(motion, valid=motion.valid & ~near)
-    assert misfit(motion, *terms, Term(hidden.effect, np.array([0.01]))) < 0.3 * misfit(motion, *terms)
+    assert misfit(motion, *terms, Term(hidden.effect, np.array([0.01]))) < 0.3 * misfit(
+        motion, *terms
+    )
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -147,7 +162,8 @@ def test_a_stiff_cuff_is_no_cuff():
     rigid = moved("with_human")
     stiff = moved("with_human", Term(BY_LABEL["cuff_compliance@knee"].effect, np.array([2e4])))
     inside = rigid.valid & stiff.valid
-    # The machine's own small inertia beside the cuff, which the rigid leg has not, is all that is left.
+    # The machine's own small inertia beside the cuff, which the rigid leg has not, is all that is
+    # left.
     assert_allclose(stiff.q[inside], rigid.q[inside], atol=1e-3)
     assert np.sqrt(np.mean((stiff.torque - rigid.torque)[inside] ** 2)) < 0.15
 

@@ -18,7 +18,13 @@ def test_the_pages_are_up_to_date():
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_a_page_says_all_about_an_effect(effect):
     page = pages()[f"{effect.name}.md"]
-    for told in (effect.equation, effect.looks_like, effect.confirm, effect.source, effect.side.value):
+    for told in (
+        effect.equation,
+        effect.looks_like,
+        effect.confirm,
+        effect.source,
+        effect.side.value,
+    ):
         assert told in page
     assert effect.forms_differ in page and f"**Family:** {effect.family.value};" in page
     for parameter in effect().parameters:

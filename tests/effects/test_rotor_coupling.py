@@ -23,7 +23,8 @@ def drive(t):
 
 
 def by_hand(t, state):
-    """Lagrange's equations of two links and the rotor's (dq1 + N dq2)², solved for the accelerations."""
+    """Lagrange's equations of two links and the rotor's (dq1 + N dq2)², solved for the
+    accelerations."""
     (q1, q2), (v1, v2) = state[:2], state[2:]
     bend, h = X3 * LENGTH * np.cos(q2), X3 * LENGTH * np.sin(q2)
     links = np.array([[X1 + 2 * bend, X2 + bend], [X2 + bend, X2]])
@@ -40,7 +41,12 @@ def model(own_inertia, coupling, body=(X1 + ROTOR, X2, X3, X4)):
 
 def simulated(of, seconds=2.0, h=2e-4):
     a = assemble(of, Geometry(LENGTH, GRAVITY))
-    w, s, state, load = workspace(2), stages(2, 0), resting_state(np.array([0.6, -0.9])), np.zeros(2)
+    w, s, state, load = (
+        workspace(2),
+        stages(2, 0),
+        resting_state(np.array([0.6, -0.9])),
+        np.zeros(2),
+    )
     for i in range(round(seconds / h)):
         step(a, w, s, i * h, h, state, np.zeros(0), load, drive((i + 0.5) * h))
     return np.concatenate([state[Q], state[DQ]])

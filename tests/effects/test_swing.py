@@ -7,7 +7,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.dynamics.assembly import assemble
-from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
+from pipelines.dynamics.forward import (
+    DTHETA,
+    THETA,
+    Q,
+    accelerations,
+    resting_state,
+    stages,
+    step,
+    workspace,
+)
 from pipelines.effects.backlash import SHAFT_STIFFNESS, STRIKING_RATIO, Backlash
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.joint_elasticity import JointElasticity
@@ -26,7 +35,9 @@ def swung(stiffness, torque, inertia, ratio=0.0, h=0.005):
     """Return the twist of a constant inertia on an elastic joint's spring."""
     twist, zero = np.empty(len(torque)), np.zeros(len(torque))
     spring = address(JointElasticity("hip").spring)
-    swing_along(spring, np.array([stiffness]), ratio, 0.02, h, torque, zero + inertia, zero, zero, twist)
+    swing_along(
+        spring, np.array([stiffness]), ratio, 0.02, h, torque, zero + inertia, zero, zero, twist
+    )
     return twist
 
 
@@ -44,11 +55,14 @@ def test_a_load_let_go_swings_at_the_root_of_stiffness_over_inertia(stiffness, i
 def test_a_slow_load_is_followed_at_once_by_any_spring():
     torque = 20.0 * np.cos(0.5 * np.arange(0.0, 10.0, 0.005))
     for stiffness in (300.0, 1e4, 1e7, 1e10):
-        assert_allclose(swung(stiffness, torque, 0.5), torque / stiffness, atol=0.02 * 20.0 / stiffness)
+        assert_allclose(
+            swung(stiffness, torque, 0.5), torque / stiffness, atol=0.02 * 20.0 / stiffness
+        )
 
 
 def test_a_load_that_a_fit_has_made_of_nothing_does_not_run_away():
-    """Gravity that pushes up harder than the spring holds: undisturbed it would be beyond any number in seconds."""
+    """Gravity that pushes up harder than the spring holds: undisturbed it would be beyond any
+    number in seconds."""
     twist, ones = np.empty(20_000), np.ones(20_000)
     spring = address(JointElasticity("hip").spring)
     swing_along(spring, np.array([100.0]), 0.0, 0.02, 0.005, ones, -ones, -ones, -1e4 * ones, twist)
@@ -60,14 +74,17 @@ def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
     steady, wrong = np.full(1000, 5.0), np.full(1000, 5.0)
     wrong[:20] = 25.0
     left = [
-        np.abs(swung(500.0, wrong, 1.0, ratio) - swung(500.0, steady, 1.0, ratio))[800:].max() for ratio in (0, 0.1)
+        np.abs(swung(500.0, wrong, 1.0, ratio) - swung(500.0, steady, 1.0, ratio))[800:].max()
+        for ratio in (0, 0.1)
     ]
     assert left[1] < 0.01 * left[0]
 
 
 @pytest.mark.parametrize("effect", [JointElasticity, CuffCompliance])
 @pytest.mark.parametrize("joint", JOINTS)
-def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(with_human, effect, joint):
+def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(
+    with_human, effect, joint
+):
     bound, stiffness = effect(joint), 1500.0
     errors = []
     # Gravity would pull the twisted link a little further, at any speed.
@@ -79,21 +96,31 @@ def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(w
         rotor = rotor_among_links(motion, joint) if effect is JointElasticity else 0.0
         load = Model((Term(RigidBody(), X - [rotor, 0.0, 0.0, 0.0]),)).torque(motion)
         swing = bound.corrected(motion, (stiffness,)).q
-        at_once = bound.corrected(replace(motion, body=None, limb_body=None, load=load, limb_load=load), (stiffness,)).q
+        at_once = bound.corrected(
+            replace(motion, body=None, limb_body=None, load=load, limb_load=load), (stiffness,)
+        ).q
         inside = slice(200, -200)
-        errors.append(np.abs(swing - at_once)[inside].max() / np.abs(at_once - motion.q)[inside].max())
+        errors.append(
+            np.abs(swing - at_once)[inside].max() / np.abs(at_once - motion.q)[inside].max()
+        )
     assert errors[1] < 0.3 * errors[0]
     assert errors[1] < 0.05
 
 
 @pytest.mark.parametrize(
     ("effect", "shape", "ratio", "error"),
-    [(JointElasticity, (300.0, 0.0), 0.0, 0.05), (Backlash, (0.02, SHAFT_STIFFNESS), STRIKING_RATIO, 0.3)],
+    [
+        (JointElasticity, (300.0, 0.0), 0.0, 0.05),
+        (Backlash, (0.02, SHAFT_STIFFNESS), STRIKING_RATIO, 0.3),
+    ],
     ids=["spring", "play"],
 )
 @pytest.mark.parametrize("joint", JOINTS)
-def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(joint, effect, shape, ratio, error):
-    """Both from the same torque: one integrates motor and link, one the link behind the motor's motion."""
+def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(
+    joint, effect, shape, ratio, error
+):
+    """Both from the same torque: one integrates motor and link, one the link behind the motor's
+    motion."""
     bound = effect(joint)
     model = Model((Term(RigidBody(), X), Term(bound, np.array(shape))))
     states, ddtheta = simulated(model, seconds=6.0)
@@ -115,23 +142,40 @@ def test_what_turns_with_the_motor_does_not_hang_on_the_spring(rotor):
     """A body that holds a rotor, the rotor taken off, swings as the body without it."""
     t = np.arange(0.0, 5.0, 0.005)
     q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
-    dq, ddq = np.gradient(q, 0.005, axis=0), np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0)
+    dq, ddq = (
+        np.gradient(q, 0.005, axis=0),
+        np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0),
+    )
     n, with_rotor = len(t), X + np.array([rotor, 0.0, 0.0, 0.0])
-    motion = Motion(t, q, dq, ddq, np.zeros((n, 2)), np.zeros(n, np.int64), np.ones(n, bool), body=X)
+    motion = Motion(
+        t, q, dq, ddq, np.zeros((n, 2)), np.zeros(n, np.int64), np.ones(n, bool), body=X
+    )
     direction = np.tile([1.0, 0.0], (n, 1))
-    swung_alone = behind_spring(motion, motion.link_swing, direction, JointElasticity("hip"), (400.0, 0.0))
+    swung_alone = behind_spring(
+        motion, motion.link_swing, direction, JointElasticity("hip"), (400.0, 0.0)
+    )
     holding = replace(motion, body=with_rotor)
-    less = behind_spring(holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0), 0.0, rotor)
+    less = behind_spring(
+        holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0), 0.0, rotor
+    )
     assert_allclose(less.q, swung_alone.q, atol=1e-12)
     if rotor:
-        more = behind_spring(holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0))
+        more = behind_spring(
+            holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0)
+        )
         assert np.abs(more.q - swung_alone.q).max() > 1e-3
 
 
 def simulated(model, seconds):
-    """Swing a leg that hangs at rest: states (n, 4, 2) and the motors' accelerations (n, 2), every 5 ms."""
+    """Swing a leg that hangs at rest: states (n, 4, 2) and the motors' accelerations (n, 2), every
+    5 ms."""
     a, w, s = assemble(model, Geometry()), workspace(2), stages(2, 0)
-    state, memory, load, rates = resting_state(np.zeros(2)), np.zeros(0), np.zeros(2), np.zeros((4, 2))
+    state, memory, load, rates = (
+        resting_state(np.zeros(2)),
+        np.zeros(0),
+        np.zeros(2),
+        np.zeros((4, 2)),
+    )
     states, accelerated = [], []
     for i in range(round(seconds / 2.5e-4)):
         t = 2.5e-4 * i
@@ -146,11 +190,17 @@ def simulated(model, seconds):
 
 @pytest.mark.parametrize("with_load", [False, True])
 @pytest.mark.parametrize("before", [None, "link_swing", "limb_swing", "on_limb", "transmitted"])
-def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(before, with_load):
-    """The load of a body is that along the corrected motion, whoever asked for the measured one's first."""
+def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(
+    before, with_load
+):
+    """The load of a body is that along the corrected motion, whoever asked for the measured one's
+    first."""
     t = np.arange(0.0, 5.0, 0.005)
     q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
-    dq, ddq = np.gradient(q, 0.005, axis=0), np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0)
+    dq, ddq = (
+        np.gradient(q, 0.005, axis=0),
+        np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0),
+    )
     n = len(t)
     measured = Motion(
         t, q, dq, ddq, np.sin(np.column_stack([t, t])), np.zeros(n, np.int64), np.ones(n, bool), body=X, limb_body=X,
@@ -166,4 +216,6 @@ def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured
         lambda motion: motion.limb_swing.on_coordinate(direction),
         lambda motion: motion.on_limb, lambda motion: motion.transmitted,
     ):  # fmt: skip
-        assert all((found == expected).all() for found, expected in zip(of(moved), of(alone), strict=True))
+        assert all(
+            (found == expected).all() for found, expected in zip(of(moved), of(alone), strict=True)
+        )

@@ -127,7 +127,9 @@ def test_a_gain_that_follows_the_temperature_is_recovered_across_runs(warm_and_c
     ]
     look = Screening.of(motions)
     by_temperature = next(
-        fitted for fitted in look.fits(GainDrift("knee")) if fitted.candidate.directions == ((0.0, 0.0, 0.002),)
+        fitted
+        for fitted in look.fits(GainDrift("knee"))
+        if fitted.candidate.directions == ((0.0, 0.0, 0.002),)
     )
     assert_allclose(look.refined(by_temperature), [0.0, 0.0, 0.004], atol=0.001)
 

@@ -1,6 +1,8 @@
-"""A pendulum under its drive, which shares no code with exoid: sessions for the statistics of estimators.
+"""A pendulum under its drive, which shares no code with exoid: sessions for the statistics of
+estimators.
 
-A sampled PD loop at 800 Hz acts on noisy angles, dry friction sticks, the torque sensor has coloured noise and strays.
+A sampled PD loop at 800 Hz acts on noisy angles, dry friction sticks, the torque sensor has
+coloured noise and strays.
 """
 
 from dataclasses import dataclass
@@ -26,7 +28,8 @@ KP, KD, RATE_HZ, TICKS, STEPS = 60.0, 8.0, 200.0, 4, 6
 
 @njit(cache=True)
 def _move(angle, speed, reference, noise, inertia, moment, coulomb, viscous, kp, kd, steps, h):
-    """Semi-implicit Euler; a joint that friction can hold is held. Returns angle read and torque of each tick."""
+    """Semi-implicit Euler; a joint that friction can hold is held. Returns angle read and torque of
+    each tick."""
     n = len(reference)
     read, torque = np.empty(n), np.empty(n)
     last = angle
@@ -60,7 +63,8 @@ class Disturbed:
 def reference(time):
     """A rich motion, from no design program."""
     return 0.5 + sum(
-        a * np.sin(w * time + p) for a, w, p in ((0.5, 1.26, 0.3), (0.3, 3.1, 1.1), (0.12, 7.5, 2.0), (0.05, 13.0, 0.7))
+        a * np.sin(w * time + p)
+        for a, w, p in ((0.5, 1.26, 0.3), (0.3, 3.1, 1.1), (0.12, 7.5, 2.0), (0.05, 13.0, 0.7))
     )
 
 
@@ -78,7 +82,11 @@ def motion(disturbed, seed, seconds=20.0, purpose="train"):
     rho = np.exp(-1.0 / (RATE_HZ * disturbed.correlation_s))
     coloured = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal(len(mean) + 100))[100:]
     # A strike pushes the way the joint moves: what is symmetric would leave least squares unbiased.
-    struck = (rng.random(len(mean)) < disturbed.outliers) * disturbed.strike_nm * np.sign(np.gradient(angle))
+    struck = (
+        (rng.random(len(mean)) < disturbed.outliers)
+        * disturbed.strike_nm
+        * np.sign(np.gradient(angle))
+    )
     frame = pd.DataFrame(
         {
             "time_s": np.arange(len(mean)) / RATE_HZ,
@@ -88,7 +96,13 @@ def motion(disturbed, seed, seconds=20.0, purpose="train"):
         }
     )
     controller = {
-        "joint": {"type": "pd", "kp_nm_rad": KP, "kd_nm_s_rad": KD, "rate_hz": RATE_HZ * TICKS, "limit_nm": 200.0}
+        "joint": {
+            "type": "pd",
+            "kp_nm_rad": KP,
+            "kd_nm_s_rad": KD,
+            "rate_hz": RATE_HZ * TICKS,
+            "limit_nm": 200.0,
+        }
     }
     metadata = {
         "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ, "controller": controller,
@@ -101,4 +115,6 @@ def problem(*runs):
     """Return the fit of rigid body and friction to some runs."""
     model = Model.of(baseline(runs[0].machine, ["exo_alone"]))
     columns = len(model.linear_parameters)
-    return Problem(Training(tuple(runs), model), ("exo_alone",), np.arange(columns), np.zeros(columns))
+    return Problem(
+        Training(tuple(runs), model), ("exo_alone",), np.arange(columns), np.zeros(columns)
+    )

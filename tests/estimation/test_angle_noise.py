@@ -39,7 +39,10 @@ def tables():
 
 @pytest.fixture(scope="module")
 def shaken(tables):
-    return [replace(motion_from_table(table), file=f"run_{number}.parquet") for number, table in enumerate(tables)]
+    return [
+        replace(motion_from_table(table), file=f"run_{number}.parquet")
+        for number, table in enumerate(tables)
+    ]
 
 
 def trained(motions):
@@ -52,7 +55,11 @@ def test_accelerations_that_take_no_torque_are_noise(shaken):
 
 @pytest.mark.parametrize(
     ("effect", "values"),
-    [(None, {}), ("joint_elasticity", {"stiffness": 150.0, "hardening": 0.0}), ("backlash", {"play": 0.03})],
+    [
+        (None, {}),
+        ("joint_elasticity", {"stiffness": 150.0, "hardening": 0.0}),
+        ("backlash", {"play": 0.03}),
+    ],
 )
 def test_the_motion_of_a_leg_takes_torque_however_it_rings(effect, values):
     assert not is_loud(trained(session(effect, "knee", **values)))

@@ -23,7 +23,9 @@ def summed_lag_by_lag(stretches, lag):
 @pytest.mark.parametrize("lag", [0, 1, 7, 60])
 def test_running_sums_are_the_sum_lag_by_lag_whatever_the_pieces(lag, piece):
     rng = np.random.default_rng(5)
-    stretches = [lfilter([1], [1, -0.8], rng.standard_normal((n, 3)), axis=0) for n in (200, 1, 30, 500)]
+    stretches = [
+        lfilter([1], [1, -0.8], rng.standard_normal((n, 3)), axis=0) for n in (200, 1, 30, 500)
+    ]
 
     def in_pieces():
         for name, x in enumerate(stretches):
@@ -47,7 +49,9 @@ def test_the_variance_of_a_sum_of_correlated_numbers_is_met(rho):
     n = 2000
     found = []
     for _ in range(60):
-        noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal(n + 200))[200:, np.newaxis]
+        noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal(n + 200))[
+            200:, np.newaxis
+        ]
         found.append(long_run_covariance([noise], 1)[0].item())
     assert np.mean(found) == pytest.approx(n * (1 + rho) / (1 - rho), rel=0.12)
 
@@ -65,11 +69,16 @@ def test_a_gap_is_not_bridged():
 def test_the_critical_value_grows_with_the_share_of_the_lag():
     rng = np.random.default_rng(1)
     slow = lfilter([1], [1, -0.95], rng.standard_normal(400))[:, np.newaxis]
-    assert long_run_covariance([slow], 1)[1] > long_run_covariance([rng.standard_normal((400, 1))], 1)[1] >= 1.96
+    assert (
+        long_run_covariance([slow], 1)[1]
+        > long_run_covariance([rng.standard_normal((400, 1))], 1)[1]
+        >= 1.96
+    )
 
 
 def test_a_parameter_in_another_unit_changes_no_lag():
-    """One slow score among fast ones: in rad or in degrees, the covariance is the same thing in other units."""
+    """One slow score among fast ones: in rad or in degrees, the covariance is the same thing in
+    other units."""
     rng = np.random.default_rng(3)
     fast, slow = (lfilter([1], [1, -rho], rng.standard_normal(4000)) for rho in (0.1, 0.95))
     scores, scale = np.column_stack([fast, slow]), np.array([100.0, 0.01])

@@ -23,9 +23,13 @@ L1 = Geometry().thigh_length_m
 
 
 def swing(X, friction=(2.0, 3.0, 2.0, 3.0), kind="exo_alone", purpose="train", seed=0):
-    """A motion of 20 s whose torque is that of parameters that need not be realizable, with white noise."""
+    """A motion of 20 s whose torque is that of parameters that need not be realizable, with white
+    noise."""
     t = np.arange(4000) / 200.0
-    waves = [(0.35, 1.3, 0.0, 0.7), (0.15, 3.1, 1.0, 0.0)], [(0.4, 1.9, 1.0, -0.9), (0.2, 4.3, 0.3, 0.0)]
+    waves = (
+        [(0.35, 1.3, 0.0, 0.7), (0.15, 3.1, 1.0, 0.0)],
+        [(0.4, 1.9, 1.0, -0.9), (0.2, 4.3, 0.3, 0.0)],
+    )
     q, dq, ddq = (
         np.column_stack([sum(f(*wave) for wave in joint) for joint in waves])
         for f in (
@@ -34,8 +38,21 @@ def swing(X, friction=(2.0, 3.0, 2.0, 3.0), kind="exo_alone", purpose="train", s
             lambda a, w, p, mean: -a * w**2 * np.sin(w * t + p),
         )
     )
-    ones, noise = np.ones(len(t), dtype=bool), np.random.default_rng(seed).normal(0.0, [0.5, 0.3], q.shape)
-    bare = Motion(t, q, dq, ddq, np.zeros_like(q), np.zeros(len(t), dtype=np.int64), ones, run=kind, purpose=purpose)
+    ones, noise = (
+        np.ones(len(t), dtype=bool),
+        np.random.default_rng(seed).normal(0.0, [0.5, 0.3], q.shape),
+    )
+    bare = Motion(
+        t,
+        q,
+        dq,
+        ddq,
+        np.zeros_like(q),
+        np.zeros(len(t), dtype=np.int64),
+        ones,
+        run=kind,
+        purpose=purpose,
+    )
     ks, km = np.array(friction).reshape(2, 2).T
     torque = LEG.regressor(q, dq, ddq, bare.geometry) @ X + ks * np.sign(dq) + km * dq + noise
     return replace(bare, torque=torque, file=f"{kind}_{purpose}.parquet")
@@ -59,15 +76,23 @@ UNREAL = {
 
 
 @pytest.mark.parametrize(("X", "friction"), UNREAL.values(), ids=UNREAL)
-def test_the_realizable_fit_of_unreal_data_is_the_nearest_on_the_boundary_by_brute_force(X, friction):
+def test_the_realizable_fit_of_unreal_data_is_the_nearest_on_the_boundary_by_brute_force(
+    X, friction
+):
     problem = problem_of(swing(X, friction))
     free, fit = WeightedLeastSquares().fit(problem), Realizable().fit(problem)
     assert LEG.unrealizable(free.values[:4], Geometry()) or free.values[5] < 0.0
     assert not LEG.unrealizable(fit.values[:4], Geometry())
     assert np.all(fit.values[4:] > -1e-6)
-    on_boundary = [slack(fit.values) / np.trace(np.diag(fit.values[:2])) ** 2, np.min(fit.values[4:])]
+    on_boundary = [
+        slack(fit.values) / np.trace(np.diag(fit.values[:2])) ** 2,
+        np.min(fit.values[4:]),
+    ]
     assert min(np.abs(on_boundary)) < 1e-5
-    assert fit.told["constrained"] and "least squares alone finds no machine that can exist" in fit.remarks[0]
+    assert (
+        fit.told["constrained"]
+        and "least squares alone finds no machine that can exist" in fit.remarks[0]
+    )
 
     def rise(values):
         away = values - free.values
@@ -75,16 +100,31 @@ def test_the_realizable_fit_of_unreal_data_is_the_nearest_on_the_boundary_by_bru
 
     best = rise(fit.values)
     assert best > 1.0
-    # Brute force: realizable values all around, then the best of many searches that know no convexity.
+    # Brute force: realizable values all around, then the best of many searches that know no
+    # convexity.
     rng, size = np.random.default_rng(0), np.sqrt(np.diag(free.sensitivity))
     for scale in 10.0 ** np.linspace(-4.0, 1.0, 2000):
         trial = fit.values + scale * size * rng.standard_normal(8)
         if not LEG.unrealizable(trial[:4], Geometry()) and np.all(trial[4:] >= 0.0):
-            assert rise(trial) > best * (1.0 - 1e-4), "no nearer than what the margin of the boundary makes"
-    conditions = [{"type": "ineq", "fun": f} for f in (slack, lambda v: v[1], lambda v: v[0] - v[1], lambda v: v[4:])]
+            assert rise(trial) > best * (1.0 - 1e-4), (
+                "no nearer than what the margin of the boundary makes"
+            )
+    conditions = [
+        {"type": "ineq", "fun": f}
+        for f in (slack, lambda v: v[1], lambda v: v[0] - v[1], lambda v: v[4:])
+    ]
     searched = [
-        minimize(lambda v: rise(v) / best, start, constraints=conditions, method="SLSQP", options={"maxiter": 500})
-        for start in ([1.0, 0.3, 0.4, 2.0, 2.0, 3.0, 2.0, 3.0], [3.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 1.0])
+        minimize(
+            lambda v: rise(v) / best,
+            start,
+            constraints=conditions,
+            method="SLSQP",
+            options={"maxiter": 500},
+        )
+        for start in (
+            [1.0, 0.3, 0.4, 2.0, 2.0, 3.0, 2.0, 3.0],
+            [3.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 1.0],
+        )
     ]
     assert min(found.fun for found in searched if found.success) == pytest.approx(1.0, rel=1e-3)
 
@@ -97,7 +137,8 @@ def test_a_fit_that_can_exist_is_left_as_it_is():
 
 
 def test_the_wearer_is_made_realizable_too():
-    """With the human the whole is real, but less than the machine alone: the difference is nobody's leg."""
+    """With the human the whole is real, but less than the machine alone: the difference is nobody's
+    leg."""
     exo, whole = np.array([1.0, 0.22, 0.55, 2.3]), np.array([0.8, 0.18, 0.45, 2.6])
     runs = [
         swing(X, kind=kind, purpose=purpose, seed=seed)
@@ -127,9 +168,14 @@ def test_intervals_cover_a_truth_on_the_boundary():
     assert np.mean(inside) > 0.93
 
 
-@pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda m: f"{m.name}-{m.kinds[0]}-{m.has_gravity}")
+@pytest.mark.parametrize(
+    "mechanism", MECHANISMS, ids=lambda m: f"{m.name}-{m.kinds[0]}-{m.has_gravity}"
+)
 def test_the_inertia_form_is_definite_exactly_where_the_mass_matrix_is(mechanism):
-    rng, geometry = np.random.default_rng(1), Geometry(gravity_m_s2=0.0 if mechanism.has_gravity is False else 9.8)
+    rng, geometry = (
+        np.random.default_rng(1),
+        Geometry(gravity_m_s2=0.0 if mechanism.has_gravity is False else 9.8),
+    )
     forms = mechanism.inertia_forms(geometry)
     agreed = 0
     for _ in range(100):

@@ -13,9 +13,13 @@ from pipelines.estimation.estimators import ESTIMATORS, estimator_named
 from tests.estimators import leg, pendulum, real
 
 parser = argparse.ArgumentParser(prog="python -m tests.estimators", description=__doc__)
-parser.add_argument("--sessions", type=int, default=40, help="simulated sessions of the pendulum, of each kind")
+parser.add_argument(
+    "--sessions", type=int, default=40, help="simulated sessions of the pendulum, of each kind"
+)
 parser.add_argument("--legs", type=int, default=4, help="simulated sessions of MuJoCo's leg")
-parser.add_argument("--parts", nargs="+", default=["pendulum", "leg", "real"], choices=["pendulum", "leg", "real"])
+parser.add_argument(
+    "--parts", nargs="+", default=["pendulum", "leg", "real"], choices=["pendulum", "leg", "real"]
+)
 names = [estimator.name for estimator in ESTIMATORS]
 parser.add_argument("--methods", nargs="+", default=names, choices=names)
 chosen = parser.parse_args()

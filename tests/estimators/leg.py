@@ -35,7 +35,9 @@ def _rows(methods: Sequence[Estimator], sessions: list[Session]) -> Iterator[tup
         for number, session in enumerate(sessions):
             runs = Path(folder) / str(number)
             write(session, runs, Path(folder) / f"{number}.json")
-            recorded.append((read_motions(sorted(runs.iterdir()), FilterSettings(), Geometry()), truth(session)))
+            recorded.append(
+                (read_motions(sorted(runs.iterdir()), FilterSettings(), Geometry()), truth(session))
+            )
     for estimator in methods:
         begun, off, inside, left = time.process_time(), [], [], []
         for motions, true in recorded:
@@ -60,7 +62,8 @@ def _rows(methods: Sequence[Estimator], sessions: list[Session]) -> Iterator[tup
 def truth(session: Session) -> np.ndarray:
     """Return true values in the order of the rows of ``parameters/1``."""
     exo, whole = (
-        np.array(session.rig.leg(Run(kind, "train", 0.0, None)).inertial()) for kind in ("exo_alone", "with_human")
+        np.array(session.rig.leg(Run(kind, "train", 0.0, None)).inertial())
+        for kind in ("exo_alone", "with_human")
     )
     machine = session.rig.machine
     rotor = np.array([machine.hip_rotor, 0.0, 0.0, 0.0])  # turns with the thigh: a part of X1

@@ -22,17 +22,25 @@ def show(methods: Sequence[Estimator], sessions: int) -> None:
     """Print a table for each way."""
     for name, disturbed in SPOILT.items():
         headings = ("method", *(f"{n}, bias % ± scatter" for n in NAMES), "covered", "s")
-        table(f"**{name}**, {sessions} sessions of 20 s", headings, _rows(methods, disturbed, sessions))
+        table(
+            f"**{name}**, {sessions} sessions of 20 s",
+            headings,
+            _rows(methods, disturbed, sessions),
+        )
 
 
-def _rows(methods: Sequence[Estimator], disturbed: Disturbed, sessions: int) -> Iterator[tuple[str, ...]]:
+def _rows(
+    methods: Sequence[Estimator], disturbed: Disturbed, sessions: int
+) -> Iterator[tuple[str, ...]]:
     problems = [problem(motion(disturbed, seed)) for seed in range(1000, 1000 + sessions)]
     for estimator in methods:
         begun, values, inside = time.process_time(), [], []
         for one in problems:
             found = estimated(estimator.fit(one))
             values.append(found.values / TRUTH)
-            inside.append(np.abs(found.values - TRUTH) <= found.critical * np.sqrt(np.diag(found.covariance)))
+            inside.append(
+                np.abs(found.values - TRUTH) <= found.critical * np.sqrt(np.diag(found.covariance))
+            )
         bias, scatter = 100.0 * (np.mean(values, axis=0) - 1.0), 100.0 * np.std(values, axis=0)
         seconds = (time.process_time() - begun) / sessions
         yield (

@@ -23,7 +23,9 @@ MACHINES = {
     "double pendulum A0": ("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"),
 }
 # Of the benchmark's authors: volts for metres and for metres a second, times 35.1507 N/V.
-CONTROLLERS = {"axis": {"type": "pd", "kp_n_m": 35.1507 * 160.18 * 243.45, "kd_n_s_m": 35.1507 * 243.45}}
+CONTROLLERS = {
+    "axis": {"type": "pd", "kp_n_m": 35.1507 * 160.18 * 243.45, "kd_n_s_m": 35.1507 * 243.45}
+}
 FOLDER = real_data_folder()
 
 
@@ -35,14 +37,34 @@ def show(methods: Sequence[Estimator]) -> None:
     for name, (pattern, map_name) in MACHINES.items():
         with tempfile.TemporaryDirectory() as folder:
             files = sorted(str(file) for file in FOLDER.glob(pattern))
-            run(["--quiet", "import", *files, "--map", str(datasets() / "maps" / map_name), "-o", folder])
-            motions = read_motions(sorted(Path(folder).glob("*.parquet")), FilterSettings(), Geometry())
-        motions = [replace(motion, metadata={**motion.metadata, "controller": CONTROLLERS}) for motion in motions]
+            run(
+                [
+                    "--quiet",
+                    "import",
+                    *files,
+                    "--map",
+                    str(datasets() / "maps" / map_name),
+                    "-o",
+                    folder,
+                ]
+            )
+            motions = read_motions(
+                sorted(Path(folder).glob("*.parquet")), FilterSettings(), Geometry()
+            )
+        motions = [
+            replace(motion, metadata={**motion.metadata, "controller": CONTROLLERS})
+            for motion in motions
+        ]
         names = identify(motions).parameters
         symbols = [
-            f"{row.joint} {row.symbol}" if isinstance(row.joint, str) else row.symbol for row in names.itertuples()
+            f"{row.joint} {row.symbol}" if isinstance(row.joint, str) else row.symbol
+            for row in names.itertuples()
         ]
-        table(f"**{name}**", ("method", *symbols, "100 e/τ on the run not fitted", "s"), _rows(methods, motions))
+        table(
+            f"**{name}**",
+            ("method", *symbols, "100 e/τ on the run not fitted", "s"),
+            _rows(methods, motions),
+        )
 
 
 def _rows(methods: Sequence[Estimator], motions: list[Motion]) -> Iterator[tuple[str, ...]]:

@@ -20,13 +20,17 @@ def states() -> States:
     n = 200
     speed = random.uniform(0.3, 2.5, (n, 2)) * random.choice([-1.0, 1.0], (n, 2))
     return States(
-        random.uniform(0.0, 20.0, n), random.uniform(-1.5, 1.5, (n, 2)), speed, random.uniform(-8.0, 8.0, (n, 2))
+        random.uniform(0.0, 20.0, n),
+        random.uniform(-1.5, 1.5, (n, 2)),
+        speed,
+        random.uniform(-8.0, 8.0, (n, 2)),
     )
 
 
 @pytest.fixture(scope="session")
 def compiled(tmp_path_factory):
-    """Compile exported C as strictly as gcc can; returns a function that makes a library of models by stem."""
+    """Compile exported C as strictly as gcc can; returns a function that makes a library of models
+    by stem."""
     if not shutil.which("gcc"):
         pytest.skip("gcc is not installed; `apt-get install gcc libc6-dev` brings it")
 
@@ -56,7 +60,8 @@ def compiled(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def in_octave(tmp_path_factory):
-    """Return what exported functions give in Octave at given instants, by stem: tau, M, C, G and so on."""
+    """Return what exported functions give in Octave at given instants, by stem: tau, M, C, G and so
+    on."""
     if not shutil.which("octave-cli"):
         pytest.skip("Octave is not installed; `apt-get install octave` brings it")
 

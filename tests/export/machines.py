@@ -42,7 +42,8 @@ def named(label):
 
 
 def frame_of(terms, run, joints=("hip", "knee")):
-    """Return the rows of ``parameters/1``; the catalogue's hip and knee go by the names of ``joints``."""
+    """Return the rows of ``parameters/1``; the catalogue's hip and knee go by the names of
+    ``joints``."""
     called = dict(zip(("hip", "knee"), joints, strict=True))
     rows = [
         {
@@ -77,7 +78,8 @@ def machine(*terms, run="with_human", joints=("hip", "knee")):
 
 
 def torque(made, states, *, measured=False, memory=0.3):
-    """Return what exoid's own kernels say the drives must deliver, (n, J) N·m: each term, one instant at a time.
+    """Return what exoid's own kernels say the drives must deliver, (n, J) N·m: each term, one
+    instant at a time.
 
     ``measured`` asks for what the torque channels say instead. Memories hold ``memory``.
     """
@@ -85,7 +87,8 @@ def torque(made, states, *, measured=False, memory=0.3):
     terms = [
         t
         for t in made.model
-        if not any(getattr(t.effect, what) for what in untold) and (t.effect.reading is None or shift_of(t) is not None)
+        if not any(getattr(t.effect, what) for what in untold)
+        and (t.effect.reading is None or shift_of(t) is not None)
     ]
     names = [joint.name for joint in made.joints]
     on_links = [t for t in terms if t.effect.side in (Side.STRUCTURE, Side.HUMAN)]
@@ -100,18 +103,27 @@ def torque(made, states, *, measured=False, memory=0.3):
             state = np.full(term.effect.states, memory)
             for k in range(len(states.t)):
                 at = Instant(
-                    states.t[k], angle[k], states.dq[k], states.ddq[k], np.sign(states.dq[k]), load[k], load[k]
+                    states.t[k],
+                    angle[k],
+                    states.dq[k],
+                    states.ddq[k],
+                    np.sign(states.dq[k]),
+                    load[k],
+                    load[k],
                 )
                 term.effect.reaction(at, state, term.values, made.geometry.array(), joint, tau[k])
     for term in (t for t in terms if measured and t.effect.torque_reading is not None):
         for k in range(len(states.t)):
             joint = names.index(term.effect.joint)
-            term.effect.torque_reading(states.t[k], tau[k], term.values, joint, np.zeros(0), np.zeros(2))
+            term.effect.torque_reading(
+                states.t[k], tau[k], term.values, joint, np.zeros(0), np.zeros(2)
+            )
     return tau
 
 
 def at_joints(terms, states, names, *, sensors):
-    """Return the angles behind encoders, or behind a tilted base, as the effects' own corrections give them."""
+    """Return the angles behind encoders, or behind a tilted base, as the effects' own corrections
+    give them."""
     n = len(states.t)
     motion = Motion(
         states.t, states.q, states.dq, states.ddq, np.zeros_like(states.q), np.arange(n), np.ones(n, dtype=bool),
@@ -124,7 +136,8 @@ def at_joints(terms, states, names, *, sensors):
 
 
 def acceleration(made, states, drive, twist=None):
-    """Return how exoid's own forward dynamics accelerates the motors, (n, J) rad/s², from encoders' angles."""
+    """Return how exoid's own forward dynamics accelerates the motors, (n, J) rad/s², from encoders'
+    angles."""
     a = assemble(made.model, made.geometry, [joint.name for joint in made.joints])
     w, rates = workspace(a.joints), np.zeros((4, a.joints))
     true = states.q - made.shift()
@@ -133,7 +146,9 @@ def acceleration(made, states, drive, twist=None):
     still = np.zeros(a.joints)
     for k in range(len(states.t)):
         state = np.array([true[k] - twist[k], states.dq[k], true[k], states.dq[k]])
-        accelerations(a, w, states.t[k], state, np.zeros(0), np.sign(states.dq[k]), still, drive[k], rates)
+        accelerations(
+            a, w, states.t[k], state, np.zeros(0), np.sign(states.dq[k]), still, drive[k], rates
+        )
         found[k] = rates
     return found[:, DTHETA], found[:, 1]
 

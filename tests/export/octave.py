@@ -36,7 +36,9 @@ def computed(folder: Path, stems, states, memory) -> dict[str, dict[str, np.ndar
     J = states.q.shape[1]
     rows = np.column_stack([states.t, states.q, states.dq, states.ddq])
     np.savetxt(folder / "states.csv", rows, fmt="%.17g", delimiter=",")
-    (folder / "run_all.m").write_text(SCRIPT.format(names=", ".join(f"'{s}'" for s in stems), memory=memory, J=J))
+    (folder / "run_all.m").write_text(
+        SCRIPT.format(names=", ".join(f"'{s}'" for s in stems), memory=memory, J=J)
+    )
     command = ["octave-cli", "--no-init-file", "--quiet", "run_all.m"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr

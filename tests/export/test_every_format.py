@@ -30,7 +30,9 @@ def causes_of(effect):
 
 
 @pytest.mark.parametrize("format", FORMATS, ids=lambda format: format.name)
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.name in SIZES], ids=lambda effect: effect.name)
+@pytest.mark.parametrize(
+    "effect", [e for e in EFFECTS if e.name in SIZES], ids=lambda effect: effect.name
+)
 def test_every_effect_is_held_or_listed_with_its_parameters(effect, format):
     for term in causes_of(effect) or [LEG[0]]:
         made = machine(*LEG, *([term] if term is not LEG[0] else []))
@@ -38,7 +40,9 @@ def test_every_effect_is_held_or_listed_with_its_parameters(effect, format):
         text = "\n".join(format.write(made, "leg").values())
         assert holding.how
         if format is JSON or holding.degree is not Degree.EXACT:
-            for parameter, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True):
+            for parameter, value in zip(
+                term.effect.parameters, term.effect.physical(term.values), strict=True
+            ):
                 assert parameter.name in text
                 assert f"{value:.9g}"[:6] in text
         if format is not JSON:
@@ -53,7 +57,10 @@ def test_a_format_that_holds_an_effect_shows_it():
         made = machine(*LEG, term)
         for format in FORMATS:
             held = format.holding(term).degree is not Degree.NOT
-            assert (bare(format, made) != plain[format.name]) == held, (format.name, term.effect.label)
+            assert (bare(format, made) != plain[format.name]) == held, (
+                format.name,
+                term.effect.label,
+            )
 
 
 def bare(format, made):
@@ -67,13 +74,17 @@ def test_no_joint_name_breaks_the_c_or_changes_what_it_computes(joints, compiled
     cause = named("parallel_spring@knee")
     library = compiled({"leg": machine(*LEG, cause, joints=joints)})
     np.testing.assert_array_equal(
-        in_c(library, "leg", states)[0], in_c(compiled({"leg": machine(*LEG, cause)}), "leg", states)[0]
+        in_c(library, "leg", states)[0],
+        in_c(compiled({"leg": machine(*LEG, cause)}), "leg", states)[0],
     )
 
 
 def test_no_joint_name_breaks_the_matlab_or_changes_what_it_computes(in_octave, states):
     few = type(states)(*(part[:3] for part in (states.t, states.q, states.dq, states.ddq)))
-    models = {f"leg{i}": machine(*LEG, named("parallel_spring@knee"), joints=j) for i, j in enumerate(HOSTILE)}
+    models = {
+        f"leg{i}": machine(*LEG, named("parallel_spring@knee"), joints=j)
+        for i, j in enumerate(HOSTILE)
+    }
     expected = torque(models["leg0"], few)
     for found in in_octave(models, few).values():
         np.testing.assert_allclose(found["tau"], expected, rtol=1e-12)
@@ -90,7 +101,9 @@ def test_no_joint_name_breaks_the_xml(joints, format):
         mujoco = pytest.importorskip("mujoco")
         assert mujoco.MjModel.from_xml_string(format.write(made, "leg")[".xml"]).nv == 2
     else:
-        pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed; `make install` brings it")
+        pinocchio = pytest.importorskip(
+            "pinocchio", reason="pinocchio is not installed; `make install` brings it"
+        )
         assert pinocchio.buildModelFromXML(format.write(made, "leg")[".urdf"]).nv == 2
 
 
@@ -105,19 +118,33 @@ def test_what_acts_in_other_runs_is_listed_as_absent():
     frame = frame_of([*LEG, named("passive_joint_torque@knee")], "exo_alone")
     made = exported(type(table_of(*LEG))(frame, table_of(*LEG).metadata | {"covariance": None}))
     ((term, holding),) = made.absent
-    assert term.effect.label == "passive_joint_torque@knee" and holding.how == "it does not act in exo_alone runs"
-    assert "passive_joint_torque@knee: left out (it does not act in exo_alone runs)" in C.write(made, "leg")[".c"]
+    assert (
+        term.effect.label == "passive_joint_torque@knee"
+        and holding.how == "it does not act in exo_alone runs"
+    )
+    assert (
+        "passive_joint_torque@knee: left out (it does not act in exo_alone runs)"
+        in C.write(made, "leg")[".c"]
+    )
 
 
 def test_the_wearer_alone_has_no_drives():
-    rows = table_of(*LEG, named("passive_joint_torque@knee"), named("encoder_offset@hip"), run="human")
+    rows = table_of(
+        *LEG, named("passive_joint_torque@knee"), named("encoder_offset@hip"), run="human"
+    )
     made = exported(rows, "human")
     assert [term.effect.label for term in made.terms] == ["rigid_body", "passive_joint_torque@knee"]
-    assert {t.effect.label for t, _ in made.absent} == {"friction@hip", "friction@knee", "encoder_offset@hip"}
+    assert {t.effect.label for t, _ in made.absent} == {
+        "friction@hip",
+        "friction@knee",
+        "encoder_offset@hip",
+    }
 
 
 def test_an_unknown_run_is_refused_with_those_there_are():
-    with pytest.raises(InputError, match=r"holds no rigid body for run 'human', only for with_human; set --run"):
+    with pytest.raises(
+        InputError, match=r"holds no rigid body for run 'human', only for with_human; set --run"
+    ):
         exported(table_of(*LEG), "human")
 
 
@@ -125,14 +152,20 @@ def test_an_unknown_run_is_refused_with_those_there_are():
 def test_a_joint_that_the_machine_does_not_have_is_refused_with_those_it_has(joint):
     table = table_of(*LEG)
     table.frame.loc[table.frame["joint"] == "knee", "joint"] = joint
-    with pytest.raises(InputError, match=rf"friction has the joint {joint or 'none'}, expected hip or knee; correct"):
+    with pytest.raises(
+        InputError,
+        match=rf"friction has the joint {joint or 'none'}, expected hip or knee; correct",
+    ):
         exported(table)
 
 
 def test_two_transmissions_of_one_joint_are_listed_though_no_simulation_holds_both():
     made = machine(*LEG, named("backlash@knee"), named("joint_elasticity@knee"))
     degrees = {term.effect.label: holding.degree for term, holding in made.holdings(MJCF)}
-    assert (degrees["backlash@knee"], degrees["joint_elasticity@knee"]) == (Degree.NOT, Degree.EXACT)
+    assert (degrees["backlash@knee"], degrees["joint_elasticity@knee"]) == (
+        Degree.NOT,
+        Degree.EXACT,
+    )
     assert {holding.degree for _, holding in made.holdings(JSON)} == {Degree.EXACT}
 
 
@@ -144,9 +177,12 @@ def test_a_leg_that_cannot_be_is_refused_with_the_reason():
 
 @pytest.mark.parametrize("format", FORMATS, ids=lambda format: format.name)
 def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format):
-    """A negative half of it is no other program's to run into unseen, and takes no sound half along."""
+    """A negative half of it is no other program's to run into unseen, and takes no sound half
+    along."""
     made = machine(
-        LEG[0], replace(LEG[1], values=np.array([2.5, -0.4])), replace(LEG[2], values=np.array([-0.3, -0.1]))
+        LEG[0],
+        replace(LEG[1], values=np.array([2.5, -0.4])),
+        replace(LEG[2], values=np.array([-0.3, -0.1])),
     )
     warned = made.driving()
     assert [sentence.partition(" is negative")[0] for sentence in warned] == [
@@ -158,7 +194,10 @@ def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format
     assert ("WARNING: friction@hip: viscous = -0.4" in text) == (format is not JSON)
     degrees = {term.effect.label: holding.degree for term, holding in made.holdings(format)}
     if format in (MJCF, URDF):
-        assert (degrees["friction@hip"], degrees["friction@knee"]) == (Degree.APPROXIMATE, Degree.NOT)
+        assert (degrees["friction@hip"], degrees["friction@knee"]) == (
+            Degree.APPROXIMATE,
+            Degree.NOT,
+        )
         hip = r'frictionloss="2\.5"' if format is MJCF else r'damping="0(\.0)?" friction="2\.5"'
         assert len(re.findall(hip, text)) == 1
 
@@ -167,8 +206,12 @@ def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format
 def test_a_mechanism_without_known_bodies_is_refused_in_a_line(format):
     """As of a mechanism that another file brings; equations can be written of it all the same."""
     known = machine(*LEG)
-    other = replace(known, machine=replace(known.machine, mechanism=replace(known.machine.mechanism, title="a crane")))
+    other = replace(
+        known,
+        machine=replace(known.machine, mechanism=replace(known.machine.mechanism, title="a crane")),
+    )
     with pytest.raises(
-        InputError, match=r"leg \(a crane\) has no bodies .* export to c, matlab or json, which need no bodies"
+        InputError,
+        match=r"leg \(a crane\) has no bodies .* export to c, matlab or json, which need no bodies",
     ):
         format.write(other, "crane")

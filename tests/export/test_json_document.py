@@ -13,7 +13,9 @@ from tests.export.machines import CAUSES, LEG, machine, together, torque
 from tests.export.machines import table_of as table
 
 
-@pytest.mark.parametrize("term", [None, *CAUSES], ids=lambda term: term.effect.label if term else "bare")
+@pytest.mark.parametrize(
+    "term", [None, *CAUSES], ids=lambda term: term.effect.label if term else "bare"
+)
 def test_torque_from_the_document_is_that_of_the_model(term, states):
     made = machine(*LEG, *([term] if term else []))
     said = json.loads(JSON.write(made, "leg")[".json"])
@@ -24,7 +26,9 @@ def test_torque_from_the_document_is_that_of_the_model(term, states):
         model=model_from_parameters(pd.DataFrame(said["parameters"]), said["run"], made.machine),
         geometry=Geometry(**said["geometry"]),
     )
-    np.testing.assert_array_equal(torque(read, states, measured=True), torque(made, states, measured=True))
+    np.testing.assert_array_equal(
+        torque(read, states, measured=True), torque(made, states, measured=True)
+    )
     for mine, theirs in zip(made.model, read.model, strict=True):
         np.testing.assert_array_equal(mine.values, theirs.values)
 

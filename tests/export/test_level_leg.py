@@ -1,4 +1,5 @@
-"""A planar arm, in every format: a leg whose links lie, about axes that stand, and that no gravity moves."""
+"""A planar arm, in every format: a leg whose links lie, about axes that stand, and that no gravity
+moves."""
 
 import numpy as np
 import pytest
@@ -54,12 +55,17 @@ def test_mujoco_moves_it_as_ours_does(arm, states):
 
 
 def test_pinocchio_asks_for_the_same_torque_whatever_its_gravity(states):
-    pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed; `make install` brings it")
+    pinocchio = pytest.importorskip(
+        "pinocchio", reason="pinocchio is not installed; `make install` brings it"
+    )
     made = made_of(BODY, *CAUSES[1:])
     model = pinocchio.buildModelFromXML(URDF.write(made, "arm")[".urdf"])
     model.gravity.linear = np.array([0.0, 0.0, -9.81])
     data = model.createData()
-    found = [pinocchio.rnea(model, data, *row) for row in zip(states.q, states.dq, states.ddq, strict=True)]
+    found = [
+        pinocchio.rnea(model, data, *row)
+        for row in zip(states.q, states.dq, states.ddq, strict=True)
+    ]
     agree(np.array(found), torque(made, states), 1e-12)
 
 

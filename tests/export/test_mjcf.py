@@ -37,7 +37,8 @@ def agree(found, expected):
 
 @pytest.fixture(scope="module")
 def drive(states, leg):
-    """Torques that stop no joint within a step: MuJoCo's friction would then hold it, and ours still rub."""
+    """Torques that stop no joint within a step: MuJoCo's friction would then hold it, and ours
+    still rub."""
     return torque(leg, states) + np.random.default_rng(3).uniform(-5.0, 5.0, states.q.shape)
 
 
@@ -65,7 +66,9 @@ def test_control_is_the_torque_that_the_channel_would_say(order, states, drive):
     said = drive.copy()
     for term in (t for t in made.model if t.effect.side is Side.SENSOR):
         for k in range(len(said)):
-            term.effect.torque_reading(states.t[k], said[k], term.values, 1, np.zeros(0), np.zeros(2))
+            term.effect.torque_reading(
+                states.t[k], said[k], term.values, 1, np.zeros(0), np.zeros(2)
+            )
     agree(simulated(made, states, said), acceleration(made, states, drive)[0])
 
 
@@ -75,13 +78,16 @@ def test_a_link_behind_a_soft_joint_swings_as_ours_does(joint, hardening, states
     soft = named(f"joint_elasticity@{joint}")
     soft = Term(soft.effect, np.array([600.0, hardening]))
     viscous = [Term(t.effect, np.array([0.0, t.values[1]])) for t in LEG[1:]]
-    made = machine(LEG[0], *viscous, soft, named(f"parallel_spring@{joint}"), named("rotor_inertia@knee"))
+    made = machine(
+        LEG[0], *viscous, soft, named(f"parallel_spring@{joint}"), named("rotor_inertia@knee")
+    )
     twist = np.zeros_like(states.q)
     j = ("hip", "knee").index(joint)
     twist[:, j] = np.random.default_rng(4).uniform(-0.05, 0.05, len(states.t))
     motor, link = acceleration(made, states, drive, twist)
     found = simulated(made, states, drive, [(f"{joint}_twist", -twist[:, j])])
-    # Each joint of MuJoCo turns relative to the one before: the link is the motor and its twist together.
+    # Each joint of MuJoCo turns relative to the one before: the link is the motor and its twist
+    # together.
     behind = found[:, j] + found[:, j + 1]
     other = found[:, 2 if j == 0 else 0]
     agree(found[:, j], motor[:, j])

@@ -33,7 +33,8 @@ each = pytest.mark.parametrize("kind", SINGLES)
 
 
 def single(kind, *, causes=CAUSES, times=1.0):
-    """Return a machine as its file tells of it, every cause in it that MJCF holds, its X so many times as large."""
+    """Return a machine as its file tells of it, every cause in it that MJCF holds, its X so many
+    times as large."""
     mechanism = SINGLES[kind]
     body = [times * value for value in X[kind]]
     given = {"rigid_body": dict(zip([p.name for p in mechanism.parameters], body, strict=True))}
@@ -55,7 +56,12 @@ def single(kind, *, causes=CAUSES, times=1.0):
 def instants():
     random = np.random.default_rng(8)
     speed = random.uniform(0.5, 2.0, (30, 1)) * random.choice([-1.0, 1.0], (30, 1))
-    return States(random.uniform(0, 9, 30), random.uniform(-1, 1, (30, 1)), speed, random.uniform(-8, 8, (30, 1)))
+    return States(
+        random.uniform(0, 9, 30),
+        random.uniform(-1, 1, (30, 1)),
+        speed,
+        random.uniform(-8, 8, (30, 1)),
+    )
 
 
 def agree(found, expected, relative):
@@ -63,13 +69,18 @@ def agree(found, expected, relative):
 
 
 def test_every_mechanism_is_tried():
-    assert {*SINGLES.values()} == {mechanism for mechanism in MECHANISMS if len(mechanism.kinds) == 1}
+    assert {*SINGLES.values()} == {
+        mechanism for mechanism in MECHANISMS if len(mechanism.kinds) == 1
+    }
 
 
 @each
 def test_mujoco_swings_its_link_behind_a_soft_joint_as_ours_does(kind, instants):
     """What stays with the motor goes with the machine's own inertia, not with an exoskeleton's."""
-    soft = {"friction": {"coulomb": 0.0, "viscous": 0.3}, "joint_elasticity": {"stiffness": 90.0, "hardening": 0.0}}
+    soft = {
+        "friction": {"coulomb": 0.0, "viscous": 0.3},
+        "joint_elasticity": {"stiffness": 90.0, "hardening": 0.0},
+    }
     made = single(kind, causes=soft)
     random = np.random.default_rng(5)
     twist, drive = random.uniform(-0.05, 0.05, (30, 1)), random.uniform(-3.0, 3.0, (30, 1))
@@ -89,14 +100,19 @@ def test_mujoco_moves_it_as_ours_does(kind, instants):
 
 @each
 def test_pinocchio_asks_for_the_same_torque(kind, instants):
-    pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed; `make install` brings it")
+    pinocchio = pytest.importorskip(
+        "pinocchio", reason="pinocchio is not installed; `make install` brings it"
+    )
     made = single(kind, causes={"encoder_offset": {"offset": 0.07}})
     text = URDF.write(made, "machine")[".urdf"]
     model = pinocchio.buildModelFromXML(text)
     told = float(text.split("Gravity is the reader's to set: ")[1].split()[0])
     model.gravity.linear = np.array([0.0, 0.0, -told])
     data = model.createData()
-    found = [pinocchio.rnea(model, data, *row) for row in zip(instants.q, instants.dq, instants.ddq, strict=True)]
+    found = [
+        pinocchio.rnea(model, data, *row)
+        for row in zip(instants.q, instants.dq, instants.ddq, strict=True)
+    ]
     agree(np.array(found), torque(made, instants), 1e-12)
 
 
@@ -118,7 +134,9 @@ def test_torque_from_json_is_that_of_the_model(kind, instants):
     made = single(kind)
     said = json.loads(JSON.write(made, "machine")[".json"])
     model = model_from_parameters(pd.DataFrame(said["parameters"]), said["run"], made.machine)
-    np.testing.assert_array_equal(torque(replace(made, model=model), instants), torque(made, instants))
+    np.testing.assert_array_equal(
+        torque(replace(made, model=model), instants), torque(made, instants)
+    )
 
 
 @each
@@ -133,21 +151,35 @@ def test_units_are_those_of_the_joint(kind):
 def test_what_slides_is_no_hinge():
     for kind, joint, urdf in (("lift", "slide", "prismatic"), ("pendulum", "hinge", "revolute")):
         made = single(kind)
-        assert ET.fromstring(MJCF.write(made, "m")[".xml"].encode()).find(".//joint").get("type") == joint
-        assert ET.fromstring(URDF.write(made, "m")[".urdf"].encode()).find(".//joint").get("type") == urdf
+        assert (
+            ET.fromstring(MJCF.write(made, "m")[".xml"].encode()).find(".//joint").get("type")
+            == joint
+        )
+        assert (
+            ET.fromstring(URDF.write(made, "m")[".urdf"].encode()).find(".//joint").get("type")
+            == urdf
+        )
 
 
 def test_a_cause_that_such_a_machine_cannot_have_is_said_to_be_left_out():
-    """A turntable's mass off its axis weighs nothing: no equation holds it, and no format claims to."""
+    """A turntable's mass off its axis weighs nothing: no equation holds it, and no format claims
+    to."""
     made = single("turntable", causes={"mass_off_axis": {"mass_moment": 0.05}})
     for format in FORMATS:
-        ((_, holding),) = [(t, h) for t, h in made.holdings(format) if t.effect.name == "mass_off_axis"]
-        assert holding.degree == "left out" and holding.how == "a machine of this kind cannot have it"
+        ((_, holding),) = [
+            (t, h) for t, h in made.holdings(format) if t.effect.name == "mass_off_axis"
+        ]
+        assert (
+            holding.degree == "left out" and holding.how == "a machine of this kind cannot have it"
+        )
 
 
 @each
 def test_a_body_of_negative_inertia_is_refused_as_no_machine_of_its_kind(kind):
-    with pytest.raises(InputError, match=r"are no real machine: X1 = -.* with the signs of torque and angle as they"):
+    with pytest.raises(
+        InputError,
+        match=r"are no real machine: X1 = -.* with the signs of torque and angle as they",
+    ):
         single(kind, times=-1.0)
 
 
@@ -161,7 +193,11 @@ def test_play_is_held_by_json_and_listed_by_what_has_no_element_for_it():
         assert "0.012" in text and (format is JSON or f"left out ({holding.how})" in text)
 
 
-@pytest.mark.parametrize(("kind", "times"), [*((kind, 0.0) for kind in SINGLES), ("pendulum", 1e-300)])
+@pytest.mark.parametrize(
+    ("kind", "times"), [*((kind, 0.0) for kind in SINGLES), ("pendulum", 1e-300)]
+)
 def test_a_body_without_mass_is_refused_in_a_line(kind, times):
-    with pytest.raises(InputError, match=r"exo_alone parameters are no real machine: .* identify again"):
+    with pytest.raises(
+        InputError, match=r"exo_alone parameters are no real machine: .* identify again"
+    ):
         single(kind, times=times)

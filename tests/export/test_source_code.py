@@ -45,12 +45,18 @@ def pointer(array):
 
 def in_c(library, stem, states, memory=0.3):
     """Return torque, reading and mass matrix as the C library gives them."""
-    tau, reading, M = np.empty_like(states.q), np.empty_like(states.q), np.empty((*states.q.shape, states.q.shape[1]))
+    tau, reading, M = (
+        np.empty_like(states.q),
+        np.empty_like(states.q),
+        np.empty((*states.q.shape, states.q.shape[1])),
+    )
     state = np.full(64, memory)
     for k in range(len(states.t)):
         t = ctypes.c_double(states.t[k])
         arrays = [np.ascontiguousarray(part[k]) for part in (states.q, states.dq, states.ddq)]
-        getattr(library, f"{stem}_inverse_dynamics")(t, *map(pointer, arrays), pointer(state), pointer(tau[k]))
+        getattr(library, f"{stem}_inverse_dynamics")(
+            t, *map(pointer, arrays), pointer(state), pointer(tau[k])
+        )
         reading[k] = tau[k]
         getattr(library, f"{stem}_torque_reading")(t, pointer(reading[k]))
         getattr(library, f"{stem}_mass_matrix")(t, pointer(arrays[0]), pointer(M[k]))
@@ -91,7 +97,9 @@ def test_mass_coriolis_and_gravity_in_octave_are_ours(octave, models, states):
     ours = made.machine.mechanism
     for k in range(len(at.t)):
         agree(octave["bare"]["M"][k], ours.mass_matrix(at.q[k], made.X, made.geometry))
-        agree(octave["bare"]["C"][k], ours.coriolis_matrix(at.q[k], at.dq[k], made.X, made.geometry))
+        agree(
+            octave["bare"]["C"][k], ours.coriolis_matrix(at.q[k], at.dq[k], made.X, made.geometry)
+        )
         agree(octave["bare"]["G"][k], ours.gravity_torque(at.q[k], made.X, made.geometry))
 
 
@@ -107,7 +115,9 @@ def test_a_memory_moves_as_ours_does(library, octave, models, states):
     expected, found = np.zeros((len(at.t), 1)), np.zeros((len(at.t), 1))
     memory = np.full(1, 0.3)
     for k in range(len(at.t)):
-        now = Instant(at.t[k], at.q[k], at.dq[k], np.zeros(2), np.sign(at.dq[k]), np.zeros(2), np.zeros(2))
+        now = Instant(
+            at.t[k], at.q[k], at.dq[k], np.zeros(2), np.sign(at.dq[k]), np.zeros(2), np.zeros(2)
+        )
         term.effect.derivative(now, memory, term.values, made.geometry.array(), 1, expected[k])
         arrays = [np.ascontiguousarray(part[k]) for part in (at.q, at.dq)]
         library[f"{stem}_memory_rate"](

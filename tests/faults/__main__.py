@@ -1,4 +1,5 @@
-"""``make faults``: let every fault loose on a run and write what became of it into docs/faults.md."""
+"""``make faults``: let every fault loose on a run and write what became of it into
+docs/faults.md."""
 
 import argparse
 import re
@@ -41,7 +42,11 @@ def rows() -> Iterator[str]:
             if journal.exists():
                 made = recover(journal)
                 missing, wrong = made.account.missed, _wrong(made.path, ended.latched)
-                fate = "is killed, then `exoid recover`" if ended.code < 0 else "stops, then `exoid recover`"
+                fate = (
+                    "is killed, then `exoid recover`"
+                    if ended.code < 0
+                    else "stops, then `exoid recover`"
+                )
                 yield f"| TCP | {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
             else:
                 kept = Path(folder) / "run.aborted.parquet"

@@ -1,4 +1,5 @@
-"""Everything that can befall a frame, a connection or a device between exoid and the drives, by name."""
+"""Everything that can befall a frame, a connection or a device between exoid and the drives, by
+name."""
 
 import struct
 from collections.abc import Iterable
@@ -39,7 +40,9 @@ class From:
 
 def _is_a_sample(frame: Frame) -> bool:
     """Tell whether a frame asks for a device's block or brings it; a status word alone is none."""
-    return frame.function == EXCHANGE or (frame.function == 3 and (not frame.is_reply or len(frame.words) >= 8))
+    return frame.function == EXCHANGE or (
+        frame.function == 3 and (not frame.is_reply or len(frame.words) >= 8)
+    )
 
 
 ALWAYS = float("inf")
@@ -125,13 +128,16 @@ def add(place: slice, counts: int) -> Fault:
 
 
 def another_master(away_rad: float) -> Fault:
-    """Let the set-point that a drive holds be another than what it was sent, as after a write of somebody else's."""
+    """Let the set-point that a drive holds be another than what it was sent, as after a write of
+    somebody else's."""
 
     def written_over(frame: Frame, link: Link) -> list[bytes]:
         if frame.function != EXCHANGE:
             return [frame.raw]
         words = frame.written
-        counts = int.from_bytes(struct.pack(">2H", *words[:2]), "big", signed=True) + round(1e6 * away_rad)
+        counts = int.from_bytes(struct.pack(">2H", *words[:2]), "big", signed=True) + round(
+            1e6 * away_rad
+        )
         other = struct.pack(">i", counts)
         return [frame.with_body(frame.body[:11] + other + frame.body[15:])]
 
@@ -221,7 +227,8 @@ class Case:
 
 
 def cases(frames: type[Frame]) -> list[Case]:
-    """Return the faults of a kind of frame, new ones at each call: they remember what they have seen."""
+    """Return the faults of a kind of frame, new ones at each call: they remember what they have
+    seen."""
     everything = [
         Case("none", nothing),
         Case("a reply is lost", From(lose), gap=True),

@@ -1,4 +1,5 @@
-"""``exoid acquire`` in a process of its own, on a rig in this one that remembers what it latched and when."""
+"""``exoid acquire`` in a process of its own, on a rig in this one that remembers what it latched
+and when."""
 
 import os
 import resource
@@ -33,7 +34,9 @@ class Ended:
     disabled: bool
 
 
-def strike(folder: Path, blow: Callable[[subprocess.Popen, Path], None], rows: int, wait_s: float = 0.0) -> Ended:
+def strike(
+    folder: Path, blow: Callable[[subprocess.Popen, Path], None], rows: int, wait_s: float = 0.0
+) -> Ended:
     """Start an endless run, and once it has written so many rows, and a while longer, strike it."""
     folder.mkdir(parents=True, exist_ok=True)
     output = folder / "run.parquet"
@@ -49,7 +52,9 @@ def strike(folder: Path, blow: Callable[[subprocess.Popen, Path], None], rows: i
             sys.executable, "-m", "exoid_cli.app", "acquire", "--config", str(config), "--run", "run", "--trajectory",
             str(folder / "excitation.toml"), "-o", str(output),
         ]  # fmt: skip
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         try:
             _wait_for(process, output, rows)
             time.sleep(wait_s)
@@ -68,7 +73,8 @@ def send(number: signal.Signals) -> Callable[[subprocess.Popen, Path], None]:
 
 
 def fill_the_disk(process: subprocess.Popen, output: Path) -> None:
-    """Let no file of the process grow by more than a few samples: in the midst of a batch it can write no more."""
+    """Let no file of the process grow by more than a few samples: in the midst of a batch it can
+    write no more."""
     room = journal_of(output).stat().st_size + 3000
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (room, room))
 
@@ -77,7 +83,10 @@ def _wait_for(process: subprocess.Popen, output: Path, rows: int) -> None:
     until = time.monotonic() + PATIENCE_S
     while time.monotonic() < until and process.poll() is None:
         try:
-            if sum(batch.rows.num_rows for batch in JournalFile(journal_of(output)).batches()) >= rows:
+            if (
+                sum(batch.rows.num_rows for batch in JournalFile(journal_of(output)).batches())
+                >= rows
+            ):
                 return
         except (FileNotFoundError, ContractError):
             pass

@@ -1,4 +1,5 @@
-"""A proxy that lets a fault loose on the Modbus frames that pass through it, be they TCP's or RTU's."""
+"""A proxy that lets a fault loose on the Modbus frames that pass through it, be they TCP's or
+RTU's."""
 
 import asyncio
 import threading
@@ -152,7 +153,11 @@ class Proxy:
         self._thread.join()
 
     async def _serve(self) -> None:
-        self._loop, self._until, self._links = asyncio.get_running_loop(), asyncio.Event(), set[asyncio.Task]()
+        self._loop, self._until, self._links = (
+            asyncio.get_running_loop(),
+            asyncio.Event(),
+            set[asyncio.Task](),
+        )
         server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
         self.port = server.sockets[0].getsockname()[1]
         self._listening.set()
@@ -171,7 +176,9 @@ class Proxy:
         task.add_done_callback(self._links.discard)
         try:
             with suppress(OSError, asyncio.CancelledError):
-                device_reader, device = await asyncio.open_connection("127.0.0.1", self._device_port)
+                device_reader, device = await asyncio.open_connection(
+                    "127.0.0.1", self._device_port
+                )
                 await self._pass_on(Link(writer, device), reader, device_reader, writer, device)
         finally:
             writer.transport.abort()
@@ -198,7 +205,12 @@ class Proxy:
             await asyncio.gather(*pumps, return_exceptions=True)
 
     async def _pump(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, link: Link, *, is_reply: bool
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        link: Link,
+        *,
+        is_reply: bool,
     ) -> None:
         while True:
             frame = await self._frames.read(reader, is_reply=is_reply)

@@ -1,4 +1,5 @@
-"""A short run on a virtual rig behind the proxy, and how what it recorded stands beside what the rig latched."""
+"""A short run on a virtual rig behind the proxy, and how what it recorded stands beside what the
+rig latched."""
 
 import asyncio
 import re
@@ -25,7 +26,8 @@ from tests.faults.faults import REPLY_S, WATCHDOG_S
 from tests.faults.proxy import Fault, Frame, Proxy, RtuFrame, TcpFrame
 
 CONTROL, DISABLE = 2, 0
-"""Which of the words that a drive is told is the control word, and which one takes the torque away."""
+"""Which of the words that a drive is told is the control word, and which one takes the torque
+away."""
 RATE = 100.0
 SEED = 5
 EXCITATION = """\
@@ -35,7 +37,11 @@ theta0_rad = [0.15, -0.25]
 a = [[0.08, 0.0], [0.08, 0.0]]
 b = [[0.0, 0.02], [0.02, -0.02]]
 """
-RESOLUTION = {("angle", "rad"): 1e-6, ("velocity", "rad_s"): 1e-5, ("torque", "nm"): 0.12 * 100 * 1e-4}
+RESOLUTION = {
+    ("angle", "rad"): 1e-6,
+    ("velocity", "rad_s"): 1e-5,
+    ("torque", "nm"): 0.12 * 100 * 1e-4,
+}
 """What one count of each register stands for, rad, rad/s, N·m."""
 
 
@@ -69,7 +75,11 @@ class Result:
 
 def rig_file(folder: Path, port: int, frames: type[Frame] = TcpFrame, **changes: float) -> Path:
     """Write the plain rig, all on one port or on one RTU line through it, with short ramps."""
-    text = (datasets() / "rigs" / "plain.toml").read_text().replace("embedded = true", "embedded = false", 1)
+    text = (
+        (datasets() / "rigs" / "plain.toml")
+        .read_text()
+        .replace("embedded = true", "embedded = false", 1)
+    )
     place = f"port = {port}" if frames is TcpFrame else 'line = "leg"'
     text = re.sub(r"^(map = .*)$", rf"\1\n{place}", text, flags=re.MULTILINE)
     if frames is RtuFrame:
@@ -85,7 +95,9 @@ def rig_file(folder: Path, port: int, frames: type[Frame] = TcpFrame, **changes:
 
 
 @contextmanager
-def served(folder: Path, run: str, frames: type[Frame] = TcpFrame) -> Iterator[tuple[int, dict[int, Latched]]]:
+def served(
+    folder: Path, run: str, frames: type[Frame] = TcpFrame
+) -> Iterator[tuple[int, dict[int, Latched]]]:
     """Serve the rig; yields its port, and all that it latches by number."""
     path = rig_file(folder, 502, frames)
     rig = load_rig(path)
@@ -137,7 +149,9 @@ def run_through(
     with served(folder, run, frames) as (port, latched), Proxy(port, fault, frames) as proxy:
         why = None
         try:
-            acquire(rig_file(folder, proxy.port, frames, **changes), settings, excitation, output, RATE)
+            acquire(
+                rig_file(folder, proxy.port, frames, **changes), settings, excitation, output, RATE
+            )
         except DeviceError as error:
             why = str(error)
     disabled = are_disabled(proxy)

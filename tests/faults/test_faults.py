@@ -1,4 +1,5 @@
-"""No fault brings a wrong number into a recording: a run goes on with a gap that is told, or stops and says why."""
+"""No fault brings a wrong number into a recording: a run goes on with a gap that is told, or stops
+and says why."""
 
 import re
 
@@ -18,12 +19,15 @@ def told_s(why):
 EVERY_CASE = pytest.mark.parametrize(
     ("frames", "case"),
     [
-        # What serial lines alone have, and each third of the others; all of them in `make faults` and `make test-slow`.
+        # What serial lines alone have, and each third of the others; all of them in `make faults`
+        # and `make test-slow`.
         pytest.param(
             frames,
             case,
             id=f"{name}: {case.name}",
-            marks=pytest.mark.slow if frames is RtuFrame and case.frames is not RtuFrame and k % 3 else (),
+            marks=pytest.mark.slow
+            if frames is RtuFrame and case.frames is not RtuFrame and k % 3
+            else (),
         )
         for frames, name in ((TcpFrame, "TCP"), (RtuFrame, "RTU"))
         for k, case in enumerate(cases(frames))
@@ -34,11 +38,17 @@ EVERY_CASE = pytest.mark.parametrize(
 @EVERY_CASE
 def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(frames, case, tmp_path):
     result = run_through(case.fault, tmp_path, case.run, frames=frames)
-    assert result.wrong == 0 or "frozen" in str(result.why)  # that is known only when others have moved on
+    # That is known only when others have moved on.
+    assert result.wrong == 0 or "frozen" in str(result.why)
     assert result.wrong_s <= told_s(result.why)
     assert result.disabled or "could not be disabled" in str(result.why)
-    between = int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0]) + 1 - len(result.frame)
-    # Of a run that went to its end, the last sample may be a busy computer's to miss: no other tells of it.
+    between = (
+        int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0])
+        + 1
+        - len(result.frame)
+    )
+    # Of a run that went to its end, the last sample may be a busy computer's to miss: no other
+    # tells of it.
     assert between == result.missing or (result.why is None and between < result.missing)
     if case.stops is None or (case.either and result.why is None):
         assert result.why is None

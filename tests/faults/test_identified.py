@@ -11,7 +11,16 @@ from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig import load_rig
-from tests.faults.faults import EXCHANGE, another_unit, cut, delay, lose, nothing, other_transaction, twice
+from tests.faults.faults import (
+    EXCHANGE,
+    another_unit,
+    cut,
+    delay,
+    lose,
+    nothing,
+    other_transaction,
+    twice,
+)
 from tests.faults.runs import RATE, rig_file, run_through
 
 DURATION_S = 10.0
@@ -26,7 +35,8 @@ REPLY_S = 0.1
 
 
 class BadLine:
-    """Every so many replies something befalls one that a run survives, one thing after the other."""
+    """Every so many replies something befalls one that a run survives, one thing after the
+    other."""
 
     def __init__(self, every):
         late = delay(1.5 * REPLY_S), delay(0.2 * REPLY_S)
@@ -58,7 +68,10 @@ def recorded(tmp_path_factory):
 def parameters(result, other):
     motions = [
         motion_from_table(
-            motion_table(Table(one.frame, {**one.metadata, "purpose": purpose}, Path(purpose)), FilterSettings())
+            motion_table(
+                Table(one.frame, {**one.metadata, "purpose": purpose}, Path(purpose)),
+                FilterSettings(),
+            )
         )
         for one, purpose in ((result, "train"), (other, "validate"))
     ]
@@ -76,7 +89,10 @@ def test_what_a_bad_line_brought_identifies_the_same_leg_within_its_intervals(re
     bad, good = recorded["bad"], recorded["good"]
     found, without_faults = parameters(bad, good), parameters(good, good)
     plant = load_rig(rig_file(tmp_path, 502)).plant
-    truth = [*plant.exo_inertial, *np.column_stack([plant.coulomb_nm, plant.viscous_nm_s_rad]).ravel()]
+    truth = [
+        *plant.exo_inertial,
+        *np.column_stack([plant.coulomb_nm, plant.viscous_nm_s_rad]).ravel(),
+    ]
     low, high = found["ci95_low"].to_numpy(), found["ci95_high"].to_numpy()
     assert ((low <= without_faults["value"]) & (without_faults["value"] <= high)).all()
     assert ((low <= truth) & (truth <= high)).all()

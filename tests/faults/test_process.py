@@ -15,7 +15,9 @@ from tests.faults.runs import wrong_rows
 LONGEST_LOSS_S = 0.5
 
 
-@pytest.mark.parametrize(("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+@pytest.mark.parametrize(
+    ("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")]
+)
 def test_a_signal_ends_the_run_with_all_that_was_exchanged(tmp_path, number, name):
     ended = strike(tmp_path, send(number), rows=40)
     table = RECORDING.read(tmp_path / "run.aborted.parquet")
@@ -29,7 +31,9 @@ def test_a_full_disk_ends_the_run_and_what_was_written_before_is_recovered(tmp_p
     ended = strike(tmp_path, fill_the_disk, rows=40)
     assert (ended.code, ended.disabled) == (3, True)
     assert len(ended.said.splitlines()) == 1
-    assert re.search(r"run.parquet.journal: cannot be written .*make room, then `exoid recover ", ended.said)
+    assert re.search(
+        r"run.parquet.journal: cannot be written .*make room, then `exoid recover ", ended.said
+    )
     made = recover(journal_of(ended.output))
     frame = RECORDING.read(made.path).frame
     assert made.account.samples >= 40
@@ -40,7 +44,10 @@ def test_a_full_disk_ends_the_run_and_what_was_written_before_is_recovered(tmp_p
 def kill_and_compare(folder, generator):
     """Kill a run at some moment; nothing that was exchanged half a second before may be lost."""
     ended = strike(
-        folder, send(signal.SIGKILL), rows=int(generator.integers(1, 60)), wait_s=generator.uniform(0.0, 1.0)
+        folder,
+        send(signal.SIGKILL),
+        rows=int(generator.integers(1, 60)),
+        wait_s=generator.uniform(0.0, 1.0),
     )
     made = recover(journal_of(ended.output))
     frame = RECORDING.read(made.path).frame

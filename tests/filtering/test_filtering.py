@@ -26,7 +26,11 @@ def filter_recording(table, settings):
     motion = filtered(table, settings)
     summary = Summary(motion)
     pieces = list(summary.passing(motion.pieces()))
-    return Filtered(Table(pa.concat_tables(pieces).to_pandas(), motion.metadata), summary.segments, summary.cutoff_hz)
+    return Filtered(
+        Table(pa.concat_tables(pieces).to_pandas(), motion.metadata),
+        summary.segments,
+        summary.cutoff_hz,
+    )
 
 
 def test_velocity_and_acceleration_are_those_of_the_motion():
@@ -34,8 +38,14 @@ def test_velocity_and_acceleration_are_those_of_the_motion():
     motion = filter_recording(recording(time, 1e-5), FilterSettings(cutoff_hz=12.0)).motion
     MOTION.check(motion.frame, motion.metadata)
     inside = motion.frame[motion.frame["valid"]]
-    assert_allclose(inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=2e-3)
-    assert_allclose(inside["hip_acceleration_rad_s2"], -0.5 * W**2 * np.sin(W * inside["time_s"] + 0.5), atol=0.05)
+    assert_allclose(
+        inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=2e-3
+    )
+    assert_allclose(
+        inside["hip_acceleration_rad_s2"],
+        -0.5 * W**2 * np.sin(W * inside["time_s"] + 0.5),
+        atol=0.05,
+    )
 
 
 def test_torque_and_every_sample_stay_as_measured():
@@ -44,7 +54,9 @@ def test_torque_and_every_sample_stay_as_measured():
     assert len(frame) == len(original.frame)
     assert_allclose(frame["knee_torque_nm"], original.frame["knee_torque_nm"], rtol=0)
     assert_allclose(frame["knee_angle_measured_rad"], original.frame["knee_angle_rad"], rtol=0)
-    assert_allclose(frame["knee_velocity_measured_rad_s"], original.frame["knee_velocity_rad_s"], rtol=0)
+    assert_allclose(
+        frame["knee_velocity_measured_rad_s"], original.frame["knee_velocity_rad_s"], rtol=0
+    )
 
 
 def test_a_gap_starts_a_new_segment_with_edges_of_its_own():
@@ -58,7 +70,9 @@ def test_a_gap_starts_a_new_segment_with_edges_of_its_own():
     for edge in (0, 1999, 2000, len(frame) - 1):
         assert not frame["valid"].iloc[edge]
     inside = frame[frame["valid"]]
-    assert_allclose(inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=2e-3)
+    assert_allclose(
+        inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=2e-3
+    )
 
 
 def test_a_jittering_clock_is_taken_at_its_own_times():
@@ -66,7 +80,9 @@ def test_a_jittering_clock_is_taken_at_its_own_times():
     time = np.sort(grid(20) + rng.uniform(-1e-3, 1e-3, 4000))
     frame = filter_recording(recording(time, 1e-6), FilterSettings(cutoff_hz=12.0)).motion.frame
     inside = frame[frame["valid"]]
-    assert_allclose(inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=3e-3)
+    assert_allclose(
+        inside["hip_velocity_rad_s"], 0.5 * W * np.cos(W * inside["time_s"] + 0.5), atol=3e-3
+    )
 
 
 def test_a_stretch_too_short_to_filter_is_kept_but_not_trusted():

@@ -1,4 +1,5 @@
-"""A recording that is filtered window by window is filtered as if all at once, whatever its length and its gaps."""
+"""A recording that is filtered window by window is filtered as if all at once, whatever its length
+and its gaps."""
 
 import numpy as np
 import pyarrow as pa
@@ -16,8 +17,8 @@ from pipelines.signals.low_pass import derivative, low_pass
 from tests.filtering.recordings import RATE_HZ, grid, recording
 
 ROUNDING = 1e-13
-"""Of the largest angle: what a recursion whose poles are near 1 makes of the last digit. A difference of angles
-between samples multiplies it by the sample rate."""
+"""Of the largest angle: what a recursion whose poles are near 1 makes of the last digit. A
+difference of angles between samples multiplies it by the sample rate."""
 
 
 def rounding(column, largest_angle):
@@ -35,7 +36,8 @@ def whole(path, settings):
 
 
 def holed(jitter_s=0.0):
-    """A minute with gaps: a long stretch, two of a few samples, one too short to filter, the rest."""
+    """A minute with gaps: a long stretch, two of a few samples, one too short to filter, the
+    rest."""
     time = grid(60)
     time = np.sort(time + np.random.default_rng(1).uniform(-jitter_s, jitter_s, len(time)))
     return np.r_[time[:5003], time[5100:5103], time[5200:5290], time[5400:5412], time[5500:]]
@@ -52,7 +54,9 @@ def stored(tmp_path):
     return store
 
 
-@pytest.mark.parametrize("settings", [{}, {"cutoff_hz": 2.0}, {"cutoff_hz": 60.0, "order": 1}, {"order": 9}])
+@pytest.mark.parametrize(
+    "settings", [{}, {"cutoff_hz": 2.0}, {"cutoff_hz": 60.0, "order": 1}, {"order": 9}]
+)
 @pytest.mark.parametrize("jitter_s", [0.0, 1e-3])
 def test_windows_change_nothing_but_rounding(stored, monkeypatch, settings, jitter_s):
     path, chosen = stored(holed(jitter_s)), FilterSettings(**settings)
@@ -68,7 +72,8 @@ def test_windows_change_nothing_but_rounding(stored, monkeypatch, settings, jitt
 
 
 def test_a_window_as_long_as_the_recording_is_the_textbook_filter(stored):
-    """Forwards and backwards over all samples, straight from SciPy: what windows are to agree with."""
+    """Forwards and backwards over all samples, straight from SciPy: what windows are to agree
+    with."""
     time = grid(20)
     frame = whole(stored(time), FilterSettings(cutoff_hz=9.0))
     smooth = low_pass(frame["hip_angle_measured_rad"].to_numpy(), RATE_HZ, 9.0)
@@ -76,7 +81,9 @@ def test_a_window_as_long_as_the_recording_is_the_textbook_filter(stored):
     assert_array_equal(frame["hip_acceleration_rad_s2"], derivative(smooth, RATE_HZ, 2))
 
 
-def test_a_clock_that_is_not_the_nominal_one_is_followed_over_hours_as_over_seconds(stored, monkeypatch):
+def test_a_clock_that_is_not_the_nominal_one_is_followed_over_hours_as_over_seconds(
+    stored, monkeypatch
+):
     """30 ppm fast: after minutes no sample stands on the nominal grid any more."""
     in_small_pieces(monkeypatch, 5000)
     time = grid(400) * (1 + 3e-5)
@@ -119,6 +126,8 @@ def test_a_fault_deep_in_a_file_is_named_by_its_row(stored, monkeypatch):
     table.frame["time_s"] = time
     path = stored(grid(20))
     monkeypatch.setattr(parquet, "ROWS", 500)
-    parquet.save(path, [pa.Table.from_pandas(table.frame)], {**table.metadata, "contract": "recording/1"})
+    parquet.save(
+        path, [pa.Table.from_pandas(table.frame)], {**table.metadata, "contract": "recording/1"}
+    )
     with pytest.raises(Exception, match=r"column time_s, row 3500: found 17\.495 after 17\.495"):
         RECORDING.read(path)

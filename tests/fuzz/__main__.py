@@ -1,4 +1,5 @@
-"""``make fuzz``: hostile replies against the client, hostile requests against the rig; exit code 1 if any did harm."""
+"""``make fuzz``: hostile replies against the client, hostile requests against the rig; exit code 1
+if any did harm."""
 
 import argparse
 import asyncio
@@ -28,7 +29,9 @@ def main() -> int:
 def run(target: str, seed: int, inputs: int, only: int | None = None) -> Outcome:
     """Fuzz one side and print what came of it."""
     outcome = (
-        asyncio.run(replies.fuzz(seed, inputs, only)) if target == "replies" else requests.fuzz(seed, inputs, only)
+        asyncio.run(replies.fuzz(seed, inputs, only))
+        if target == "replies"
+        else requests.fuzz(seed, inputs, only)
     )
     print(outcome, flush=True)
     return outcome

@@ -14,7 +14,8 @@ Script = list[bytes | float | None]
 """What is sent, one after the other; a float is a pause, s."""
 
 SPECIAL = [
-    struct.pack(">f", value) for value in (float("nan"), float("inf"), float("-inf"), 3.4e38, -3.4e38, 1e-45, 0.0)
+    struct.pack(">f", value)
+    for value in (float("nan"), float("inf"), float("-inf"), 3.4e38, -3.4e38, 1e-45, 0.0)
 ] + [b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\x80\x00\x00\x00", b"\x00\x00\x00\x01"]
 """What is odd as a float or as an integer."""
 
@@ -31,7 +32,8 @@ class Frame:
     length: int | None = None
     """What the head says; None for the truth."""
     rtu: bool = False
-    """Whether unit and body travel alone, with a checksum; a lie about the rest is one about that."""
+    """Whether unit and body travel alone, with a checksum; a lie about the rest is one about
+    that."""
 
     def __bytes__(self) -> bytes:
         if self.rtu:
@@ -73,14 +75,18 @@ def _flipped(rng: Random, data: bytes) -> bytes:
 
 
 def _other_body(rng: Random, frame: Frame) -> bytes:
-    function = rng.choice((1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43, rng.randrange(256)))
+    function = rng.choice(
+        (1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43, rng.randrange(256))
+    )
     return bytes([function]) + rng.choice((frame.body[1:], rng.randbytes(rng.randrange(40))))
 
 
 def _other_count(rng: Random, frame: Frame) -> bytes:
     body = bytearray(frame.body)
     if len(body) > 1:
-        body[1] = rng.choice((0, 1, body[1] - 1 & 255, body[1] + 1 & 255, body[1] - 2 & 255, 255, rng.randrange(256)))
+        body[1] = rng.choice(
+            (0, 1, body[1] - 1 & 255, body[1] + 1 & 255, body[1] - 2 & 255, 255, rng.randrange(256))
+        )
     return bytes(body)
 
 
@@ -98,17 +104,32 @@ MUTATIONS: dict[str, Mutation] = {
     "bits flipped": lambda rng, f: [_flipped(rng, bytes(f))],
     "cut": lambda rng, f: [bytes(f)[: rng.randrange(len(bytes(f)))]],
     "grown": lambda rng, f: [bytes(f) + rng.randbytes(rng.randint(1, 400))],
-    "body grown, length true": lambda rng, f: [bytes(replace(f, body=f.body + rng.randbytes(rng.randint(1, 9))))],
-    "body cut, length true": lambda rng, f: [bytes(replace(f, body=f.body[: rng.randrange(len(f.body) + 1)]))],
-    "length": lambda rng, f: [bytes(replace(f, length=rng.choice((0, 1, 2, 3, 254, 255, 256, 0x7FFF, 0xFFFF))))],
+    "body grown, length true": lambda rng, f: [
+        bytes(replace(f, body=f.body + rng.randbytes(rng.randint(1, 9))))
+    ],
+    "body cut, length true": lambda rng, f: [
+        bytes(replace(f, body=f.body[: rng.randrange(len(f.body) + 1)]))
+    ],
+    "length": lambda rng, f: [
+        bytes(replace(f, length=rng.choice((0, 1, 2, 3, 254, 255, 256, 0x7FFF, 0xFFFF))))
+    ],
     "byte count": lambda rng, f: [bytes(replace(f, body=_other_count(rng, f)))],
     "function": lambda rng, f: [bytes(replace(f, body=_other_body(rng, f)))],
-    "exception": lambda rng, f: [bytes(replace(f, body=bytes([f.body[0] | 0x80, rng.randrange(256)])))],
+    "exception": lambda rng, f: [
+        bytes(replace(f, body=bytes([f.body[0] | 0x80, rng.randrange(256)])))
+    ],
     "exception of another size": lambda rng, f: [
         bytes(replace(f, body=bytes([rng.randrange(128, 256)]) + rng.randbytes(rng.randrange(6))))
     ],
     "transaction": lambda rng, f: [
-        bytes(replace(f, transaction=rng.choice((0, f.transaction + 1 & 0xFFFF, 0xFFFF, rng.randrange(65536)))))
+        bytes(
+            replace(
+                f,
+                transaction=rng.choice(
+                    (0, f.transaction + 1 & 0xFFFF, 0xFFFF, rng.randrange(65536))
+                ),
+            )
+        )
     ],
     "protocol": lambda rng, f: [bytes(replace(f, protocol=rng.randrange(1, 65536)))],
     "unit": lambda rng, f: [bytes(replace(f, unit=rng.randrange(256)))],
@@ -116,7 +137,10 @@ MUTATIONS: dict[str, Mutation] = {
     "after another": lambda rng, f: [
         bytes(replace(f, transaction=rng.randrange(65536), body=_flipped(rng, f.body))) + bytes(f)
     ],
-    "ahead of the next": lambda rng, f: [bytes(f), bytes(replace(f, transaction=f.transaction + 1 & 0xFFFF))],
+    "ahead of the next": lambda rng, f: [
+        bytes(f),
+        bytes(replace(f, transaction=f.transaction + 1 & 0xFFFF)),
+    ],
     "noise": lambda rng, f: [rng.randbytes(rng.randint(1, 600))],
     "noise first": lambda rng, f: [rng.randbytes(rng.randint(1, 20)), bytes(f)],
     "hang up": lambda rng, f: [HANG_UP],
@@ -126,7 +150,9 @@ MUTATIONS: dict[str, Mutation] = {
 
 RARE: dict[str, Mutation] = {
     "dribble": lambda rng, f: [
-        piece for byte in (bytes(f) * 20)[:200] for piece in (bytes([byte ^ rng.randrange(2)]), 0.002)
+        piece
+        for byte in (bytes(f) * 20)[:200]
+        for piece in (bytes([byte ^ rng.randrange(2)]), 0.002)
     ],
     "flood": lambda rng, f: [rng.randbytes(65536)] * 64,
     "flood of replies": lambda rng, f: [bytes(replace(f, body=_flipped(rng, f.body))) * 500] * 20,

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HANG_S = 5.0
-"""Many times what any time-out in a fuzzed rig comes to, so that a busy machine is not taken for a fault."""
+"""Many times what any time-out in a fuzzed rig comes to, so that a busy machine is not taken for a
+fault."""
 MEMORY_MIB = 64.0
 """How much either side may grow by."""
 KEPT = Path("build/fuzz")
@@ -36,14 +37,22 @@ class Outcome:
         """Keep a failing input: its seed and number make it again, the transcript is to read."""
         KEPT.mkdir(parents=True, exist_ok=True)
         path = KEPT / f"{self.target}-{self.seed}-{index}.json"
-        kept = {"target": self.target, "seed": self.seed, "index": index, "why": why, "transcript": transcript}
+        kept = {
+            "target": self.target,
+            "seed": self.seed,
+            "index": index,
+            "why": why,
+            "transcript": transcript,
+        }
         path.write_text(json.dumps(kept, indent=1))
         self.failures.append(f"{why} (replay: python -m tests.fuzz --replay {path})")
 
     def check_memory(self) -> None:
         """Fail where memory grew without bound."""
         if self.grown_mib > MEMORY_MIB:
-            self.failures.append(f"memory grew by {self.grown_mib:.0f} MiB, at most {MEMORY_MIB:.0f} MiB are expected")
+            self.failures.append(
+                f"memory grew by {self.grown_mib:.0f} MiB, at most {MEMORY_MIB:.0f} MiB are expected"
+            )
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {what}" for what, count in self.counts.most_common())

@@ -65,8 +65,13 @@ class Peer:
         def answer(request: Frame) -> Script:
             self.answered += 1
             frame = replace(request, length=None, body=self._body(request, rng))
-            name, script = ("right", [bytes(frame)]) if rng.random() < right_share else mutated(rng, frame)
-            sent = ["hang up" if s is HANG_UP else s if isinstance(s, float) else s[:300].hex() for s in script[:8]]
+            name, script = (
+                ("right", [bytes(frame)]) if rng.random() < right_share else mutated(rng, frame)
+            )
+            sent = [
+                "hang up" if s is HANG_UP else s if isinstance(s, float) else s[:300].hex()
+                for s in script[:8]
+            ]
             self.transcript.append(f"{bytes(request).hex()} -> {name}: {sent}")
             self.asked = request
             return script
@@ -86,7 +91,9 @@ class Peer:
         return bytes([function, 2 * count]) + data
 
     def _map(self, unit: int):
-        (device,) = [device for device in (*self._rig.drive, *self._rig.sensor) if device.unit == unit]
+        (device,) = [
+            device for device in (*self._rig.drive, *self._rig.sensor) if device.unit == unit
+        ]
         maps = self._rig.map.drive if device in self._rig.drive else self._rig.map.sensor
         return maps[device.map]
 
@@ -95,7 +102,9 @@ class Peer:
         sending = asyncio.ensure_future(self._send(writer, []))
         with suppress(OSError, asyncio.IncompleteReadError):
             while True:
-                request = await (self._rtu_request(reader) if self._rig.line else self._tcp_request(reader))
+                request = await (
+                    self._rtu_request(reader) if self._rig.line else self._tcp_request(reader)
+                )
                 sending.cancel()  # who asks anew listens no more
                 sending = asyncio.ensure_future(self._send(writer, self.answer(request)))
         sending.cancel()
@@ -108,7 +117,8 @@ class Peer:
 
     async def _rtu_request(self, reader: asyncio.StreamReader) -> Frame:
         head = await reader.readexactly(2)
-        head += await reader.readexactly({3: 4, 16: 5, 23: 9}[head[1]])  # where bytes are counted, the count ends it
+        # Where bytes are counted, the count ends it.
+        head += await reader.readexactly({3: 4, 16: 5, 23: 9}[head[1]])
         rest = await reader.readexactly(2 if head[1] == 3 else head[-1] + 2)
         return Frame(0, head[0], head[1:] + rest[:-2], rtu=True)
 
@@ -140,14 +150,17 @@ class Client:
         """Connect a new machine, of which nothing is left of the last operation."""
         self.peer.answer = self.peer.honest
         until = time.monotonic() + PATIENCE_S
-        while True:  # a time-out this short is missed now and then, most of all beside another client's flood
+        # A time-out this short is missed now and then, most of all beside another client's flood.
+        while True:
             try:
                 await self._connect_once()
                 return
             except DeviceError as error:
                 await self._hang_up()
                 if time.monotonic() > until:
-                    raise TimeoutError(f"an honest peer was not reached within {PATIENCE_S:g} s") from error
+                    raise TimeoutError(
+                        f"an honest peer was not reached within {PATIENCE_S:g} s"
+                    ) from error
 
     async def _connect_once(self) -> None:
         here = {"host": "127.0.0.1", "port": self._port}
@@ -156,7 +169,10 @@ class Client:
                 update={
                     "drive": tuple(d.model_copy(update=here) for d in self._rig.drive),
                     "sensor": tuple(s.model_copy(update=here) for s in self._rig.sensor),
-                    "line": {name: line.at(f"127.0.0.1:{self._port}") for name, line in self._rig.line.items()},
+                    "line": {
+                        name: line.at(f"127.0.0.1:{self._port}")
+                        for name, line in self._rig.line.items()
+                    },
                 }
             ),
             with_sensors=True,
@@ -183,7 +199,8 @@ class Client:
             await asyncio.sleep(0.001)
 
     async def operate(self, rng: Random) -> str:
-        """Try one operation on hostile replies; return what came of it, raise what must not come of it."""
+        """Try one operation on hostile replies; return what came of it, raise what must not come of
+        it."""
         self.peer.transcript.clear()
         single = rng.random() < 0.8
         self.peer.answer = self.peer.hostile(rng, 0.0 if single else RIGHT_SHARE)
@@ -200,7 +217,8 @@ class Client:
         return "accepted"
 
     async def _single(self, rng: Random) -> None:
-        """One request: what is accepted must have been sent, bit for bit, in a whole frame of the right kind."""
+        """One request: what is accepted must have been sent, bit for bit, in a whole frame of the
+        right kind."""
         part = rng.choice(self._parts)
         device, unit = part.device, part.settings.unit
         if isinstance(part, Sensor) or rng.random() < 0.3:
@@ -213,7 +231,10 @@ class Client:
         else:
             found = await asyncio.wait_for(device.exchange(part.tell, [1, 2, 3], part.told), HANG_S)
             expected = b"\x17\x1c" + b"".join(word.to_bytes(2, "big") for word in found)
-        if bytes(replace(self.peer.asked, length=None, unit=unit, body=expected)) not in self.peer.sent:
+        if (
+            bytes(replace(self.peer.asked, length=None, unit=unit, body=expected))
+            not in self.peer.sent
+        ):
             raise AssertionError(f"accepted {expected.hex()}, which no frame of the peer's held")
 
     async def _look(self, rng: Random) -> None:
@@ -231,7 +252,8 @@ class Client:
 
 
 def hostile_rigs() -> list[RigSettings]:
-    """Return the plain rig, with floats where it does not count, and all on one RTU line; all of little patience."""
+    """Return the plain rig, with floats where it does not count, and all on one RTU line; all of
+    little patience."""
     text = (datasets() / "rigs" / "plain.toml").read_text()
     patience = "".join(f"{key} = {TIMEOUT_S}\n" for key in ("watchdog_s", "connect_s", "control_s"))
     text = re.sub(r"^watchdog_s = [^#\n]*\n", patience, text, flags=re.MULTILINE)
@@ -254,11 +276,14 @@ def _load(text: str, folder: Path) -> RigSettings:
 
 
 async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float = np.inf) -> Outcome:
-    """Try so many replies, or as many as there is time for; ``only`` one operation to see it again."""
+    """Try so many replies, or as many as there is time for; ``only`` one operation to see it
+    again."""
     outcome = Outcome("replies", seed)
     said = _listen_to_asyncio()
     rigs = hostile_rigs()
-    clients = [Client(rigs[k % len(rigs)]) for k in range(SIDE_BY_SIDE if only is None else len(rigs))]
+    clients = [
+        Client(rigs[k % len(rigs)]) for k in range(SIDE_BY_SIDE if only is None else len(rigs))
+    ]
     numbers = iter(range(1 << 60)) if only is None else iter([only] * len(rigs))
     until, before = time.monotonic() + seconds, peak_mib()
 
@@ -275,7 +300,9 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
             outcome.count(what, time.perf_counter() - began)
             if said:
                 outcome.fail(
-                    index, f"within asyncio, of this input or one beside it: {said.pop()}", client.peer.transcript
+                    index,
+                    f"within asyncio, of this input or one beside it: {said.pop()}",
+                    client.peer.transcript,
                 )
             await client.renew()
             if sum(c.peer.answered for c in clients) >= inputs or time.monotonic() > until:
@@ -290,7 +317,8 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
 
 
 def _listen_to_asyncio() -> list[str]:
-    """Return where it is noted what nobody waited for: asyncio would print it to the user as a traceback."""
+    """Return where it is noted what nobody waited for: asyncio would print it to the user as a
+    traceback."""
     said: list[str] = []
 
     def note(loop: asyncio.AbstractEventLoop, context: dict) -> None:

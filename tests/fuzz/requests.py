@@ -49,7 +49,8 @@ class Rig:
         return socket.create_connection(("127.0.0.1", self._port), timeout=HANG_S)
 
     def give_up(self) -> None:
-        """Close the connection: what the rig makes of a bad frame's rest is not the next input's business."""
+        """Close the connection: what the rig makes of a bad frame's rest is not the next input's
+        business."""
         if self._line is not None:
             self._line.close()
         self._line = None
@@ -84,15 +85,33 @@ class Rig:
 def serving() -> Iterator[Rig]:
     """Serve the plain rig, its set-points and angles floats, as a user would."""
     text = (datasets() / "rigs" / "plain.toml").read_text()
-    text = re.sub(r'^((angle|reference) = .*)"int32", scale = 1e-6', r'\1"float32"', text, flags=re.MULTILINE)
+    text = re.sub(
+        r'^((angle|reference) = .*)"int32", scale = 1e-6', r'\1"float32"', text, flags=re.MULTILINE
+    )
     with TemporaryDirectory() as folder, TemporaryFile() as complaints:
         path = Path(folder) / "rig.toml"
         path.write_text(text)
-        command = [sys.executable, "-m", "exoid_cli.app", "rig", "serve", path, "--run", "with_human", "--port", "0"]
+        command = [
+            sys.executable,
+            "-m",
+            "exoid_cli.app",
+            "rig",
+            "serve",
+            path,
+            "--run",
+            "with_human",
+            "--port",
+            "0",
+        ]
         with subprocess.Popen(
-            [*command, "--until-input-ends"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints
+            [*command, "--until-input-ends"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
         ) as process:
-            rig = Rig(process, int(process.stdout.readline().decode().rpartition(":")[2]), complaints)
+            rig = Rig(
+                process, int(process.stdout.readline().decode().rpartition(":")[2]), complaints
+            )
             try:
                 yield rig
             finally:
@@ -107,7 +126,11 @@ def request(rng: Random) -> Frame:
     """Return a request that is well formed, as far as its function is one that counts."""
     function = rng.choice((3, 16, 23, 23)) if rng.random() < 0.6 else rng.choice(FUNCTIONS)
     address = rng.choice(ADDRESSES) if rng.random() < 0.9 else rng.randrange(65536)
-    count = rng.choice((1, 2, 3, 14, 120, 121, 125, 126)) if rng.random() < 0.9 else rng.randrange(65536)
+    count = (
+        rng.choice((1, 2, 3, 14, 120, 121, 125, 126))
+        if rng.random() < 0.9
+        else rng.randrange(65536)
+    )
     data = words(rng, min(count, 120))
     if address in (200, 201, 202) and rng.random() < 0.7:  # a set-point, enabled
         address, count, data = 200, 3, words(rng, 2)[:4] + b"\x00\x0f"
@@ -134,7 +157,9 @@ def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float = np.in
             rng = Random(f"{seed}/{index}")
             frame = request(rng)
             name, script = ("right", [bytes(frame)]) if rng.random() < 0.5 else mutated(rng, frame)
-            transcript.append(f"{name}: {[s[:300].hex() if isinstance(s, bytes) else s for s in script[:8]]}")
+            transcript.append(
+                f"{name}: {[s[:300].hex() if isinstance(s, bytes) else s for s in script[:8]]}"
+            )
             began = time.perf_counter()
             what, wrong = _sent(rig, frame, name, script)
             if index % POLITE_EVERY == 0 or index == only:
@@ -146,7 +171,9 @@ def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float = np.in
                 break
         if only is None and (wrong := _flooded(rig)):
             outcome.failures.append(wrong)
-        outcome.grown_mib = peak_mib(rig.process.pid) - before if rig.process.poll() is None else 0.0
+        outcome.grown_mib = (
+            peak_mib(rig.process.pid) - before if rig.process.poll() is None else 0.0
+        )
     outcome.check_memory()
     return outcome
 
@@ -192,7 +219,8 @@ def _received(line: socket.socket, wait_s: float) -> bytes:
 
 
 def _flooded(rig: Rig) -> str | None:
-    """Ask for ever without fetching an answer, from one connection; then ask politely, beside many that are idle."""
+    """Ask for ever without fetching an answer, from one connection; then ask politely, beside many
+    that are idle."""
     idle = [rig.connect() for _ in range(100)]
     asked = bytes(Frame(1, 1, struct.pack(">BHH", 3, 100, 14)))
     with rig.connect() as greedy, suppress(OSError):

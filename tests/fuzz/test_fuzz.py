@@ -38,7 +38,9 @@ def answered():
         async def asking():
             client = replies.Client(replies.hostile_rigs()[0])
             await client.open()
-            client.peer.answer = lambda request: [bytes(change(Frame(request.transaction, 1, READ_14)))]
+            client.peer.answer = lambda request: [
+                bytes(change(Frame(request.transaction, 1, READ_14)))
+            ]
             try:
                 return await client.machine.drives[0].device.read(100, 14)
             finally:
@@ -81,7 +83,9 @@ def test_a_write_is_done_when_what_was_written_is_confirmed():
         drive = client.machine.drives[0]
         try:
             await drive.device.write(drive.tell, [1, 2, 3])
-            client.peer.answer = lambda request: [bytes(replace(request, length=None, body=b"\x10\x00\xc8\x00\x02"))]
+            client.peer.answer = lambda request: [
+                bytes(replace(request, length=None, body=b"\x10\x00\xc8\x00\x02"))
+            ]
             await drive.device.write(drive.tell, [1, 2, 3])
         finally:
             await client.end()

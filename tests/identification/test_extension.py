@@ -40,7 +40,9 @@ from tests.identification.test_two_step import with_noise
 
 HIDDEN = (
     PlantEffect(effect="coulomb_asymmetry", joint="hip", values={"asymmetry": 0.8}),
-    PlantEffect(effect="parallel_spring", joint="knee", values={"stiffness": 9.0, "rest_angle": -0.6}),
+    PlantEffect(
+        effect="parallel_spring", joint="knee", values={"stiffness": 9.0, "rest_angle": -0.6}
+    ),
     PlantEffect(effect="rotor_inertia", joint="knee", values={"inertia": 0.12}),
 )
 SIZES = {
@@ -89,7 +91,8 @@ def test_the_truth_of_an_extension_lies_in_its_intervals_95_times_in_100(hidden,
     inside = []
     for seed in range(20):
         table = identify(
-            with_noise(hidden, "20 ms", (0.6, 0.4), seed), extension=Extension(chosen(LABELS, THE_LEG))
+            with_noise(hidden, "20 ms", (0.6, 0.4), seed),
+            extension=Extension(chosen(LABELS, THE_LEG)),
         ).parameters
         true = np.append(truth, list(SIZES.values()))
         inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
@@ -110,14 +113,18 @@ def test_every_method_finds_what_is_named(estimator):
 
 def test_what_acts_with_a_human_only_is_fitted_in_the_second_step_and_leaves_the_first_alone():
     ligament = PlantEffect(
-        effect="passive_joint_torque", joint="knee", values={"stiffness": 14.0, "onset_angle": -0.8, "width": 0.25}
+        effect="passive_joint_torque",
+        joint="knee",
+        values={"stiffness": 14.0, "onset_angle": -0.8, "width": 0.25},
     )
     runs = session((ligament,))
     term = Term(PassiveJointTorque("knee"), np.array([1.0, -0.8, 0.25]))
     found, without = identify(runs, extension=Extension((term,))), identify(runs)
     assert sizes(found)["passive_joint_torque", "stiffness"] == pytest.approx(14.0, rel=0.02)
     first = without.parameters["step"] == "friction"
-    assert_allclose(found.parameters["value"][: first.sum()], without.parameters["value"][first], rtol=1e-9)
+    assert_allclose(
+        found.parameters["value"][: first.sum()], without.parameters["value"][first], rtol=1e-9
+    )
     held = found.parameters.set_index("name").loc[["onset_angle", "width"]]
     assert held["std_error"].isna().all()
 
@@ -139,13 +146,16 @@ def test_behind_soft_cuffs_machine_and_limb_have_each_their_own_body(truth):
 
 
 def shape_and_error(run):
-    """Return the encoder's offset of least residual, and its standard error under independent noise."""
+    """Return the encoder's offset of least residual, and its standard error under independent
+    noise."""
     on = run.machine
 
     def problem(offset):
         effects = (*baseline(on, ["exo_alone"]), EncoderOffset("joint", on=on))
         terms = (Term.of(e, [offset] * len(e.shape)) for e in effects)
-        return Problem(Training((run,), Model(tuple(terms))), ("exo_alone",), np.arange(4), np.zeros(4))
+        return Problem(
+            Training((run,), Model(tuple(terms))), ("exo_alone",), np.arange(4), np.zeros(4)
+        )
 
     def left(offset):
         of = problem(offset)
@@ -158,8 +168,8 @@ def shape_and_error(run):
 
 
 def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
-    """Behind an encoder 0.08 rad off, known as well as its run tells: gravity's moment goes with it, and would be too
-    sure of itself were the offset certain.
+    """Behind an encoder 0.08 rad off, known as well as its run tells: gravity's moment goes with
+    it, and would be too sure of itself were the offset certain.
     """
     noise = pendulum.Disturbed(torque_nm=0.3, correlation_s=1e-4)
     judged = replace(pendulum.motion(noise, 1000, purpose="validate"), file="validate.parquet")
@@ -174,11 +184,15 @@ def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
             known = Extension((term,), None if certain else np.array([[error**2]]))
             table = identify([run, judged], extension=known).parameters[:4]
             own.append(table["std_error"])
-        inside.append((table["ci95_low"] <= pendulum.TRUTH) & (pendulum.TRUTH <= table["ci95_high"]))
+        inside.append(
+            (table["ci95_low"] <= pendulum.TRUTH) & (pendulum.TRUTH <= table["ci95_high"])
+        )
         found.append(table["value"])
     scatter = np.std(found, axis=0)[1]
     carried, certain = (np.mean(errors[key], axis=0)[1] / scatter for key in (False, True))
-    print(f"\ncovered {np.mean(inside):.3f}; error of the moment over its scatter {carried:.2f}, {certain:.2f} without")
+    print(
+        f"\ncovered {np.mean(inside):.3f}; error of the moment over its scatter {carried:.2f}, {certain:.2f} without"
+    )
     assert 0.91 <= np.mean(inside) <= 0.99
     assert carried == pytest.approx(1.0, abs=0.2)
     assert certain < 0.8
@@ -198,16 +212,25 @@ def test_with_reversals_the_fit_is_least_squares_on_every_valid_block(hidden):
     assert identify(runs).method["samples"].startswith("all but |v| < 0.04 rad/s")
 
 
-ZEROS = {"exo_alone_train": 1.5, "exo_alone_validate": -2.0, "with_human_train": 0.7, "with_human_validate": -0.4}
+ZEROS = {
+    "exo_alone_train": 1.5,
+    "exo_alone_validate": -2.0,
+    "with_human_train": 0.7,
+    "with_human_validate": -0.4,
+}
 
 
 @pytest.fixture(scope="module")
 def tared(noiseless_motions, tmp_path_factory):
-    """A hip torque sensor that is tared anew at each start; the files, and what a diagnosis would tell of it."""
+    """A hip torque sensor that is tared anew at each start; the files, and what a diagnosis would
+    tell of it."""
     folder = tmp_path_factory.mktemp("tared")
     runs, files = [], []
     for motion in noiseless_motions:
-        run = replace(motion, torque=motion.torque + np.array([ZEROS[motion.file.removesuffix(".parquet")], 0.0]))
+        run = replace(
+            motion,
+            torque=motion.torque + np.array([ZEROS[motion.file.removesuffix(".parquet")], 0.0]),
+        )
         frame = {"time_s": run.time, "segment": run.segment, "valid": run.valid}
         for j, joint in enumerate(run.joints):
             frame |= {
@@ -231,9 +254,13 @@ def told_of(files, told, folder):
         ]
     )  # fmt: skip
     of_runs = [
-        {"name": f.name, "sha256": recording_behind(f), "values": {"offset": ZEROS[f.stem]}} for f in files if told(f)
+        {"name": f.name, "sha256": recording_behind(f), "values": {"offset": ZEROS[f.stem]}}
+        for f in files
+        if told(f)
     ]
-    PARAMETERS.write(folder / "parameters.parquet", plain, {"each_run": {"torque_offset@hip": of_runs}})
+    PARAMETERS.write(
+        folder / "parameters.parquet", plain, {"each_run": {"torque_offset@hip": of_runs}}
+    )
     return PARAMETERS.read(folder / "parameters.parquet")
 
 
@@ -246,22 +273,33 @@ def test_what_each_run_has_for_itself_is_fitted_in_each(tared, truth, tmp_path):
     assert (last["effect"], bool(last["each_run"])) == ("torque_offset", True)
     assert last["value"] == pytest.approx(1.5, abs=0.01)
     told = {one["name"]: one["values"]["offset"] for one in found.each_run["torque_offset@hip"]}
-    assert told == pytest.approx({f"{name}.parquet": zero for name, zero in ZEROS.items()}, abs=0.01)
+    assert told == pytest.approx(
+        {f"{name}.parquet": zero for name, zero in ZEROS.items()}, abs=0.01
+    )
     assert found.validation.pooled.rmse.max() < 0.05
-    assert [r for r in found.remarks if "was learnt from this run" in r and r.startswith("exo_alone_validate")]
+    assert [
+        r
+        for r in found.remarks
+        if "was learnt from this run" in r and r.startswith("exo_alone_validate")
+    ]
     assert identify(runs).validation.pooled.rmse[0] > 1.0
 
 
 def test_intervals_hold_where_a_sensor_is_tared_anew_in_each_run(tared, truth, tmp_path):
-    """Gravity's moment goes with such an offset: were it held for certain, a third of its intervals would hold."""
+    """Gravity's moment goes with such an offset: were it held for certain, a third of its intervals
+    would hold."""
     runs, files = tared
     extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
     true = np.append(truth, 1.5)
     inside = []
     for seed in range(20):
-        table = identify(with_noise(runs, "20 ms", (0.6, 0.4), seed), extension=extension).parameters
+        table = identify(
+            with_noise(runs, "20 ms", (0.6, 0.4), seed), extension=extension
+        ).parameters
         inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
-    print(f"\ncovered {np.mean(inside):.3f}; the moments {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}")
+    print(
+        f"\ncovered {np.mean(inside):.3f}; the moments {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}"
+    )
     assert 0.91 <= np.mean(inside) <= 0.99
     assert np.mean(inside, axis=0)[[3, 11, 15]].min() > 0.8
 
@@ -275,7 +313,8 @@ def test_a_run_that_the_diagnosis_did_not_see_is_told_to_have_anothers_zero(tare
 
 
 SMALL = {"joint_elasticity": 0.12, "backlash": 0.12, "cuff_compliance": 0.06}
-"""How far the rigid bodies may be off behind what is undone approximately; all others are within 1.5 %."""
+"""How far the rigid bodies may be off behind what is undone approximately; all others are within
+1.5 %."""
 
 
 OF_LAST_JOINT = [t for t in TERMS if t.effect.joint == (t.effect.joints or ("hip",))[-1]]
@@ -289,7 +328,8 @@ OF_LAST_JOINT = [t for t in TERMS if t.effect.joint == (t.effect.joints or ("hip
     ],
 )
 def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_ones(term, truth):
-    """Those too whose torque goes with the load, which is not measured: the drive's own friction is in what is."""
+    """Those too whose torque goes with the load, which is not measured: the drive's own friction is
+    in what is."""
     effect = term.effect
     if effect.name in ("rigid_body", "friction") or effect.goes_with_time:
         pytest.skip("is fitted anyway, or differs from run to run")
@@ -297,10 +337,14 @@ def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_one
         pytest.skip("warms while the machine moves to where the run begins")
     names = [p.name for p in effect.parameters]
     true = dict(zip(names, map(float, effect.physical(term.values)), strict=True))
-    runs = session((PlantEffect(effect=effect.name, joint=effect.joint, values=true),), seconds=20.0)
+    runs = session(
+        (PlantEffect(effect=effect.name, joint=effect.joint, values=true),), seconds=20.0
+    )
     held = Term.of(effect, term.shape)
     found, without = identify(runs, extension=Extension((held,))), identify(runs)
-    assert sizes(found) == pytest.approx({(effect.name, name): value for name, value in true.items()}, rel=0.02)
+    assert sizes(found) == pytest.approx(
+        {(effect.name, name): value for name, value in true.items()}, rel=0.02
+    )
     body = found.parameters[found.parameters["effect"] == "rigid_body"]
     expected = np.delete(truth, np.s_[4:8])
     if effect.side is Side.DRIVE:
@@ -310,18 +354,23 @@ def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_one
 
 
 @pytest.mark.parametrize(("stiffness", "trusted"), [(150.0, True), (15.0, False)])
-def test_values_behind_a_spring_that_these_runs_do_not_go_with_are_not_to_be_trusted(hidden, stiffness, trusted):
+def test_values_behind_a_spring_that_these_runs_do_not_go_with_are_not_to_be_trusted(
+    hidden, stiffness, trusted
+):
     held = Term(JointElasticity("knee"), np.array([stiffness]))
     remarks = identify(hidden, extension=Extension((held,))).remarks
     assert any("did not come to agree" in remark for remark in remarks) != trusted
 
 
 def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
-    """Of two things that a torque sensor does, the order counts: simulation takes them as identification did."""
+    """Of two things that a torque sensor does, the order counts: simulation takes them as
+    identification did."""
     runs, files = tared
     extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
     gained = extension.with_terms([Term(TorqueGain("hip"), np.array([1.3]))])
-    found = identify([replace(run, torque=run.torque * [1.3, 1.0]) for run in runs], extension=gained)
+    found = identify(
+        [replace(run, torque=run.torque * [1.3, 1.0]) for run in runs], extension=gained
+    )
     for kind in ("exo_alone", "with_human"):
         run = next(run for run in found.training.runs if run.run == kind)
         told = {one["name"]: one["values"] for one in found.each_run["torque_offset@hip"]}[run.file]
@@ -334,17 +383,28 @@ def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
 def test_what_is_named_twice_is_fitted_once_and_that_is_told():
     once = Extension(chosen(["rotor_inertia@knee"], THE_LEG))
     again = once.with_terms(chosen(["rotor_inertia@knee", "torque_offset@hip"], THE_LEG))
-    assert [term.effect.label for term in again.terms] == ["rotor_inertia@knee", "torque_offset@hip"]
-    assert again.remarks == ("rotor_inertia@knee is among the causes already, and is fitted as it is there",)
+    assert [term.effect.label for term in again.terms] == [
+        "rotor_inertia@knee",
+        "torque_offset@hip",
+    ]
+    assert again.remarks == (
+        "rotor_inertia@knee is among the causes already, and is fitted as it is there",
+    )
 
 
 @pytest.mark.parametrize(
     ("label", "said"),
     [
-        ("encoder_offset@hip", r"--effect: found encoder_offset@hip, expected coulomb_asymmetry@hip or "),
+        (
+            "encoder_offset@hip",
+            r"--effect: found encoder_offset@hip, expected coulomb_asymmetry@hip or ",
+        ),
         ("friction@hip", r"--effect: found friction@hip, expected"),
         ("cogging@knee", r"--effect: found cogging@knee, expected"),
-        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected torque_offset@hip or torque_offset@k"),
+        (
+            "torque_offset@ankle",
+            r"--effect: found torque_offset@ankle, expected torque_offset@hip or torque_offset@k",
+        ),
         ("rotor_inertia", r"--effect: found rotor_inertia, expected rotor_inertia@knee \(others"),
     ],
 )
@@ -353,29 +413,49 @@ def test_what_cannot_be_fitted_by_its_name_alone_is_refused(label, said):
         chosen([label], THE_LEG)
 
 
-def test_a_cause_of_a_human_is_left_out_where_nobody_is_in_the_machine_and_that_is_told(tared, tmp_path):
+def test_a_cause_of_a_human_is_left_out_where_nobody_is_in_the_machine_and_that_is_told(
+    tared, tmp_path
+):
     runs, files = tared
     table = told_of(files, lambda f: True, tmp_path)
-    cuffs = table.frame.assign(effect="cuff_compliance", joint="knee", name="stiffness", value=120.0, each_run=False)
+    cuffs = table.frame.assign(
+        effect="cuff_compliance", joint="knee", name="stiffness", value=120.0, each_run=False
+    )
     frame = pd.concat([table.frame, cuffs], ignore_index=True)
     extension = named(replace(table, frame=frame), runs[:2], files[:2])
     assert [term.effect.label for term in extension.terms] == ["torque_offset@hip"]
     found = identify(runs[:2], extension=extension)
-    assert "cuff_compliance@knee is left out: it acts in none of these runs to train on" in found.remarks
+    assert (
+        "cuff_compliance@knee is left out: it acts in none of these runs to train on"
+        in found.remarks
+    )
 
 
 def test_a_diagnosis_of_another_machine_is_refused(tared, tmp_path):
     runs, files = tared
     table = told_of(files, lambda f: True, tmp_path)
-    other = replace(table, metadata=table.metadata | {"joints": [{"name": "axis", "kind": "prismatic"}]})
-    with pytest.raises(InputError, match=r"with the joints axis \(prismatic\), the runs are of a leg with hip \(rev"):
+    other = replace(
+        table, metadata=table.metadata | {"joints": [{"name": "axis", "kind": "prismatic"}]}
+    )
+    with pytest.raises(
+        InputError,
+        match=r"with the joints axis \(prismatic\), the runs are of a leg with hip \(rev",
+    ):
         named(other, runs, files)
 
 
-def test_rows_of_what_each_run_has_for_itself_are_all_of_the_first_run_that_was_trained_on(noiseless_motions):
+def test_rows_of_what_each_run_has_for_itself_are_all_of_the_first_run_that_was_trained_on(
+    noiseless_motions,
+):
     """The diagnosis' own first run may not be among them."""
-    zeros = {motion.file: zero for motion, zero in zip(noiseless_motions, (0.03, -0.02, 0.05, 0.01), strict=True)}
-    runs = [replace(motion, q=motion.q + np.array([zeros[motion.file], 0.0])) for motion in noiseless_motions]
+    zeros = {
+        motion.file: zero
+        for motion, zero in zip(noiseless_motions, (0.03, -0.02, 0.05, 0.01), strict=True)
+    }
+    runs = [
+        replace(motion, q=motion.q + np.array([zeros[motion.file], 0.0]))
+        for motion in noiseless_motions
+    ]
     effect = EncoderOffset("hip", each_run=True)
     own = {file: (Term(effect, np.array([zero])),) for file, zero in zeros.items()}
     found = identify(runs, extension=Extension((Term(effect, np.array([0.2])),), own=own))
@@ -386,13 +466,20 @@ def test_rows_of_what_each_run_has_for_itself_are_all_of_the_first_run_that_was_
 
 def test_the_empty_machine_alone_is_refitted_by_a_diagnosis_that_knew_a_human(hidden):
     """Its table tells of bodies that are not in these runs."""
-    bodies = {kind: np.array([1.0, 0.22, 0.55, 2.3]) for kind in ("exo_alone", "with_human", "human")}
+    bodies = {
+        kind: np.array([1.0, 0.22, 0.55, 2.3]) for kind in ("exo_alone", "with_human", "human")
+    }
     extension = Extension(chosen(LABELS, THE_LEG), bodies=bodies)
-    found = identify([motion for motion in hidden if motion.run == "exo_alone"], extension=extension)
+    found = identify(
+        [motion for motion in hidden if motion.run == "exo_alone"], extension=extension
+    )
     assert sizes(found) == pytest.approx(SIZES, rel=0.02)
 
 
 def test_a_torque_that_is_nought_all_along_is_refused_beside_effects_too(hidden):
     silent = [replace(motion, torque=motion.torque * np.array([1.0, 0.0])) for motion in hidden]
-    with pytest.raises(InputError, match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts"):
+    with pytest.raises(
+        InputError,
+        match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts",
+    ):
         identify(silent, extension=Extension(chosen(LABELS, THE_LEG)))

@@ -25,7 +25,10 @@ SESSIONS = 200
 def noisy(motion, seed):
     rho = np.exp(-1.0 / (motion.sample_rate_hz * NOISE.correlation_s))
     white = np.random.default_rng(seed).standard_normal((len(motion) + 200, 2))
-    noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], white, axis=0)[200:] * [NOISE.hip_nm, NOISE.knee_nm]
+    noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], white, axis=0)[200:] * [
+        NOISE.hip_nm,
+        NOISE.knee_nm,
+    ]
     return replace(motion, torque=motion.torque + noise)
 
 
@@ -42,6 +45,8 @@ def test_foretold_standard_errors_are_the_scatter_of_identifications():
     tables = [identify([noisy(train, seed), validate]).parameters for seed in range(SESSIONS)]
     scatter = np.std([table["value"] for table in tables], axis=0)
     said = np.mean([table["std_error"] for table in tables], axis=0)
-    print(f"\nover the scatter {np.round(foretold / scatter, 2)}, over the fit's own {np.round(foretold / said, 2)}")
+    print(
+        f"\nover the scatter {np.round(foretold / scatter, 2)}, over the fit's own {np.round(foretold / said, 2)}"
+    )
     np.testing.assert_allclose(foretold, scatter, rtol=0.2)
     np.testing.assert_allclose(foretold, said, rtol=0.2)

@@ -1,6 +1,8 @@
-"""Why torque and regressor go through one filter, and reversals are left out: what a faultless fit leaves otherwise.
+"""Why torque and regressor go through one filter, and reversals are left out: what a faultless fit
+leaves otherwise.
 
-``pytest -s tests/identification/test_regression_filter.py`` prints the ratios that docs/identification.md quotes.
+``pytest -s tests/identification/test_regression_filter.py`` prints the ratios that
+docs/identification.md quotes.
 """
 
 import numpy as np
@@ -22,10 +24,15 @@ def coloured(samples, rate_hz):
 
 
 def blocks(motion):
-    """Averages over 25 ms: the filter, the samples that remain, and whether all of a block's samples are good."""
+    """Averages over 25 ms: the filter, the samples that remain, and whether all of a block's
+    samples are good."""
     block = block_average(motion)
     starts = block.starts(motion.segment)
-    return lambda x: block.mean(x, starts), starts + block.decimation // 2, lambda good: block.all(good, starts)
+    return (
+        lambda x: block.mean(x, starts),
+        starts + block.decimation // 2,
+        lambda good: block.all(good, starts),
+    )
 
 
 def five_hertz(motion):
@@ -39,11 +46,16 @@ def left(regressor, torque, noise, rows):
     y = np.concatenate([torque[rows[:, j], j] / NOISE[j] for j in range(2)])
     values = np.linalg.lstsq(A, y, rcond=None)[0]
     both = rows.all(axis=1)
-    return np.sqrt(np.mean((torque - regressor @ values)[both] ** 2, axis=0) / np.mean(noise[both] ** 2, axis=0))
+    return np.sqrt(
+        np.mean((torque - regressor @ values)[both] ** 2, axis=0)
+        / np.mean(noise[both] ** 2, axis=0)
+    )
 
 
 @pytest.mark.parametrize("method", [blocks, five_hertz])
-def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_itself(noiseless_motions, method):
+def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_itself(
+    noiseless_motions, method
+):
     motion = noiseless_motions[0]
     noise = coloured(len(motion), motion.sample_rate_hz)
     effects = baseline(motion.machine, ("exo_alone",))
@@ -55,7 +67,9 @@ def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_its
     torque_alone = left(regressor[kept], torque, rest, valid)
     both_alike = left(smooth(regressor), torque, rest, valid)
     masked = left(smooth(regressor), torque, rest, moving)
-    print(f"\n{method.__name__}: torque alone {torque_alone}, both alike {both_alike}, and masked {masked}")
+    print(
+        f"\n{method.__name__}: torque alone {torque_alone}, both alike {both_alike}, and masked {masked}"
+    )
     assert np.all(torque_alone > both_alike)
     assert np.all(both_alike > 1.08)
     np.testing.assert_allclose(masked, 1.0, atol=0.02)

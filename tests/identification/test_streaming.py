@@ -42,13 +42,19 @@ def test_pieces_change_nothing_but_rounding(recordings, monkeypatch):
     found = identify(runs)
     scale = whole.parameters["std_error"]
     for column in ("value", "std_error", "ci95_low", "ci95_high"):
-        assert_allclose((found.parameters[column] - whole.parameters[column]) / scale, 0.0, atol=1e-7)
-    assert_allclose(found.covariance, whole.covariance, rtol=0, atol=1e-7 * np.abs(whole.covariance).max())
+        assert_allclose(
+            (found.parameters[column] - whole.parameters[column]) / scale, 0.0, atol=1e-7
+        )
+    assert_allclose(
+        found.covariance, whole.covariance, rtol=0, atol=1e-7 * np.abs(whole.covariance).max()
+    )
     assert_allclose(found.one_step, whole.one_step, rtol=1e-8)
     assert_allclose(found.validation.pooled.rmse, whole.validation.pooled.rmse, rtol=1e-9)
     assert found.validation.pooled.samples == whole.validation.pooled.samples
     left = [
-        pa.concat_tables(residuals(some, whole.model_of, "baseline")).to_pandas().reset_index(drop=True)
+        pa.concat_tables(residuals(some, whole.model_of, "baseline"))
+        .to_pandas()
+        .reset_index(drop=True)
         for some in (runs, motions)
     ]
     assert_frame_equal(*left, rtol=1e-8, atol=1e-8)
@@ -59,7 +65,9 @@ def test_a_figure_of_a_long_run_has_rows_from_all_of_it_and_the_error_of_all_of_
 
     rng = np.random.default_rng(0)
     n = 5000
-    whole = pd.DataFrame({"time_s": np.arange(n), "scored": rng.random(n) < 0.8, "left": rng.standard_normal(n)})
+    whole = pd.DataFrame(
+        {"time_s": np.arange(n), "scored": rng.random(n) < 0.8, "left": rng.standard_normal(n)}
+    )
     drawn = figures._Drawn(whole.iloc[:0])
     for start in range(0, n, 37):
         drawn.add(whole.iloc[start : start + 37], ["left"])

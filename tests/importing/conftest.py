@@ -37,7 +37,12 @@ class Pendulum:
     torque: NDArray
 
     def columns(self) -> dict[str, NDArray]:
-        return {"time": self.time, "angle": self.angle, "velocity": self.velocity, "torque": self.torque}
+        return {
+            "time": self.time,
+            "angle": self.angle,
+            "velocity": self.velocity,
+            "torque": self.torque,
+        }
 
 
 @pytest.fixture
@@ -48,7 +53,9 @@ def pendulum() -> Pendulum:
     angle = np.sin(phases) @ [0.5, 0.3, 0.1]
     velocity = (np.cos(phases) * frequencies) @ [0.5, 0.3, 0.1]
     acceleration = (-np.sin(phases) * frequencies**2) @ [0.5, 0.3, 0.1]
-    torque = 0.05 * acceleration + 2.0 * np.sin(angle) + 0.1 * velocity + 0.2 * np.tanh(velocity / 0.01)
+    torque = (
+        0.05 * acceleration + 2.0 * np.sin(angle) + 0.1 * velocity + 0.2 * np.tanh(velocity / 0.01)
+    )
     return Pendulum(time, angle, velocity, torque)
 
 
@@ -87,7 +94,15 @@ def imported(tmp_path, capsys):
 def write_csv(tmp_path):
     """Write columns as text."""
 
-    def write(columns, name="log.csv", delimiter=",", decimal=".", header=True, before="", encoding="utf-8"):
+    def write(
+        columns,
+        name="log.csv",
+        delimiter=",",
+        decimal=".",
+        header=True,
+        before="",
+        encoding="utf-8",
+    ):
         lines = [delimiter.join(columns)] if header else []
         for row in zip(*columns.values(), strict=True):
             lines.append(delimiter.join(str(value).replace(".", decimal) for value in row))
@@ -101,21 +116,29 @@ def write_csv(tmp_path):
 @pytest.fixture(params=["mcap", "sqlite3"])
 def bag(request, pendulum, tmp_path):
     """A ROS 2 bag whose messages name two joints in changing order, beside another topic."""
-    rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
+    rosbag2, typesys = (
+        pytest.importorskip("rosbags.rosbag2"),
+        pytest.importorskip("rosbags.typesys"),
+    )
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     types = store.types
-    plugin = rosbag2.StoragePlugin.MCAP if request.param == "mcap" else rosbag2.StoragePlugin.SQLITE3
+    plugin = (
+        rosbag2.StoragePlugin.MCAP if request.param == "mcap" else rosbag2.StoragePlugin.SQLITE3
+    )
     with rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
         kind = "sensor_msgs/msg/JointState"
         states = writer.add_connection("/joint_states", kind, typestore=store)
         text = writer.add_connection("/rosout_text", "std_msgs/msg/String", typestore=store)
         hello = types["std_msgs/msg/String"]("hello")
-        writer.write(text, 1_700_000_000_000_000_000, store.serialize_cdr(hello, "std_msgs/msg/String"))
+        writer.write(
+            text, 1_700_000_000_000_000_000, store.serialize_cdr(hello, "std_msgs/msg/String")
+        )
         rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)
         for k, (time, *values) in enumerate(rows):
             stamp = 1_700_000_000_000_000_000 + round(time * 1e9)
             header = types["std_msgs/msg/Header"](
-                types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), "base"
+                types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9),
+                "base",
             )
             order = [0, 1] if k % 2 else [1, 0]
             arrays = [np.array([value, 9.0])[order] for value in values]

@@ -1,4 +1,5 @@
-"""A clock that repeats, goes back, starts over, stops or wraps: seen, told, handled; nothing is invented."""
+"""A clock that repeats, goes back, starts over, stops or wraps: seen, told, handled; nothing is
+invented."""
 
 import numpy as np
 import pandas as pd
@@ -65,9 +66,14 @@ def test_rows_without_a_number_become_gaps(imported, pendulum, write_csv):
 
 
 def test_repeated_stamps_are_dropped_and_told(imported, pendulum, write_csv):
-    outcome = imported(write_csv(cut(pendulum.columns(), np.sort(np.append(np.arange(2000), [50, 50, 60])))))
+    outcome = imported(
+        write_csv(cut(pendulum.columns(), np.sort(np.append(np.arange(2000), [50, 50, 60]))))
+    )
     assert len(outcome.recording().frame) == 2000
-    assert "3 rows (0.1%) with the stamp of another, the first is row 51; the first of each kept" in outcome.told
+    assert (
+        "3 rows (0.1%) with the stamp of another, the first is row 51; the first of each kept"
+        in outcome.told
+    )
 
 
 def test_rows_out_of_order_are_put_in_order(imported, pendulum, write_csv):
@@ -90,7 +96,9 @@ def test_a_clock_that_starts_over_keeps_the_longest_run(imported, pendulum, writ
 
 def test_a_clock_that_starts_over_can_be_split_into_runs(imported, pendulum, write_csv):
     columns = joined(cut(pendulum.columns(), slice(0, 600)), pendulum.columns())
-    outcome = imported(write_csv(columns), map_text=MAP.replace('unit = "s"', 'unit = "s"\nrestarts = "split"', 1))
+    outcome = imported(
+        write_csv(columns), map_text=MAP.replace('unit = "s"', 'unit = "s"\nrestarts = "split"', 1)
+    )
     assert len(outcome.recording("whole_run1").frame) == 600
     assert len(outcome.recording("whole_run2").frame) == 2000
 
@@ -98,7 +106,9 @@ def test_a_clock_that_starts_over_can_be_split_into_runs(imported, pendulum, wri
 def test_a_short_run_that_starts_over_is_not_mixed_with_the_next(imported, pendulum, write_csv):
     """Half a second back is no more than a late packet could be; a hundred rows of it are."""
     columns = joined(cut(pendulum.columns(), slice(0, 100)), pendulum.columns())
-    assert_allclose(imported(write_csv(columns)).recording().frame["pivot_angle_rad"], pendulum.angle)
+    assert_allclose(
+        imported(write_csv(columns)).recording().frame["pivot_angle_rad"], pendulum.angle
+    )
 
 
 def test_a_first_sample_long_before_the_rest_is_left_out(imported, pendulum, write_csv):
@@ -122,7 +132,9 @@ def test_a_single_wild_stamp_is_left_out(imported, pendulum, write_csv):
 def test_a_clock_that_was_full_is_told_of_and_counted_on_where_the_map_says_so(
     imported, pendulum, write_csv, bits, unit, scale
 ):
-    ticks = (np.round(pendulum.time * scale).astype(np.int64) + 2**bits - round(4 * scale)) % 2**bits
+    ticks = (
+        np.round(pendulum.time * scale).astype(np.int64) + 2**bits - round(4 * scale)
+    ) % 2**bits
     path = write_csv(pendulum.columns() | {"time": ticks})
     text = MAP.replace('unit = "s"', f'unit = "{unit}"', 1)
     silent = imported(path, map_text=text)
@@ -132,13 +144,17 @@ def test_a_clock_that_was_full_is_told_of_and_counted_on_where_the_map_says_so(
 
 
 @pytest.mark.parametrize("kind", ["uint32", "uint64", "int32", "int64"])
-def test_a_clock_of_any_width_that_starts_over_steps_back_and_does_not_wrap_round(imported, pendulum, tmp_path, kind):
+def test_a_clock_of_any_width_that_starts_over_steps_back_and_does_not_wrap_round(
+    imported, pendulum, tmp_path, kind
+):
     """Stamps before the first one, as numbers without a sign, are 50 days later."""
     milliseconds = np.where(np.arange(2000) < 900, 100_000, 0) + np.round(1e3 * pendulum.time)
     milliseconds[[30, 31]] = milliseconds[[31, 30]]
     path = tmp_path / "log.parquet"
     pd.DataFrame(pendulum.columns() | {"time": milliseconds.astype(kind)}).to_parquet(path)
-    outcome = imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ms"\nrestarts = "split"', 1))
+    outcome = imported(
+        path, map_text=MAP.replace('unit = "s"', 'unit = "ms"\nrestarts = "split"', 1)
+    )
     assert "goes back a little, 1 time" in outcome.told
     lengths = sorted(len(RECORDING.read(file).frame) for file in outcome.folder.glob("*.parquet"))
     assert lengths == [900, 1100]
@@ -164,7 +180,8 @@ def test_a_log_without_a_clock_is_uniform_where_the_map_says_so(imported, pendul
 
 
 def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, tmp_path):
-    """Torque at 1 kHz, from its own clock, beside angles at 200 Hz: 0.05 N·m s² of bend make at most 10^-4 N·m."""
+    """Torque at 1 kHz, from its own clock, beside angles at 200 Hz: 0.05 N·m s² of bend make at
+    most 10^-4 N·m."""
     import scipy.io
 
     fast = np.arange(0.5, 9.0, 0.001)
@@ -179,8 +196,13 @@ def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, t
     inside = (pendulum.time >= 0.5) & (pendulum.time <= fast[-1])
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[inside], atol=1e-4)
     assert "sampled at 1000 Hz by a clock of its own (fast)" in outcome.told
-    uniform = imported(path, map_text=text.replace('column = "time"\nunit = "s"', "rate_hz = 200.0", 1))
-    assert (uniform.code, "joint[0].torque.time: found 'fast' beside time.rate_hz" in uniform.err) == (2, True)
+    uniform = imported(
+        path, map_text=text.replace('column = "time"\nunit = "s"', "rate_hz = 200.0", 1)
+    )
+    assert (
+        uniform.code,
+        "joint[0].torque.time: found 'fast' beside time.rate_hz" in uniform.err,
+    ) == (2, True)
 
 
 def test_rows_that_never_hold_both_need_to_be_interpolated(imported, pendulum, write_csv):
@@ -205,39 +227,64 @@ def test_a_short_irregular_recording_can_be_filtered(imported, pendulum, write_c
     columns = cut(pendulum.columns(), slice(0, 1200)) | {"time": pendulum.time[:1200] + jitter}
     outcome = imported(write_csv(columns))
     assert (
-        run(["-q", "filter", str(outcome.folder / "whole.parquet"), "-o", str(outcome.folder / "motion.parquet")]) == 0
+        run(
+            [
+                "-q",
+                "filter",
+                str(outcome.folder / "whole.parquet"),
+                "-o",
+                str(outcome.folder / "motion.parquet"),
+            ]
+        )
+        == 0
     )
 
 
 @pytest.mark.parametrize(("factor", "rate"), [(1e3, "0.2"), (1e-3, "2e+05")])
 def test_a_unit_that_makes_no_machines_rate_is_told(imported, pendulum, write_csv, factor, rate):
-    """Milliseconds taken for seconds, and seconds for milliseconds: imported as the map says, and told."""
+    """Milliseconds taken for seconds, and seconds for milliseconds: imported as the map says, and
+    told."""
     outcome = imported(write_csv(pendulum.columns() | {"time": factor * pendulum.time}))
     assert outcome.code == 0
-    assert f"time: {rate} Hz, where machines are sampled at 10 to 10000 Hz; kept; check time.unit" in outcome.told
+    assert (
+        f"time: {rate} Hz, where machines are sampled at 10 to 10000 Hz; kept; check time.unit"
+        in outcome.told
+    )
     assert "check time.unit" not in imported(write_csv(pendulum.columns())).told
 
 
 def test_a_log_whose_rows_are_reversed_is_told_so(imported, exoid, pendulum, write_csv):
     path = write_csv({name: values[::-1] for name, values in pendulum.columns().items()})
     outcome = imported(path)
-    assert (outcome.code, "its clock runs backwards, by 9.995 s from the first row to the last" in outcome.err) == (
+    assert (
+        outcome.code,
+        "its clock runs backwards, by 9.995 s from the first row to the last" in outcome.err,
+    ) == (
         2,
         True,
     )
     outcome = exoid("import", path, "--guess")
-    assert (outcome.code, "its clock, 'time', runs backwards; turn the order of its rows round" in outcome.err) == (
+    assert (
+        outcome.code,
+        "its clock, 'time', runs backwards; turn the order of its rows round" in outcome.err,
+    ) == (
         2,
         True,
     )
 
 
-def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_it_says(imported, pendulum, write_csv):
+def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_it_says(
+    imported, pendulum, write_csv
+):
     stamps = pd.Timestamp("2024-03-05 23:59:58") + pd.to_timedelta(pendulum.time, unit="s")
     columns = pendulum.columns() | {"time": stamps.strftime("%d.%m.%Y %H:%M:%S,%f")}
     text = MAP.replace('unit = "s"', 'unit = "iso8601"', 1)
     outcome = imported(write_csv(columns, delimiter=";"), map_text=text)
     assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
-    american = imported(write_csv(pendulum.columns() | {"time": stamps.strftime("%m/%d/%y %I.%M")}), map_text=text)
+    american = imported(
+        write_csv(pendulum.columns() | {"time": stamps.strftime("%m/%d/%y %I.%M")}), map_text=text
+    )
     assert (american.code, american.err.count("\n")) == (2, 1)
-    assert "has '03/05/24 11.59' where a date should be, expected dates as 2026-01-31" in american.err
+    assert (
+        "has '03/05/24 11.59' where a date should be, expected dates as 2026-01-31" in american.err
+    )

@@ -56,7 +56,9 @@ def test_a_row_of_units_below_the_header_belongs_to_the_names(imported, pendulum
     path = write_csv(pendulum.columns())
     header, rest = path.read_text().split("\n", 1)
     path.write_text(f"{header}\n{units}\n{rest}")
-    names = dict(zip(pendulum.columns(), units.replace("[", "").replace("]", "").split(","), strict=True))
+    names = dict(
+        zip(pendulum.columns(), units.replace("[", "").replace("]", "").split(","), strict=True)
+    )
     text = MAP
     for name, unit in names.items():
         text = text.replace(f'column = "{name}"', f'column = "{name} [{unit}]"')
@@ -84,13 +86,17 @@ def test_names_in_quotes_may_hold_the_delimiter(imported, pendulum, write_csv):
 def test_dates_are_time(imported, pendulum, write_csv):
     dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
     path = write_csv(pendulum.columns() | {"time": dates.strftime("%Y-%m-%d %H:%M:%S.%f")})
-    assert_is_the_pendulum(imported(path, map_text=MAP.replace('unit = "s"', 'unit = "iso8601"')), pendulum)
+    assert_is_the_pendulum(
+        imported(path, map_text=MAP.replace('unit = "s"', 'unit = "iso8601"')), pendulum
+    )
 
 
 def test_nanoseconds_since_1970_lose_no_digit(imported, pendulum, write_csv):
     stamps = 1_700_000_000_123_456_789 + np.round(pendulum.time * 1e9).astype(np.int64)
     path = write_csv(pendulum.columns() | {"time": stamps})
-    assert_is_the_pendulum(imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ns"')), pendulum)
+    assert_is_the_pendulum(
+        imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ns"')), pendulum
+    )
 
 
 def test_parquet(imported, pendulum, tmp_path):
@@ -101,8 +107,12 @@ def test_parquet(imported, pendulum, tmp_path):
 
 def test_parquet_with_nested_columns(imported, pendulum, tmp_path):
     path = tmp_path / "log.parquet"
-    states = [{"angle": a, "velocity": v} for a, v in zip(pendulum.angle, pendulum.velocity, strict=True)]
-    pd.DataFrame({"time": pendulum.time, "state": states, "torque": pendulum.torque}).to_parquet(path)
+    states = [
+        {"angle": a, "velocity": v} for a, v in zip(pendulum.angle, pendulum.velocity, strict=True)
+    ]
+    pd.DataFrame({"time": pendulum.time, "state": states, "torque": pendulum.torque}).to_parquet(
+        path
+    )
     text = MAP.replace('"angle"', '"state.angle"').replace('"velocity"', '"state.velocity"')
     assert_is_the_pendulum(imported(path, map_text=text), pendulum)
 
@@ -125,11 +135,15 @@ def test_json(imported, pendulum, tmp_path, shape):
 def test_json_with_arrays_in_its_records(imported, pendulum, tmp_path):
     records = [
         {"t": t, "joints": {"q": [0.0, q], "dq": [0.0, dq]}, "tau": [0.0, tau]}
-        for t, q, dq, tau in zip(*(values.tolist() for values in pendulum.columns().values()), strict=True)
+        for t, q, dq, tau in zip(
+            *(values.tolist() for values in pendulum.columns().values()), strict=True
+        )
     ]
     path = tmp_path / "log.json"
     path.write_text(json.dumps({"data": {"samples": records}, "note": "x"}))
-    text = '[source]\ntable = "data.samples"\n' + MAP.replace('"time"', '"t"').replace('"angle"', '"joints.q[1]"')
+    text = '[source]\ntable = "data.samples"\n' + MAP.replace('"time"', '"t"').replace(
+        '"angle"', '"joints.q[1]"'
+    )
     text = text.replace('"velocity"', '"joints.dq[1]"').replace('"torque"', '"tau[1]"')
     assert_is_the_pendulum(imported(path, map_text=text), pendulum)
 
@@ -145,14 +159,17 @@ def test_matlab(imported, pendulum, tmp_path, version):
 def test_matlab_structs_and_matrices(imported, pendulum, tmp_path):
     path = tmp_path / "log.mat"
     state = np.column_stack([pendulum.angle, pendulum.velocity])
-    scipy.io.savemat(path, {"run": {"time": pendulum.time, "state": state, "drive": {"torque": pendulum.torque}}})
+    scipy.io.savemat(
+        path, {"run": {"time": pendulum.time, "state": state, "drive": {"torque": pendulum.torque}}}
+    )
     text = MAP.replace('"time"', '"run.time"').replace('"angle"', '"run.state[0]"')
     text = text.replace('"velocity"', '"run.state[1]"').replace('"torque"', '"run.drive.torque"')
     assert_is_the_pendulum(imported(path, map_text=text), pendulum)
 
 
 def test_matlab_v73(imported, pendulum, tmp_path):
-    """As MATLAB writes it: HDF5 behind a header of 512 bytes, axes the other way round, a class at each variable."""
+    """As MATLAB writes it: HDF5 behind a header of 512 bytes, axes the other way round, a class at
+    each variable."""
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "log.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -203,7 +220,9 @@ def test_ros_bags(imported, pendulum, bag):
     assert_is_the_pendulum(imported(stored, map_text=BAG_MAP), pendulum)
 
 
-def test_a_library_that_is_not_installed_is_named_with_its_extra(imported, pendulum, tmp_path, monkeypatch):
+def test_a_library_that_is_not_installed_is_named_with_its_extra(
+    imported, pendulum, tmp_path, monkeypatch
+):
     path = tmp_path / "log.h5"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     monkeypatch.setitem(sys.modules, "h5py", None)
@@ -216,7 +235,8 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(imported, pendu
 
 @pytest.mark.parametrize("row", [50, 1900])
 def test_a_line_of_nul_bytes_costs_its_row_wherever_it_stands(imported, pendulum, write_csv, row):
-    """As a logger leaves them whose disk was full; the first is among the bytes by which the format is found."""
+    """As a logger leaves them whose disk was full; the first is among the bytes by which the format
+    is found."""
     path = write_csv(pendulum.columns())
     lines = path.read_bytes().split(b"\n")
     lines[row + 1] = b"\0" * len(lines[row + 1])
@@ -239,9 +259,13 @@ def test_dates_and_durations_of_parquet_are_time(imported, pendulum, tmp_path, z
     since = pd.to_timedelta(pendulum.time, unit="s")
     dates = pd.Timestamp("2025-03-30 01:59:58.000123", tz=zone) + since
     map_text = MAP.replace('unit = "s"', f'unit = "{unit}"')
-    assert_is_the_pendulum(imported(as_parquet(pendulum, tmp_path, dates), map_text=map_text), pendulum)
+    assert_is_the_pendulum(
+        imported(as_parquet(pendulum, tmp_path, dates), map_text=map_text), pendulum
+    )
     if unit == "ns":
-        assert_is_the_pendulum(imported(as_parquet(pendulum, tmp_path, since), map_text=map_text), pendulum)
+        assert_is_the_pendulum(
+            imported(as_parquet(pendulum, tmp_path, since), map_text=map_text), pendulum
+        )
 
 
 @pytest.mark.parametrize("form", ["parquet", "csv"])
@@ -260,7 +284,9 @@ def test_dates_whose_unit_is_one_of_numbers_are_refused_with_the_right_one(
     assert f"and time.unit = '{unit}' in the map says otherwise; set it to iso8601" in outcome.err
 
 
-def test_durations_whose_unit_is_another_are_refused_with_the_right_one(imported, pendulum, tmp_path):
+def test_durations_whose_unit_is_another_are_refused_with_the_right_one(
+    imported, pendulum, tmp_path
+):
     outcome = imported(as_parquet(pendulum, tmp_path, pd.to_timedelta(pendulum.time, unit="s")))
     assert outcome.code == 2 and "'time' holds durations, the first" in outcome.err
     assert outcome.err.endswith("set it to ns\n")
@@ -289,7 +315,9 @@ def test_a_date_that_is_missing_is_no_text():
     findings = []
     values = np.array(["2025-03-30", "NaT", "NaT"], dtype="datetime64[ns]")
     assert np.isnan(numbers(values, "angle", findings)).all()
-    assert [finding.found for finding in findings] == ["1 row with text, the first '2025-03-30T00:00:00.' in row 0"]
+    assert [finding.found for finding in findings] == [
+        "1 row with text, the first '2025-03-30T00:00:00.' in row 0"
+    ]
 
 
 def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, capsys):
@@ -303,16 +331,21 @@ def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("name", "coarse"), [("time_s", False), ("t [ms]", False), ("x", False), ("time_s", True), ("t [ms]", True)]
+    ("name", "coarse"),
+    [("time_s", False), ("t [ms]", False), ("x", False), ("time_s", True), ("t [ms]", True)],
 )
 def test_a_guess_takes_durations_of_parquet_for_ns_whatever_their_name_says(
     imported, pendulum, tmp_path, capsys, name, coarse
 ):
     since = pd.to_timedelta(pendulum.time, unit="s").round("us")
     path = tmp_path / "log.parquet"
-    pd.DataFrame({name: since.floor("10ms") if coarse else since} | pendulum.columns() | {"time": 0.0}).to_parquet(path)
+    pd.DataFrame(
+        {name: since.floor("10ms") if coarse else since} | pendulum.columns() | {"time": 0.0}
+    ).to_parquet(path)
     assert run(["import", str(path), "--guess"]) == 0
     text = capsys.readouterr().out
-    assert tomllib.loads(text)["time"] == ({"rate_hz": 200.0} if coarse else {"column": name, "unit": "ns"})
+    assert tomllib.loads(text)["time"] == (
+        {"rate_hz": 200.0} if coarse else {"column": name, "unit": "ns"}
+    )
     frame = imported(path, map_text=text).recording("log_train").frame
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)

@@ -23,9 +23,13 @@ def guessed(tmp_path, capsys):
 
     def call(*files):
         path = tmp_path / "guess.toml"
-        assert run(["import", *map(str, files), "--guess", "--map", str(path), "--json"]) == 0, capsys.readouterr().err
+        assert run(["import", *map(str, files), "--guess", "--map", str(path), "--json"]) == 0, (
+            capsys.readouterr().err
+        )
         told = json.loads(capsys.readouterr().out)
-        return path.read_text(encoding="utf-8"), {doubt["key"]: doubt["why"] for doubt in told["doubts"]}
+        return path.read_text(encoding="utf-8"), {
+            doubt["key"]: doubt["why"] for doubt in told["doubts"]
+        }
 
     return call
 
@@ -44,7 +48,10 @@ def swinging(pendulum):
     [
         (("time", "position", "velocity", "torque"), (1, 1, 1, 1)),
         (("t_ms", "pos_meas1", "vel_meas1", "tau_meas1"), (1e3, 1, 1, -1)),
-        (("Time (us)", "Angle [deg]", "Speed [rpm]", "Torque [Nm]"), (1e6, 180 / np.pi, 30 / np.pi, 1)),
+        (
+            ("Time (us)", "Angle [deg]", "Speed [rpm]", "Torque [Nm]"),
+            (1e6, 180 / np.pi, 30 / np.pi, 1),
+        ),
         (("stamp", "pos", "vel", "tau"), (1e9, 180 / np.pi, 30 / np.pi, 1)),
         (("clock", "q", "omega", "effort"), (1e3, 180 / np.pi, 180 / np.pi, 1)),
         (("a", "b", "c", "d"), (1, 1, 1, 1)),
@@ -53,7 +60,10 @@ def swinging(pendulum):
 )
 def test_a_guess_imports_the_truth(imported, guessed, pendulum, write_csv, names, factors):
     columns = swinging(pendulum)
-    logged = {name: factor * values for name, factor, values in zip(names, factors, columns.values(), strict=True)}
+    logged = {
+        name: factor * values
+        for name, factor, values in zip(names, factors, columns.values(), strict=True)
+    }
     path = write_csv(logged)
     text, _ = guessed(path)
     outcome = imported(path, map_text=text)
@@ -63,7 +73,9 @@ def test_a_guess_imports_the_truth(imported, guessed, pendulum, write_csv, names
     rows = len(frame)
     assert_allclose(frame["time_s"], pendulum.time[:rows], atol=1e-9)
     assert_allclose(frame[f"{name}_angle_rad"], columns["angle"][:rows], rtol=1e-9, atol=1e-9)
-    assert_allclose(frame[f"{name}_velocity_rad_s"], columns["velocity"][:rows], rtol=1e-9, atol=1e-9)
+    assert_allclose(
+        frame[f"{name}_velocity_rad_s"], columns["velocity"][:rows], rtol=1e-9, atol=1e-9
+    )
     assert_allclose(frame[f"{name}_torque_nm"], columns["torque"][:rows], rtol=1e-9, atol=1e-9)
 
 
@@ -78,19 +90,25 @@ def test_a_clock_too_coarse_for_its_rows_gives_their_rate(imported, guessed, pen
 
 def test_a_pause_as_long_as_the_log_changes_no_rate_and_is_told(guessed, pendulum, write_csv):
     paused = pendulum.time + 10.0 * (pendulum.time >= 5.0)
-    text, doubts = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * paused) / 100.0}))
+    text, doubts = guessed(
+        write_csv(swinging(pendulum) | {"time": np.floor(100.0 * paused) / 100.0})
+    )
     assert "rate_hz = 200.0" in text
     assert "none came for 10 s" in doubts["time.rate_hz"]
 
 
-def test_stamps_with_three_and_four_rows_by_turns_give_the_rate_of_both(guessed, pendulum, write_csv):
+def test_stamps_with_three_and_four_rows_by_turns_give_the_rate_of_both(
+    guessed, pendulum, write_csv
+):
     stamps = np.arange(2000) * 3 // 10 / 100.0
     text, doubts = guessed(write_csv(swinging(pendulum) | {"time": stamps}))
     assert tomllib.loads(text)["time"]["rate_hz"] == pytest.approx(1000.0 / 3.0, rel=2e-3)
     assert "none came" not in doubts["time.rate_hz"]
 
 
-def test_a_coarse_clock_whose_stamps_have_few_rows_and_many_by_turns_gives_no_rate(pendulum, write_csv, capsys):
+def test_a_coarse_clock_whose_stamps_have_few_rows_and_many_by_turns_gives_no_rate(
+    pendulum, write_csv, capsys
+):
     stamps = np.repeat(np.arange(400) / 50.0, np.tile([2, 8], 200))
     path = write_csv(swinging(pendulum) | {"time": stamps})
     assert run(["import", str(path), "--guess"]) == 2
@@ -112,22 +130,40 @@ def test_a_fine_clock_without_a_name_goes_before_a_coarse_one_of_its_rate_that_h
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
 
 
-def test_what_rises_at_another_rate_than_a_coarse_clock_does_not_take_its_place(guessed, pendulum, write_csv):
-    others = {"index": 2 * np.arange(2000), "x": 1e3 * pendulum.time**2, "part": 1e6 * pendulum.time % 1e6}
-    text, _ = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * pendulum.time) / 100.0} | others))
+def test_what_rises_at_another_rate_than_a_coarse_clock_does_not_take_its_place(
+    guessed, pendulum, write_csv
+):
+    others = {
+        "index": 2 * np.arange(2000),
+        "x": 1e3 * pendulum.time**2,
+        "part": 1e6 * pendulum.time % 1e6,
+    }
+    text, _ = guessed(
+        write_csv(swinging(pendulum) | {"time": np.floor(100.0 * pendulum.time) / 100.0} | others)
+    )
     assert tomllib.loads(text)["time"] == {"rate_hz": 200.0}
 
 
 def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
     _, doubts = guessed(write_csv(dict(zip("abcd", swinging(pendulum).values(), strict=True))))
-    assert {"joint[0].angle.column", "joint[0].angle.unit", "joint[0].torque.column", "time.column"} <= doubts.keys()
+    assert {
+        "joint[0].angle.column",
+        "joint[0].angle.unit",
+        "joint[0].torque.column",
+        "time.column",
+    } <= doubts.keys()
     assert "integrates to it" in doubts["joint[0].angle.column"]
 
 
-def test_a_speed_in_another_unit_than_the_angles_integrates_to_all_of_it(guessed, pendulum, write_csv):
+def test_a_speed_in_another_unit_than_the_angles_integrates_to_all_of_it(
+    guessed, pendulum, write_csv
+):
     columns, factors = swinging(pendulum), (1, 180 / np.pi, 30 / np.pi, 1)
     names = ("Time (s)", "Angle [deg]", "Speed [rpm]", "Torque [Nm]")
-    logged = {name: factor * values for name, factor, values in zip(names, factors, columns.values(), strict=True)}
+    logged = {
+        name: factor * values
+        for name, factor, values in zip(names, factors, columns.values(), strict=True)
+    }
     told = re.search(r"integrates to ([\d.]+) of the angle", guessed(write_csv(logged))[0])
     assert float(told[1]) == pytest.approx(1.0, abs=0.01)
 
@@ -153,7 +189,9 @@ def test_an_encoders_steps_tell_its_unit(guessed, pendulum, write_csv):
     """4096 steps in a turn are 4096 in one unit only."""
     columns = swinging(pendulum)
     degrees = np.round(np.degrees(columns["angle"]) * 4096 / 360) * 360 / 4096
-    text, doubts = guessed(write_csv(columns | {"angle": degrees, "velocity": np.degrees(columns["velocity"])}))
+    text, doubts = guessed(
+        write_csv(columns | {"angle": degrees, "velocity": np.degrees(columns["velocity"])})
+    )
     assert "make 2^12 of a turn in deg" in text
     assert "joint[0].angle.unit" not in doubts
 
@@ -170,7 +208,9 @@ def test_a_velocity_of_another_joint_is_doubtful(guessed, pendulum, write_csv):
     assert "does not integrate to the angle" in doubts["joint[0].velocity.unit"]
 
 
-def test_a_current_needs_a_torque_constant_that_no_log_tells(imported, guessed, pendulum, write_csv):
+def test_a_current_needs_a_torque_constant_that_no_log_tells(
+    imported, guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     columns["Current (mA)"] = np.round(1e4 * columns.pop("torque")).astype(int) % 65536
     path = write_csv(columns)
@@ -183,17 +223,25 @@ def test_a_current_needs_a_torque_constant_that_no_log_tells(imported, guessed, 
     assert imported(path, map_text=filled).code == 0
 
 
-def test_a_voltage_on_a_joint_that_may_slide_names_both_gains_and_the_number_that_the_log_holds(guessed, tmp_path):
+def test_a_voltage_on_a_joint_that_may_slide_names_both_gains_and_the_number_that_the_log_holds(
+    guessed, tmp_path
+):
     time = np.arange(4000) / 1000.0
     place = 0.2 * np.sin(2.0 * time)
     path = tmp_path / "slide.mat"
-    savemat(path, {"t": time, "qm": place, "vir": 2.0 * np.cos(2.0 * time), "gtau": 35.15, "kp": 160.0})
+    savemat(
+        path, {"t": time, "qm": place, "vir": 2.0 * np.cos(2.0 * time), "gtau": 35.15, "kp": 160.0}
+    )
     text, doubts = guessed(path)
-    assert re.search(r"# gain_nm_v = +# FILL IN: .*perhaps gtau = 35.15, .*; gain_n_v where it slides", text)
+    assert re.search(
+        r"# gain_nm_v = +# FILL IN: .*perhaps gtau = 35.15, .*; gain_n_v where it slides", text
+    )
     assert "kp" not in doubts["joint[0].torque.gain_nm_v"]
 
 
-def test_what_changes_with_the_kind_of_a_joint_is_told_where_nothing_says_that_it_turns(guessed, tmp_path):
+def test_what_changes_with_the_kind_of_a_joint_is_told_where_nothing_says_that_it_turns(
+    guessed, tmp_path
+):
     time = np.arange(4000) / 1000.0
     place = 0.2 * np.sin(2.0 * time)
     path = tmp_path / "slide.mat"
@@ -214,25 +262,40 @@ def test_a_column_of_0_and_1_that_says_whether_the_drive_is_on_is_proposed(
     on[:50] = 0.0
     path = write_csv(swinging(pendulum) | {name: on})
     text, doubts = guessed(path)
-    assert re.search(rf'^enabled = "{name}" +# its name says so; 0 in 2.5% of the rows: where it is 0 ', text, re.M)
+    assert re.search(
+        rf'^enabled = "{name}" +# its name says so; 0 in 2.5% of the rows: where it is 0 ',
+        text,
+        re.M,
+    )
     assert "joint[0].enabled" not in doubts
     assert "Not used" not in text
     assert len(imported(path, map_text=text).recording("log_train").frame) == 0.7 * len(on) - 50
 
 
 @pytest.mark.parametrize("values", [0.0, 7.0], ids=["never on", "a number"])
-def test_a_column_that_is_no_switch_is_not_proposed_whatever_its_name(guessed, pendulum, write_csv, values):
-    text, _ = guessed(write_csv(swinging(pendulum) | {"torque_enable": np.full(len(pendulum.time), values)}))
+def test_a_column_that_is_no_switch_is_not_proposed_whatever_its_name(
+    guessed, pendulum, write_csv, values
+):
+    text, _ = guessed(
+        write_csv(swinging(pendulum) | {"torque_enable": np.full(len(pendulum.time), values)})
+    )
     assert "enabled =" not in text
     assert "Not used: torque_enable" in text
 
 
 def test_every_joint_has_its_own_switch_or_that_of_all(guessed, pendulum, write_csv):
     one, on = swinging(pendulum), np.ones(len(pendulum.time))
-    joints = {f"{joint}_{what}": one[what] for joint in ("hip", "knee") for what in ("angle", "velocity", "torque")}
+    joints = {
+        f"{joint}_{what}": one[what]
+        for joint in ("hip", "knee")
+        for what in ("angle", "velocity", "torque")
+    }
     switches = {"enabled": on, "knee_enabled": on}
     text, _ = guessed(write_csv({"time": pendulum.time} | joints | switches))
-    assert [joint["enabled"] for joint in tomllib.loads(text)["joint"]] == ["enabled", "knee_enabled"]
+    assert [joint["enabled"] for joint in tomllib.loads(text)["joint"]] == [
+        "enabled",
+        "knee_enabled",
+    ]
 
 
 def test_several_joints_are_told_apart_and_never_sure_of_their_signs(guessed, pendulum, write_csv):
@@ -245,7 +308,11 @@ def test_several_joints_are_told_apart_and_never_sure_of_their_signs(guessed, pe
     joints = tomllib.loads(text)["joint"]
     assert [joint["name"] for joint in joints] == ["hip", "knee"]
     assert joints[0]["torque"]["column"] == "hip_torque"
-    assert {"joint[0].torque.sign", "joint[1].torque.sign", "geometry.thigh_length_m"} <= doubts.keys()
+    assert {
+        "joint[0].torque.sign",
+        "joint[1].torque.sign",
+        "geometry.thigh_length_m",
+    } <= doubts.keys()
 
 
 def test_a_clock_that_was_full_is_counted_on(imported, guessed, pendulum, write_csv):
@@ -353,17 +420,30 @@ def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
 )  # fmt: skip
 def test_counts_are_an_angle_where_nothing_else_is(guessed, pendulum, write_csv, name, joint):
     counts = np.round(1000.0 * pendulum.angle).astype(int) + 2000
-    columns = {"time_us": pendulum.time * 1e6, name: counts, "cmd_counts": counts + 1, "iq_mA": pendulum.torque}
+    columns = {
+        "time_us": pendulum.time * 1e6,
+        name: counts,
+        "cmd_counts": counts + 1,
+        "iq_mA": pendulum.torque,
+    }
     text, doubts = guessed(write_csv(columns))
     (found,) = tomllib.loads(text)["joint"]
-    assert (found["name"], found["angle"]["column"], found["angle"]["unit"]) == (joint, name, "counts")
+    assert (found["name"], found["angle"]["column"], found["angle"]["unit"]) == (
+        joint,
+        name,
+        "counts",
+    )
     assert (found["reference"]["column"], found["torque"]["column"]) == ("cmd_counts", "iq_mA")
     assert doubts["joint[0].angle.column"] == "no name says angle, but this one is in counts"
 
 
-@pytest.mark.parametrize("name", ["adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"])
+@pytest.mark.parametrize(
+    "name", ["adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"]
+)
 def test_counts_of_something_else_are_no_angle(pendulum, write_csv, capsys, name):
-    path = write_csv({"t_s": pendulum.time, name: np.round(1000.0 * pendulum.angle), "iq_mA": pendulum.torque})
+    path = write_csv(
+        {"t_s": pendulum.time, name: np.round(1000.0 * pendulum.angle), "iq_mA": pendulum.torque}
+    )
     assert run(["import", str(path), "--guess"]) == 2
     assert "no name of a column that changes says angle" in capsys.readouterr().err
 
@@ -399,7 +479,9 @@ def test_a_slip_in_a_column_does_not_hide_it(guessed, pendulum, write_csv):
 
 
 @pytest.mark.parametrize("value", ["", "nan", "inf"])
-def test_a_column_without_a_number_makes_neither_a_part_nor_a_noise(guessed, pendulum, write_csv, value):
+def test_a_column_without_a_number_makes_neither_a_part_nor_a_noise(
+    guessed, pendulum, write_csv, value
+):
     """Of numpy's warnings the suite makes errors."""
     text, _ = guessed(write_csv(swinging(pendulum) | {"hip_angle": [value] * len(pendulum.time)}))
     assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
@@ -415,12 +497,19 @@ def test_a_clock_that_misses_its_first_stamp_is_one_all_the_same(guessed, pendul
 def test_a_log_of_a_moment_gets_a_guess_without_a_sign(guessed, pendulum, write_csv, unit):
     """A window in which a torque could be compared with the motion is longer than all of it."""
     columns = swinging(pendulum)
-    names = {"time": f"t [{unit}]", "angle": "angle [deg]", "velocity": "speed [rpm]", "torque": "torque [Nm]"}
+    names = {
+        "time": f"t [{unit}]",
+        "angle": "angle [deg]",
+        "velocity": "speed [rpm]",
+        "torque": "torque [Nm]",
+    }
     columns = {names[name]: values[:60] for name, values in columns.items()}
     assert "joint[0].torque.sign" in guessed(write_csv(columns))[1]
 
 
-def test_a_clock_in_whose_unit_no_machine_is_sampled_is_doubted_whatever_its_name_says(guessed, pendulum, write_csv):
+def test_a_clock_in_whose_unit_no_machine_is_sampled_is_doubted_whatever_its_name_says(
+    guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     columns["t [ms]"] = columns.pop("time")
     assert "at which no machine is sampled: is it s?" in guessed(write_csv(columns))[1]["time.unit"]
@@ -430,7 +519,10 @@ def test_a_leg_is_a_leg_in_other_languages(guessed, pendulum, write_csv):
     one = swinging(pendulum)
     columns = {"Zeit [s]": one["time"]}
     for joint in ("Hüfte", "Knie"):
-        columns |= {f"Winkel {joint} [°]": np.degrees(one["angle"]), f"Strom {joint} [mA]": 1e3 * one["torque"]}
+        columns |= {
+            f"Winkel {joint} [°]": np.degrees(one["angle"]),
+            f"Strom {joint} [mA]": 1e3 * one["torque"],
+        }
     joints = tomllib.loads(guessed(write_csv(columns))[0])["joint"]
     assert [joint["name"] for joint in joints] == ["hip", "knee"]
 
@@ -439,7 +531,11 @@ def test_a_single_sine_is_not_taken_for_its_own_velocity(guessed, pendulum, writ
     """The integral of a sine is a cosine, but a negative one."""
     time = pendulum.time
     angle, velocity = np.sin(2.0 * time), 2.0 * np.cos(2.0 * time)
-    text, _ = guessed(write_csv({"a": time, "b": velocity, "c": angle, "d": np.sin(angle) + 0.2 * np.sign(velocity)}))
+    text, _ = guessed(
+        write_csv(
+            {"a": time, "b": velocity, "c": angle, "d": np.sin(angle) + 0.2 * np.sign(velocity)}
+        )
+    )
     joint = tomllib.loads(text)["joint"][0]
     assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c", "b")
 
@@ -469,7 +565,9 @@ HEADERS = {
 
 
 @pytest.mark.parametrize("names", HEADERS.values(), ids=HEADERS)
-def test_a_unit_in_a_header_is_believed_and_imports_the_truth(imported, guessed, pendulum, write_csv, names):
+def test_a_unit_in_a_header_is_believed_and_imports_the_truth(
+    imported, guessed, pendulum, write_csv, names
+):
     factors = (1.0, 180.0 / np.pi, 180.0 / np.pi, 1e3)
     columns = zip(names, factors, swinging(pendulum).values(), strict=True)
     path = write_csv({name: factor * values for name, factor, values in columns})
@@ -482,8 +580,11 @@ def test_a_unit_in_a_header_is_believed_and_imports_the_truth(imported, guessed,
     assert_allclose(torque, swinging(pendulum)["torque"][: len(torque)], rtol=1e-9, atol=1e-9)
 
 
-def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, guessed, pendulum, write_csv):
-    """Counts, revolutions and milliamperes of a motor: what its log cannot tell is asked for, the rest is right."""
+def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(
+    imported, guessed, pendulum, write_csv
+):
+    """Counts, revolutions and milliamperes of a motor: what its log cannot tell is asked for, the
+    rest is right."""
     columns = swinging(pendulum)
     counts = np.round(columns["angle"] / (2.0 * np.pi) * 50 * 4096).astype(int)
     path = write_csv(
@@ -498,12 +599,16 @@ def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, gu
     )
     text, doubts = guessed(path)
     assert "by the velocity 4096 in a turn" in doubts["joint[0].angle.counts_per_turn"]
-    assert {f"joint[0].{what}.gear_ratio" for what in ("angle", "velocity", "torque")} <= doubts.keys()
+    assert {
+        f"joint[0].{what}.gear_ratio" for what in ("angle", "velocity", "torque")
+    } <= doubts.keys()
     assert "joint[0].torque.unit" not in doubts
     filled = text.replace("# counts_per_turn =", "counts_per_turn = 4096 #").replace(
         "gear_ratio = 1.0", "gear_ratio = 50"
     )
-    outcome = imported(path, map_text=filled.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #"))
+    outcome = imported(
+        path, map_text=filled.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #")
+    )
     assert (outcome.code, outcome.err) == (0, "")
     frame = outcome.recording("log_train").frame
     assert_allclose(frame["joint_torque_nm"], columns["torque"][: len(frame)], atol=1e-9)
@@ -521,7 +626,9 @@ COUNTED = {
 
 
 @pytest.mark.parametrize("kind", COUNTED)
-def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(imported, guessed, pendulum, write_csv, kind):
+def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(
+    imported, guessed, pendulum, write_csv, kind
+):
     """Set-point and speed come from the same encoder as the angle, and need what it needs."""
     columns, (answers, (reference, angle, count)) = swinging(pendulum), COUNTED[kind]
     counts = np.round(columns["angle"] / (2.0 * np.pi) * 4096).astype(int)
@@ -536,7 +643,9 @@ def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(import
     )
     text, doubts = guessed(path)
     of = ("angle", "velocity", "reference")
-    assert {f"joint[0].{one}.{key}" for one in of for key in ("counts_per_turn", "gear_ratio")} <= doubts.keys()
+    assert {
+        f"joint[0].{one}.{key}" for one in of for key in ("counts_per_turn", "gear_ratio")
+    } <= doubts.keys()
     assert "counts_per_m where it slides" in doubts["joint[0].reference.counts_per_turn"]
     filled = text.replace('"revolute"', f'"{kind}"')
     for key, answer in answers.items():
@@ -547,11 +656,20 @@ def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(import
     assert_allclose(frame[reference] - frame[angle], 3 * count, atol=1e-9)
 
 
-SIGNED = {"pos_counts": "angle", "speed [counts/s]": "velocity", "ref_counts": "reference", "iq_mA": "torque"}
+SIGNED = {
+    "pos_counts": "angle",
+    "speed [counts/s]": "velocity",
+    "ref_counts": "reference",
+    "iq_mA": "torque",
+}
 
 
-@pytest.mark.parametrize("unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names))
-def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(imported, guessed, pendulum, write_csv, unsigned):
+@pytest.mark.parametrize(
+    "unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names)
+)
+def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(
+    imported, guessed, pendulum, write_csv, unsigned
+):
     columns, per_rad = swinging(pendulum), 4096 / (2.0 * np.pi)
     logged = {
         "time_us": np.round(1e6 * pendulum.time),
@@ -561,12 +679,14 @@ def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(imported, guessed,
         "iq_mA": np.round(1e3 * columns["torque"]),
     }
     logged = {name: values.astype(int) for name, values in logged.items()}
-    path = write_csv({name: values % 65536 if name in unsigned else values for name, values in logged.items()})
+    path = write_csv(
+        {name: values % 65536 if name in unsigned else values for name, values in logged.items()}
+    )
     text, _ = guessed(path)
     joint = tomllib.loads(text)["joint"][0]
-    assert [quantity for quantity in SIGNED.values() if joint[quantity].get("signed_bits") == 16] == [
-        SIGNED[name] for name in unsigned
-    ]
+    assert [
+        quantity for quantity in SIGNED.values() if joint[quantity].get("signed_bits") == 16
+    ] == [SIGNED[name] for name in unsigned]
     for key, answer in COUNTED["revolute"][0].items():
         text = text.replace(f"# {key} =", f"{answer} #")
     frame = imported(path, map_text=text).recording("log_train").frame
@@ -576,19 +696,32 @@ def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(imported, guessed,
         list(logged.items())[1:],
         strict=True,
     ):
-        assert_allclose(frame[f"joint_{name}"], values[: len(frame)] / factor, atol=1e-9, err_msg=column)
+        assert_allclose(
+            frame[f"joint_{name}"], values[: len(frame)] / factor, atol=1e-9, err_msg=column
+        )
 
 
-def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(guessed, pendulum, write_csv):
+def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(
+    guessed, pendulum, write_csv
+):
     place = 40.0 * pendulum.angle
-    columns = {"t_s": pendulum.time, "pos_mm": place, "ref_counts": np.round(1e3 * place), "force_N": pendulum.torque}
+    columns = {
+        "t_s": pendulum.time,
+        "pos_mm": place,
+        "ref_counts": np.round(1e3 * place),
+        "force_N": pendulum.torque,
+    }
     text, doubts = guessed(write_csv(columns))
     assert tomllib.loads(text)["joint"][0]["reference"]["unit"] == "counts"
     assert "joint[0].reference.counts_per_m" in doubts
 
 
 def test_a_slides_current_asks_for_the_force_of_its_motor(imported, guessed, pendulum, write_csv):
-    columns = {"t_s": pendulum.time, "pos_mm": 40.0 * pendulum.angle, "motor_mA": np.round(1e3 * pendulum.torque)}
+    columns = {
+        "t_s": pendulum.time,
+        "pos_mm": 40.0 * pendulum.angle,
+        "motor_mA": np.round(1e3 * pendulum.torque),
+    }
     path = write_csv(columns)
     text, doubts = guessed(path)
     assert "lead_m where it turns a screw" in doubts["joint[0].torque.force_constant_n_a"]
@@ -596,7 +729,9 @@ def test_a_slides_current_asks_for_the_force_of_its_motor(imported, guessed, pen
     assert imported(path, map_text=filled).code == 0
 
 
-def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, pendulum, write_csv):
+def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(
+    imported, guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     path = write_csv(
         {
@@ -608,20 +743,36 @@ def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, 
     )
     text, doubts = guessed(path)
     assert text.count("gear_ratio = 50.0") == 2
-    assert "as of a motor that turns 50 times for one turn of the joint" in doubts["joint[0].velocity.unit"]
+    assert (
+        "as of a motor that turns 50 times for one turn of the joint"
+        in doubts["joint[0].velocity.unit"]
+    )
     assert {"joint[0].velocity.gear_ratio", "joint[0].torque.gear_ratio"} <= doubts.keys()
-    outcome = imported(path, map_text=text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #"))
+    outcome = imported(
+        path, map_text=text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #")
+    )
     assert (outcome.code, outcome.err) == (0, "")
     frame = outcome.recording("log_train").frame
     assert_allclose(frame["knee_torque_nm"], columns["torque"][: len(frame)], atol=1e-9)
-    assert_allclose(frame["knee_velocity_rad_s"], 1.004 * columns["velocity"][: len(frame)], atol=1e-9)
+    assert_allclose(
+        frame["knee_velocity_rad_s"], 1.004 * columns["velocity"][: len(frame)], atol=1e-9
+    )
 
 
-def test_a_speed_in_another_unit_than_its_name_says_may_be_that_and_no_gear(guessed, pendulum, write_csv):
+def test_a_speed_in_another_unit_than_its_name_says_may_be_that_and_no_gear(
+    guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     speed = np.degrees(columns["velocity"])
     _, doubts = guessed(
-        write_csv({"t_s": pendulum.time, "q_rad": columns["angle"], "speed_rad_s": speed, "tau_Nm": columns["torque"]})
+        write_csv(
+            {
+                "t_s": pendulum.time,
+                "q_rad": columns["angle"],
+                "speed_rad_s": speed,
+                "tau_Nm": columns["torque"],
+            }
+        )
     )
     assert doubts["joint[0].velocity.unit"].endswith("or it is in deg/s, whatever its name says")
 
@@ -630,7 +781,9 @@ def test_json_records_with_an_index_that_has_no_name_are_read(guessed, pendulum,
     path = tmp_path / "log.json"
     columns = {"": np.arange(len(pendulum.time))} | pendulum.columns()
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    path.write_text(json.dumps([dict(zip(columns, row, strict=True)) for row in rows]), encoding="utf-8")
+    path.write_text(
+        json.dumps([dict(zip(columns, row, strict=True)) for row in rows]), encoding="utf-8"
+    )
     text, _ = guessed(path)
     assert 'column = "angle"' in text
 
@@ -642,13 +795,18 @@ def test_a_guess_reads_what_is_written_with_any_delimiter(guessed, pendulum, wri
     assert "joint[0].angle.column" not in doubts
 
 
-def test_a_current_without_a_unit_is_doubtful_for_the_reason_that_is_given(guessed, pendulum, write_csv):
+def test_a_current_without_a_unit_is_doubtful_for_the_reason_that_is_given(
+    guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     torque = columns.pop("torque")
     whole = guessed(write_csv(columns | {"motor current": np.round(100.0 * torque)}))
     (write_csv(columns).parent / "guess.toml").unlink()
     broken = guessed(write_csv(columns | {"motor current": torque}))
-    assert [tomllib.loads(text)["joint"][0]["torque"]["unit"] for text, _ in (whole, broken)] == ["mA", "A"]
+    assert [tomllib.loads(text)["joint"][0]["torque"]["unit"] for text, _ in (whole, broken)] == [
+        "mA",
+        "A",
+    ]
     assert "whole numbers, as drives tell mA" in whole[1]["joint[0].torque.unit"]
     assert "no name says its unit" in broken[1]["joint[0].torque.unit"]
 
@@ -660,14 +818,22 @@ def test_a_torque_that_no_joints_drive_delivers_is_doubted_by_the_guess_and_told
     columns["Torque (Nm)"] = 1e4 * columns.pop("torque")
     path = write_csv(columns)
     text, doubts = guessed(path)
-    assert re.search(r"no joint's drive delivers \d+(\.\d+)?e\+04 N·m: is it mN·m\?", doubts["joint[0].torque.unit"])
+    assert re.search(
+        r"no joint's drive delivers \d+(\.\d+)?e\+04 N·m: is it mN·m\?",
+        doubts["joint[0].torque.unit"],
+    )
     told = imported(path, map_text=text).told
-    assert "N·m, and drives of legs, arms and robots at most some 1000; kept; check its unit (is it mN·m?)" in told
+    assert (
+        "N·m, and drives of legs, arms and robots at most some 1000; kept; check its unit (is it mN·m?)"
+        in told
+    )
     right = imported(path, map_text=text.replace('unit = "N·m"', 'unit = "mN·m"'))
     assert "drives of legs" not in right.told
 
 
-def test_an_angle_that_no_joint_reaches_is_doubted_whatever_its_name_says(guessed, pendulum, write_csv):
+def test_an_angle_that_no_joint_reaches_is_doubted_whatever_its_name_says(
+    guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     columns["angle_rad"] = np.degrees(columns.pop("angle"))
     _, doubts = guessed(write_csv(columns))
@@ -696,30 +862,48 @@ def test_a_force_on_a_joint_that_turns_asks_for_another_column(guessed, pendulum
 
 
 @pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * np.pi), ("rev", 1.0)])
-def test_a_counter_that_starts_anew_is_counted_on(imported, guessed, pendulum, write_csv, unit, turn):
+def test_a_counter_that_starts_anew_is_counted_on(
+    imported, guessed, pendulum, write_csv, unit, turn
+):
     columns = swinging(pendulum)
     path = write_csv(columns | {"angle": columns["angle"] * turn / (2.0 * np.pi) % turn})
     found = tomllib.loads(guessed(path)[0])["joint"][0]["angle"]
     assert (found["unit"], found["wraps_at"]) == (unit, turn)
 
 
-@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%f+01:00", "%H:%M:%S.%f"])
+@pytest.mark.parametrize(
+    "form", ["%Y-%m-%d %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%f+01:00", "%H:%M:%S.%f"]
+)
 def test_dates_and_times_of_day_are_a_clock(imported, guessed, pendulum, write_csv, form):
     columns = swinging(pendulum)
     stamps = pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(columns["time"], unit="s")
     path = write_csv(columns | {"time": np.array(stamps.strftime(form))})
     text, doubts = guessed(path)
-    assert tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"} and "time.unit" not in doubts
+    assert (
+        tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"}
+        and "time.unit" not in doubts
+    )
     found = imported(path, map_text=text).recording("log_train").frame["time_s"]
     assert_allclose(np.diff(found), 0.005, atol=1e-9)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("mrad", 1e3), ("deg", 180 / np.pi)])
-def test_the_sign_of_a_torque_is_seen_in_any_unit_of_angle(guessed, pendulum, write_csv, unit, factor):
+def test_the_sign_of_a_torque_is_seen_in_any_unit_of_angle(
+    guessed, pendulum, write_csv, unit, factor
+):
     columns = swinging(pendulum)
-    path = write_csv({"t": columns["time"], f"q [{unit}]": factor * columns["angle"], "tau [Nm]": -columns["torque"]})
+    path = write_csv(
+        {
+            "t": columns["time"],
+            f"q [{unit}]": factor * columns["angle"],
+            "tau [Nm]": -columns["torque"],
+        }
+    )
     text, doubts = guessed(path)
-    assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1 and "joint[0].torque.sign" not in doubts
+    assert (
+        tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1
+        and "joint[0].torque.sign" not in doubts
+    )
 
 
 def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_and_soon(
@@ -740,12 +924,19 @@ def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_an
     assert looked_at.call_count <= 2 * 100
 
 
-def test_a_column_without_a_number_in_the_middle_of_a_long_log_hides_no_angle(guessed, pendulum, tmp_path, monkeypatch):
+def test_a_column_without_a_number_in_the_middle_of_a_long_log_hides_no_angle(
+    guessed, pendulum, tmp_path, monkeypatch
+):
     monkeypatch.setattr("pipelines.importing.sanity.consistency.MOST", 1000)
     rng, rows = np.random.default_rng(1), np.arange(len(pendulum.time))
-    columns = {"time": pendulum.time} | {f"c{k}": rng.normal(size=len(rows)).cumsum() for k in range(25)}
+    columns = {"time": pendulum.time} | {
+        f"c{k}": rng.normal(size=len(rows)).cumsum() for k in range(25)
+    }
     columns |= {"c3": pendulum.velocity, "c8": pendulum.angle}
-    columns |= {"c5": np.where(rows < 9, rows**2, np.nan), "c6": np.where(rows % 999 < 2, rows, np.nan)}
+    columns |= {
+        "c5": np.where(rows < 9, rows**2, np.nan),
+        "c6": np.where(rows % 999 < 2, rows, np.nan),
+    }
     path = tmp_path / "log.parquet"
     pd.DataFrame(columns).to_parquet(path)
     joint = tomllib.loads(guessed(path)[0])["joint"][0]
@@ -769,13 +960,17 @@ def test_a_second_log_of_one_row_is_guessed_without_a_period(guessed, pendulum, 
 
 
 def two_links(pendulum, first, second):
-    """Return columns of two joints by the names of their quantities, ``first`` and ``second`` with a place for each."""
+    """Return columns of two joints by the names of their quantities, ``first`` and ``second`` with
+    a place for each."""
     columns = swinging(pendulum)
     made = {"time": columns["time"]}
     for name, factor in ((first, 1.0), (second, -0.5)):
         for quantity in ("position", "velocity", "effort"):
             made[name.format(quantity)] = (
-                factor * columns["torque" if quantity == "effort" else quantity.replace("position", "angle")]
+                factor
+                * columns[
+                    "torque" if quantity == "effort" else quantity.replace("position", "angle")
+                ]
             )
     return made
 
@@ -783,7 +978,11 @@ def two_links(pendulum, first, second):
 def test_both_joints_of_a_state_within_a_record_are_found(guessed, pendulum, tmp_path):
     columns = swinging(pendulum)
     rows = [
-        {"stamp": t, "state": {"q": [q, -0.5 * q], "dq": [v, -0.5 * v]}, "cmd": {"tau": [tau, -0.5 * tau]}}
+        {
+            "stamp": t,
+            "state": {"q": [q, -0.5 * q], "dq": [v, -0.5 * v]},
+            "cmd": {"tau": [tau, -0.5 * tau]},
+        }
         for t, q, v, tau in zip(*columns.values(), strict=True)
     ]
     path = tmp_path / "log.json"
@@ -811,13 +1010,20 @@ def test_which_joint_carries_which_is_read_off_names_or_doubted(
     if order:
         assert [joint["name"] for joint in joints] == order
     else:
-        assert [joint["angle"]["column"] for joint in joints] == ["joint1.position", "joint2.position"]
+        assert [joint["angle"]["column"] for joint in joints] == [
+            "joint1.position",
+            "joint2.position",
+        ]
 
 
-def test_what_slides_is_taken_for_level_until_somebody_says_that_it_rises(guessed, pendulum, write_csv):
+def test_what_slides_is_taken_for_level_until_somebody_says_that_it_rises(
+    guessed, pendulum, write_csv
+):
     columns = swinging(pendulum)
     text, doubts = guessed(
-        write_csv({"t": columns["time"], "pos_mm": 100 * columns["angle"], "F_N": columns["torque"]})
+        write_csv(
+            {"t": columns["time"], "pos_mm": 100 * columns["angle"], "F_N": columns["torque"]}
+        )
     )
     assert tomllib.loads(text)["geometry"] == {"gravity_m_s2": 0.0}
     assert "a lift's" in doubts["geometry.gravity_m_s2"]

@@ -1,4 +1,5 @@
-"""What an import leaves in its folder leads to a verdict, or it is said what is missing and how to give it."""
+"""What an import leaves in its folder leads to a verdict, or it is said what is missing and how to
+give it."""
 
 import subprocess
 import sys
@@ -27,10 +28,15 @@ def two_folders(pendulum, write_csv, tmp_path):
     return files
 
 
-def test_files_of_one_name_are_told_apart_by_their_folders_as_the_refusal_says(imported, two_folders):
+def test_files_of_one_name_are_told_apart_by_their_folders_as_the_refusal_says(
+    imported, two_folders
+):
     refused = imported(*two_folders, map_text=BOTH)
     assert refused.code == 2
-    assert 'such as "{folder}_{file}_{purpose}", or each file one of its own, files = "run2/log.csv"' in refused.err
+    assert (
+        'such as "{folder}_{file}_{purpose}", or each file one of its own, files = "run2/log.csv"'
+        in refused.err
+    )
     named = BOTH + "".join(
         f'[[recording]]\nname = "{{folder}}_{{file}}_{{purpose}}"\npurpose = "{purpose}"\nspan = {span}\n'
         for purpose, span in (("train", [0.0, 0.7]), ("validate", [0.7, 1.0]))
@@ -54,15 +60,25 @@ def test_a_file_that_is_given_twice_is_named_as_that(imported, pendulum, write_c
 
 
 def test_a_guess_for_files_of_one_name_imports_both(imported, two_folders, tmp_path, capsys):
-    assert run(["import", *map(str, two_folders), "--guess", "--map", str(tmp_path / "guess.toml")]) == 0
+    assert (
+        run(["import", *map(str, two_folders), "--guess", "--map", str(tmp_path / "guess.toml")])
+        == 0
+    )
     capsys.readouterr()
     outcome = imported(*two_folders, map_text=(tmp_path / "guess.toml").read_text(encoding="utf-8"))
     assert (outcome.code, outcome.err) == (0, "")
-    assert [path.name for path in sorted(outcome.folder.iterdir())] == ["run1_log.parquet", "run2_log.parquet"]
+    assert [path.name for path in sorted(outcome.folder.iterdir())] == [
+        "run1_log.parquet",
+        "run2_log.parquet",
+    ]
 
 
-@pytest.mark.parametrize(("has", "lacks", "what"), [("train", "validate", "judge on"), ("validate", "train", "fit to")])
-def test_a_map_of_one_purpose_says_which_is_missing_and_how_to_give_it(imported, pendulum, write_csv, has, lacks, what):
+@pytest.mark.parametrize(
+    ("has", "lacks", "what"), [("train", "validate", "judge on"), ("validate", "train", "fit to")]
+)
+def test_a_map_of_one_purpose_says_which_is_missing_and_how_to_give_it(
+    imported, pendulum, write_csv, has, lacks, what
+):
     path = write_csv(pendulum.columns())
     outcome = imported(path, map_text=MAP.replace('purpose = "train"', f'purpose = "{has}"'))
     assert f"`exoid run` lacks a recording to {what}: add a [[recording]] to" in outcome.told
@@ -79,23 +95,33 @@ def test_a_recording_that_no_file_matches_is_told(imported, pendulum, write_csv)
     assert 'recording[1] (validate) is of "lgo*.csv", and no file given is; left out' in outcome.err
 
 
-def test_a_recording_that_a_changed_map_no_longer_makes_is_named_and_kept(imported, pendulum, write_csv):
+def test_a_recording_that_a_changed_map_no_longer_makes_is_named_and_kept(
+    imported, pendulum, write_csv
+):
     path = write_csv(pendulum.columns())
     imported(path)
     outcome = imported(path, map_text=MAP.replace("whole", "all"))
-    assert "whole.parquet: of these logs too, by an earlier map; this one makes it no more, remove it" in outcome.err
+    assert (
+        "whole.parquet: of these logs too, by an earlier map; this one makes it no more, remove it"
+        in outcome.err
+    )
     assert sorted(one.name for one in outcome.folder.iterdir()) == ["all.parquet", "whole.parquet"]
     other = write_csv(pendulum.columns() | {"torque": 2.0 * pendulum.torque}, "other.csv")
     assert imported(other, map_text=MAP.replace("whole", "other")).err == ""
 
 
-def test_somebody_elses_table_under_a_recordings_name_is_kept_and_named(imported, pendulum, write_csv, tmp_path):
+def test_somebody_elses_table_under_a_recordings_name_is_kept_and_named(
+    imported, pendulum, write_csv, tmp_path
+):
     path = tmp_path / "recordings" / "whole.parquet"
     path.parent.mkdir()
     pd.DataFrame({"t": [0.0]}).to_parquet(path)
     outcome = imported(write_csv(pendulum.columns()))
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert "whole.parquet: holds a table of somebody else's, not overwritten with recording/1; choose" in outcome.err
+    assert (
+        "whole.parquet: holds a table of somebody else's, not overwritten with recording/1; choose"
+        in outcome.err
+    )
     assert list(pd.read_parquet(path)) == ["t"]
 
 

@@ -16,22 +16,34 @@ def multisine(rng, time, period, joints=2):
     order = np.arange(1, 6)[:, np.newaxis]
     phase = 2 * np.pi * order * time / period
     return np.column_stack(
-        [rng.normal(size=5) / order[:, 0] @ np.sin(phase + rng.uniform(0, 2 * np.pi, (5, 1))) for _ in range(joints)]
+        [
+            rng.normal(size=5) / order[:, 0] @ np.sin(phase + rng.uniform(0, 2 * np.pi, (5, 1)))
+            for _ in range(joints)
+        ]
     )
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_period_is_found_through_ramps_drift_jitter_and_encoder_steps(seed):
     rng = np.random.default_rng(seed)
-    period, periods, rate = rng.choice([4.0, 7.3, 8.0, 10.0, 12.5, 20.0]), rng.uniform(3.2, 6.0), rng.choice([50, 333])
+    period, periods, rate = (
+        rng.choice([4.0, 7.3, 8.0, 10.0, 12.5, 20.0]),
+        rng.uniform(3.2, 6.0),
+        rng.choice([50, 333]),
+    )
     time = np.cumsum(np.maximum(rng.normal(1.0, 0.1, int(periods * period * rate)), 0.2)) / rate
-    angle = multisine(rng, time, period) * np.minimum(time, 1.0)[:, np.newaxis] + 0.05 * time[:, np.newaxis] / time[-1]
+    angle = (
+        multisine(rng, time, period) * np.minimum(time, 1.0)[:, np.newaxis]
+        + 0.05 * time[:, np.newaxis] / time[-1]
+    )
     found = repeats_after(time, np.round(angle / 0.002) * 0.002)
     assert found == pytest.approx(period, rel=5e-4)
 
 
 def filtered_noise(rng, time):
-    return sosfilt(butter(2, rng.uniform(0.05, 2.0), fs=100.0, output="sos"), rng.normal(size=len(time)))
+    return sosfilt(
+        butter(2, rng.uniform(0.05, 2.0), fs=100.0, output="sos"), rng.normal(size=len(time))
+    )
 
 
 def random_walk(rng, time):
@@ -60,7 +72,9 @@ def test_a_motion_that_does_not_repeat_has_no_period(motion):
 
 def test_a_joint_that_repeats_sooner_than_another_waits_for_it():
     time = np.arange(0.0, 40.0, 0.01)
-    both = np.column_stack([np.sin(2 * np.pi * time / 5.0), multisine(np.random.default_rng(1), time, 10.0, 1)[:, 0]])
+    both = np.column_stack(
+        [np.sin(2 * np.pi * time / 5.0), multisine(np.random.default_rng(1), time, 10.0, 1)[:, 0]]
+    )
     assert repeats_after(time, both[:, :1]) == pytest.approx(5.0)
     assert repeats_after(time, both) == pytest.approx(10.0)
 
@@ -76,7 +90,11 @@ def test_rest_repeats_nothing_and_neither_does_less_than_two_periods():
 def repeated(rng):
     time = np.arange(0.0, 40.0, 0.005)
     angle = multisine(rng, time, 8.0, 1)[:, 0]
-    return {"time": time, "angle_rad": angle, "torque_nm": np.sin(angle) + 0.1 * rng.normal(size=len(time))}
+    return {
+        "time": time,
+        "angle_rad": angle,
+        "torque_nm": np.sin(angle) + 0.1 * rng.normal(size=len(time)),
+    }
 
 
 def test_a_guess_tells_the_period_of_each_file(tmp_path, write_csv, capsys):
@@ -90,10 +108,15 @@ def test_a_guess_tells_the_period_of_each_file(tmp_path, write_csv, capsys):
     assert "# period_s: no motion repeats here" in told[2]
 
 
-@pytest.mark.parametrize("wrap", [lambda counts: counts % 65536, lambda counts: (counts + 3900) % 4096])
+@pytest.mark.parametrize(
+    "wrap", [lambda counts: counts % 65536, lambda counts: (counts + 3900) % 4096]
+)
 @pytest.mark.parametrize("name", ["angle_counts", "ref_counts"])
-def test_a_guess_looks_for_the_period_in_a_counter_that_is_counted_on(write_csv, capsys, wrap, name):
-    """With its sign lost, or full on the way, it steps where the motion does not, and by noise not in every period."""
+def test_a_guess_looks_for_the_period_in_a_counter_that_is_counted_on(
+    write_csv, capsys, wrap, name
+):
+    """With its sign lost, or full on the way, it steps where the motion does not, and by noise not
+    in every period."""
     rng = np.random.default_rng(5)
     log = repeated(rng)
     noisy = log.pop("angle_rad") + 0.003 * rng.normal(size=len(log["time"]))
@@ -104,7 +127,9 @@ def test_a_guess_looks_for_the_period_in_a_counter_that_is_counted_on(write_csv,
     assert float(period[1]) == pytest.approx(8.0, rel=5e-4)
 
 
-def test_a_set_point_is_counted_on_where_its_angle_is_and_not_where_it_steps_by_a_turn(write_csv, capsys):
+def test_a_set_point_is_counted_on_where_its_angle_is_and_not_where_it_steps_by_a_turn(
+    write_csv, capsys
+):
     log = repeated(np.random.default_rng(6))
     degrees = np.degrees(log.pop("angle_rad"))
     wraps = {"angle_deg": degrees % 360.0, "ref_deg": (degrees + 1.0) % 360.0}

@@ -23,14 +23,24 @@ WRITTEN = [
 def test_angles_are_radians_at_the_joint(imported, pendulum, write_csv, unit, factor, keys):
     path = write_csv(pendulum.columns() | {"angle": factor * pendulum.angle})
     text = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", unit = "{unit}"{keys}')
-    assert_allclose(imported(path, map_text=text).recording().frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+    assert_allclose(
+        imported(path, map_text=text).recording().frame["pivot_angle_rad"],
+        pendulum.angle,
+        atol=1e-12,
+    )
 
 
 def test_sign_and_zero(imported, pendulum, write_csv):
     """A joint whose encoder says 30 degrees where it hangs down, and counts the other way."""
     path = write_csv(pendulum.columns() | {"angle": 30.0 - np.degrees(pendulum.angle)})
-    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "deg", sign = -1, zero = 30.0')
-    assert_allclose(imported(path, map_text=text).recording().frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+    text = MAP.replace(
+        'column = "angle", unit = "rad"', 'column = "angle", unit = "deg", sign = -1, zero = 30.0'
+    )
+    assert_allclose(
+        imported(path, map_text=text).recording().frame["pivot_angle_rad"],
+        pendulum.angle,
+        atol=1e-12,
+    )
 
 
 @pytest.mark.parametrize(
@@ -46,14 +56,23 @@ def test_sign_and_zero(imported, pendulum, write_csv):
         ("kgf·cm", 1 / 0.0980665, ""),
     ],
 )
-def test_torque_is_what_the_drive_delivers_at_the_joint(imported, pendulum, write_csv, unit, factor, keys):
+def test_torque_is_what_the_drive_delivers_at_the_joint(
+    imported, pendulum, write_csv, unit, factor, keys
+):
     path = write_csv(pendulum.columns() | {"torque": factor * pendulum.torque})
-    text = MAP.replace('column = "torque", unit = "N·m"', f'column = "torque", unit = "{unit}"{keys}')
-    assert_allclose(imported(path, map_text=text).recording().frame["pivot_torque_nm"], pendulum.torque, atol=1e-12)
+    text = MAP.replace(
+        'column = "torque", unit = "N·m"', f'column = "torque", unit = "{unit}"{keys}'
+    )
+    assert_allclose(
+        imported(path, map_text=text).recording().frame["pivot_torque_nm"],
+        pendulum.torque,
+        atol=1e-12,
+    )
 
 
 def test_a_screw_turns_torque_into_force_and_turns_into_travel(imported, pendulum, write_csv):
-    """What a motor does, 2 pi x torque a turn, is what the slide does, lead x force: power is the same."""
+    """What a motor does, 2 pi x torque a turn, is what the slide does, lead x force: power is the
+    same."""
     columns = pendulum.columns()
     text = MAP.replace('name = "pivot"', 'name = "axis"\nkind = "prismatic"')
     text = text.replace('unit = "rad" }', 'unit = "rad", lead_m = 0.005 }')
@@ -76,7 +95,8 @@ def test_a_register_logged_without_its_sign_gets_it_back(imported, pendulum, wri
 
 
 def test_what_a_register_cannot_hold_is_missing(imported, pendulum, write_csv):
-    """4.2949673e9 is more than 2^32: a small negative number whose last digits a float32 has lost."""
+    """4.2949673e9 is more than 2^32: a small negative number whose last digits a float32 has
+    lost."""
     counts = np.round(4096 / (2 * np.pi) * pendulum.angle).astype(np.int64)
     unsigned = (counts % 2**32).astype(object)
     unsigned[40] = "4.2949673E9"
@@ -90,7 +110,9 @@ def test_an_encoder_that_wraps_is_counted_on(imported, pendulum, write_csv):
     path = write_csv(pendulum.columns() | {"angle": np.degrees(pendulum.angle) % 360.0})
     text = MAP.replace('unit = "rad"', 'unit = "deg", wraps_at = 360.0', 1)
     outcome = imported(path, map_text=text)
-    assert_allclose(np.diff(outcome.recording().frame["pivot_angle_rad"]), np.diff(pendulum.angle), atol=1e-12)
+    assert_allclose(
+        np.diff(outcome.recording().frame["pivot_angle_rad"]), np.diff(pendulum.angle), atol=1e-12
+    )
     assert "wraps at 360" in outcome.told
 
 
@@ -104,7 +126,8 @@ def test_a_range_leaves_out_what_cannot_be(imported, pendulum, write_csv):
 
 
 def test_expressions_are_arithmetic_with_columns(imported, pendulum, tmp_path):
-    """The second link's absolute angle, and a controller's volts times a constant that stands in the file."""
+    """The second link's absolute angle, and a controller's volts times a constant that stands in
+    the file."""
     import scipy.io
 
     path = tmp_path / "log.mat"
@@ -181,7 +204,10 @@ def test_a_span_has_the_rate_and_the_gaps_of_its_own_part(imported, pendulum, wr
         '[[recording]]\npurpose = "train"\nspan_s = [0, 4.99]\n[[recording]]\npurpose = "validate"\nspan_s = [5, 99]\n'
     )
     outcome = imported(write_csv(columns), map_text=text)
-    rates = [outcome.recording(f"log_{name}").metadata["sample_rate_hz"] for name in ("train", "validate")]
+    rates = [
+        outcome.recording(f"log_{name}").metadata["sample_rate_hz"]
+        for name in ("train", "validate")
+    ]
     assert rates == [pytest.approx(200.0), pytest.approx(100.0)]
 
 
@@ -191,31 +217,45 @@ def test_where_one_recording_is_refused_none_is_written(imported, pendulum, writ
     assert (outcome.code, outcome.folder.exists()) == (2, False)
 
 
-TURNING = [("deg", 360.0, ""), ("rad", 2.0 * np.pi, ""), ("counts", 4096.0, ", counts_per_turn = 4096")]
+TURNING = [
+    ("deg", 360.0, ""),
+    ("rad", 2.0 * np.pi, ""),
+    ("counts", 4096.0, ", counts_per_turn = 4096"),
+]
 
 
 @pytest.mark.parametrize(("unit", "turn", "keys"), TURNING, ids=lambda value: str(value)[:6])
-def test_a_counter_that_starts_anew_is_told_with_what_counts_it_on(imported, pendulum, write_csv, unit, turn, keys):
-    """An encoder whose zero lies within the swing; the joint itself never turned by more than a radian."""
+def test_a_counter_that_starts_anew_is_told_with_what_counts_it_on(
+    imported, pendulum, write_csv, unit, turn, keys
+):
+    """An encoder whose zero lies within the swing; the joint itself never turned by more than a
+    radian."""
     logged = pendulum.angle * turn / (2.0 * np.pi) % turn
-    path = write_csv(pendulum.columns() | {"angle": np.floor(logged) if unit == "counts" else logged})
+    path = write_csv(
+        pendulum.columns() | {"angle": np.floor(logged) if unit == "counts" else logged}
+    )
     text = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", unit = "{unit}"{keys}')
     outcome = imported(path, map_text=text)
     assert f"pivot_angle_rad: steps by {turn:.6g} from one row to the next" in outcome.told
     assert f"kept; set wraps_at = {turn:.10g} at it" in outcome.told
-    outcome = imported(path, map_text=text.replace(f'"{unit}"{keys}', f'"{unit}"{keys}, wraps_at = {turn:.17g}'))
+    outcome = imported(
+        path, map_text=text.replace(f'"{unit}"{keys}', f'"{unit}"{keys}, wraps_at = {turn:.17g}')
+    )
     assert "kept; set" not in outcome.told
-    assert_allclose(np.ptp(outcome.recording().frame["pivot_angle_rad"]), np.ptp(pendulum.angle), atol=0.002)
+    assert_allclose(
+        np.ptp(outcome.recording().frame["pivot_angle_rad"]), np.ptp(pendulum.angle), atol=0.002
+    )
 
 
 COUNTER = 'unit = "counts", counts_per_turn = 4096, gear_ratio = 50, zero = 1000, wraps_at = 65536'
-WITH_A_COUNTER = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", {COUNTER}').replace(
-    'name = "whole"', 'name = "{file}"'
-)
+WITH_A_COUNTER = MAP.replace(
+    'column = "angle", unit = "rad"', f'column = "angle", {COUNTER}'
+).replace('name = "whole"', 'name = "{file}"')
 
 
 def motor_counts(angle, zero=1000):
-    """What a motor's counter of 16 bits says, 50 motor turns of 4096 counts for one of the joint."""
+    """What a motor's counter of 16 bits says, 50 motor turns of 4096 counts for one of the
+    joint."""
     return (np.round(angle / (2.0 * np.pi) * 50 * 4096).astype(int) + zero) % 65536
 
 
@@ -228,41 +268,67 @@ def test_a_counter_begins_in_the_turn_nearest_to_zero_whatever_turn_it_is_logged
     for name, shift in (("below", -0.05), ("above", 0.05)):
         columns = pendulum.columns() | {"angle": motor_counts(pendulum.angle + shift)}
         files.append(write_csv(columns, f"{name}.csv"))
-    text = WITH_A_COUNTER.replace("wraps_at", "signed_bits = 16, wraps_at") if signed else WITH_A_COUNTER
+    text = (
+        WITH_A_COUNTER.replace("wraps_at", "signed_bits = 16, wraps_at")
+        if signed
+        else WITH_A_COUNTER
+    )
     outcome = imported(*files, map_text=text)
     for name, shift in (("below", -0.05), ("above", 0.05)):
         found = outcome.recording(name).frame["pivot_angle_rad"]
         assert_allclose(found, pendulum.angle + shift, atol=2e-5)
-    assert ("begins at 64906 of 65536; taken for -630, in the turn nearest to 1000" in outcome.told) is not signed
+    assert (
+        "begins at 64906 of 65536; taken for -630, in the turn nearest to 1000" in outcome.told
+    ) is not signed
     assert "turns apart" not in outcome.told
 
 
-def test_logs_that_begin_more_than_half_a_turn_apart_are_told_and_begins_at_settles_it(imported, pendulum, write_csv):
-    """A joint that hangs upright begins half a turn from zero, once to this side of it and once to that."""
+def test_logs_that_begin_more_than_half_a_turn_apart_are_told_and_begins_at_settles_it(
+    imported, pendulum, write_csv
+):
+    """A joint that hangs upright begins half a turn from zero, once to this side of it and once to
+    that."""
     files = [
-        write_csv(pendulum.columns() | {"angle": np.degrees(pendulum.angle + np.pi + shift) % 360.0}, f"{name}.csv")
+        write_csv(
+            pendulum.columns() | {"angle": np.degrees(pendulum.angle + np.pi + shift) % 360.0},
+            f"{name}.csv",
+        )
         for name, shift in (("a", -0.02), ("b", 0.02))
     ]
-    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "deg", wraps_at = 360')
+    text = MAP.replace(
+        'column = "angle", unit = "rad"', 'column = "angle", unit = "deg", wraps_at = 360'
+    )
     text = text.replace('name = "whole"', 'name = "{file}"')
     outcome = imported(*files, map_text=text)
-    assert "begins at -3.122 and in a.csv at 3.122, about 1 of its counter's turns apart; kept" in outcome.told
+    assert (
+        "begins at -3.122 and in a.csv at 3.122, about 1 of its counter's turns apart; kept"
+        in outcome.told
+    )
     findings = outcome.recording("b").metadata["imported"]["findings"]
     assert any("turns apart" in finding["found"] for finding in findings)
     settled = imported(*files, map_text=text.replace("wraps_at", "begins_at = 180, wraps_at"))
     assert "turns apart" not in settled.told
-    assert_allclose(settled.recording("b").frame["pivot_angle_rad"], pendulum.angle + np.pi + 0.02, atol=1e-12)
+    assert_allclose(
+        settled.recording("b").frame["pivot_angle_rad"], pendulum.angle + np.pi + 0.02, atol=1e-12
+    )
 
 
-def test_where_a_counter_begins_is_asked_only_of_one_that_starts_anew(imported, pendulum, write_csv):
-    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "rad", begins_at = 3.0')
+def test_where_a_counter_begins_is_asked_only_of_one_that_starts_anew(
+    imported, pendulum, write_csv
+):
+    text = MAP.replace(
+        'column = "angle", unit = "rad"', 'column = "angle", unit = "rad", begins_at = 3.0'
+    )
     outcome = imported(write_csv(pendulum.columns()), map_text=text)
     assert (outcome.code, "begins_at: found without wraps_at" in outcome.err) == (2, True)
 
 
 def test_what_jumps_otherwise_is_no_full_counter(imported, pendulum, write_csv):
     """Neither a spike, nor steps that a motion asks for, nor one that an encoder lost."""
-    for jump in (np.where(np.arange(2000) == 700, 4.0, 0.0), np.where(np.arange(2000) > 700, 2.5, 0.0)):
+    for jump in (
+        np.where(np.arange(2000) == 700, 4.0, 0.0),
+        np.where(np.arange(2000) > 700, 2.5, 0.0),
+    ):
         path = write_csv(pendulum.columns() | {"angle": pendulum.angle + jump})
         assert "wraps_at" not in imported(path).told
 
@@ -273,23 +339,36 @@ def test_rows_of_a_drive_that_was_off_are_left_out(imported, pendulum, write_csv
     columns = pendulum.columns() | {"on": np.repeat(told, 1000)}
     text = MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"')
     outcome = imported(write_csv(columns), map_text=text)
-    assert_allclose(outcome.recording().frame["pivot_torque_nm"], pendulum.torque[:1000], atol=1e-12)
+    assert_allclose(
+        outcome.recording().frame["pivot_torque_nm"], pendulum.torque[:1000], atol=1e-12
+    )
     assert "on is 0 in 1 000 rows: the drive was off" in " ".join(outcome.told.split())
 
 
-def test_a_drive_that_was_never_on_and_a_column_that_is_not_there_are_refused(imported, pendulum, write_csv):
+def test_a_drive_that_was_never_on_and_a_column_that_is_not_there_are_refused(
+    imported, pendulum, write_csv
+):
     path = write_csv(pendulum.columns() | {"on": np.zeros(2000)})
     never = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"'))
     assert (never.code, "'on' says of no row that the drive was on" in never.err) == (2, True)
-    absent = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "onn"'))
+    absent = imported(
+        path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "onn"')
+    )
     assert (absent.code, "has no column 'onn', which joint[0].enabled" in absent.err) == (2, True)
 
 
-def test_a_switch_in_words_is_refused_and_one_that_is_silent_now_and_then_is_told(imported, pendulum, write_csv):
+def test_a_switch_in_words_is_refused_and_one_that_is_silent_now_and_then_is_told(
+    imported, pendulum, write_csv
+):
     text = MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"')
-    words = imported(write_csv(pendulum.columns() | {"on": np.repeat(["ON", "OFF"], 1000)}), map_text=text)
+    words = imported(
+        write_csv(pendulum.columns() | {"on": np.repeat(["ON", "OFF"], 1000)}), map_text=text
+    )
     assert (words.code, words.err.count("\n")) == (2, 1)
-    assert "'on' has no number in any row, expected 0 where the drive was off and another number" in words.err
+    assert (
+        "'on' has no number in any row, expected 0 where the drive was off and another number"
+        in words.err
+    )
     silent = np.repeat(["1", "0"], 1000).astype(object)
     silent[:20] = ""
     told = imported(write_csv(pendulum.columns() | {"on": silent}), map_text=text).told
@@ -297,21 +376,32 @@ def test_a_switch_in_words_is_refused_and_one_that_is_silent_now_and_then_is_tol
     assert "on has no number in 20 rows: it says of none of them that the drive was on" in told
 
 
-def test_a_set_point_that_begins_later_than_the_log_begins_in_no_turn_before(imported, pendulum, write_csv):
+def test_a_set_point_that_begins_later_than_the_log_begins_in_no_turn_before(
+    imported, pendulum, write_csv
+):
     wrapped = (pendulum.angle + np.pi) % (2 * np.pi) - np.pi
     late = wrapped.astype(object)
     late[:50] = ""
     line = 'velocity = { column = "velocity", unit = "rad/s" }'
-    text = MAP.replace(line, f'{line}\nreference = {{ column = "asked", unit = "rad", wraps_at = {2 * np.pi} }}')
+    text = MAP.replace(
+        line, f'{line}\nreference = {{ column = "asked", unit = "rad", wraps_at = {2 * np.pi} }}'
+    )
     outcome = imported(write_csv(pendulum.columns() | {"asked": late}), map_text=text)
     assert (outcome.code, outcome.err) == (0, "")
-    assert_allclose(outcome.recording().frame["pivot_reference_rad"][50:], pendulum.angle[50:], atol=1e-9)
+    assert_allclose(
+        outcome.recording().frame["pivot_reference_rad"][50:], pendulum.angle[50:], atol=1e-9
+    )
     never = imported(write_csv(pendulum.columns() | {"asked": np.full(2000, "")}), map_text=text)
     assert "Traceback" not in never.err and never.code in (0, 2)
 
 
-def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(imported, pendulum, write_csv):
-    columns, text = pendulum.columns(), MAP.replace('velocity = { column = "velocity", unit = "rad/s" }\n', "")
+def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(
+    imported, pendulum, write_csv
+):
+    columns, text = (
+        pendulum.columns(),
+        MAP.replace('velocity = { column = "velocity", unit = "rad/s" }\n', ""),
+    )
     first = text[text.index("[[joint]]") : text.index("[[recording]]")]
     for name in ("elbow", "wrist"):
         columns |= {f"{name}_angle": pendulum.angle, f"{name}_torque": pendulum.torque}
@@ -321,16 +411,26 @@ def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(i
     assert outcome.code == 0, outcome.err
     assert "exoid identify and exoid diagnose do not" in " ".join(outcome.told.split())
     told = " ".join(outcome.told.split())
-    assert "elbow (revolute), wrist (revolute), and of the mechanisms that exoid knows none has these: two rev" in told
-    assert "`exoid run` ends at the motions of these: pivot (revolute), elbow (revolute), wrist (revolute) make" in told
+    assert (
+        "elbow (revolute), wrist (revolute), and of the mechanisms that exoid knows none has these: two rev"
+        in told
+    )
+    assert (
+        "`exoid run` ends at the motions of these: pivot (revolute), elbow (revolute), wrist (revolute) make"
+        in told
+    )
     assert "does the rest" not in outcome.told
 
 
-def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(imported, pendulum, write_csv):
+def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(
+    imported, pendulum, write_csv
+):
     paths = []
     for number in range(4):
         columns = dict(pendulum.columns())
-        columns["torque"] = np.where(np.arange(len(pendulum.time)) % 100 < number, np.nan, columns["torque"])
+        columns["torque"] = np.where(
+            np.arange(len(pendulum.time)) % 100 < number, np.nan, columns["torque"]
+        )
         path = write_csv(columns)
         paths.append(path.rename(path.with_name(f"log{number}.csv")))
     several = MAP.replace('name = "whole"', 'name = "{file}"')
@@ -348,7 +448,10 @@ def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(
 def test_an_angle_that_hardly_moves_is_told_of(imported, pendulum, write_csv):
     columns = pendulum.columns()
     tiny = columns | {"angle": 1e-9 * columns["angle"], "velocity": 1e-9 * columns["velocity"]}
-    assert "rad only, and what a joint does within 0.001 rad shows no mass" in imported(write_csv(tiny)).told
+    assert (
+        "rad only, and what a joint does within 0.001 rad shows no mass"
+        in imported(write_csv(tiny)).told
+    )
     assert "shows no mass" not in imported(write_csv(columns, "usual.csv")).told
 
 
@@ -363,7 +466,9 @@ def test_commas_between_thousands_are_read_over(imported, pendulum, tmp_path):
 
 
 @pytest.mark.parametrize("other", ["---", "ERR", "1234.5", "1234", ""])
-def test_what_has_no_comma_does_not_hide_those_between_thousands(imported, pendulum, write_csv, other):
+def test_what_has_no_comma_does_not_hide_those_between_thousands(
+    imported, pendulum, write_csv, other
+):
     written = [f"{1e3 * torque:,.6f}" for torque in pendulum.torque]
     assert sum("," in text for text in written) > 300
     written[77] = other
@@ -383,10 +488,14 @@ def test_where_one_comma_is_between_no_thousands_none_is(imported, pendulum, wri
     assert "rows with text" in imported(write_csv(pendulum.columns() | {"torque": written})).told
 
 
-def test_a_comma_that_may_be_a_decimal_one_is_not_taken_for_one_between_thousands(imported, pendulum, tmp_path):
+def test_a_comma_that_may_be_a_decimal_one_is_not_taken_for_one_between_thousands(
+    imported, pendulum, tmp_path
+):
     path = tmp_path / "log.csv"
     rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)
-    lines = [f'{t:.3f},{q:.12f},{dq:.12f},"{f"{tau:.3f}".replace(".", ",")}"' for t, q, dq, tau in rows]
+    lines = [
+        f'{t:.3f},{q:.12f},{dq:.12f},"{f"{tau:.3f}".replace(".", ",")}"' for t, q, dq, tau in rows
+    ]
     path.write_text("\n".join(["time,angle,velocity,torque", *lines]))
     outcome = imported(path)
     assert outcome.code == 2 and "torque" in outcome.err

@@ -1,4 +1,5 @@
-"""What cannot be imported is refused in one line that says where, what and what to do; nothing half is left."""
+"""What cannot be imported is refused in one line that says where, what and what to do; nothing half
+is left."""
 
 import os
 import subprocess
@@ -45,7 +46,9 @@ BAD_MAPS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("right", "wrong", "line"), [(a, b, " ... ".join(c)) for a, b, *c in BAD_MAPS])
+@pytest.mark.parametrize(
+    ("right", "wrong", "line"), [(a, b, " ... ".join(c)) for a, b, *c in BAD_MAPS]
+)
 def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, right, wrong, line):
     outcome = imported(write_csv(pendulum.columns()), map_text=MAP.replace(right, wrong, 1))
     assert (outcome.code, outcome.out) == (2, "")
@@ -66,7 +69,10 @@ def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, righ
             "log.csv: line 3 opens a quotation mark that nothing closes; close it",
         ),
         (b"\n\n\n", "log.csv: is empty, expected a table of numbers"),
-        (b"time,angle,velocity,torque\n", "log.csv: holds no rows of two numbers or more after 'time,angle,velocity"),
+        (
+            b"time,angle,velocity,torque\n",
+            "log.csv: holds no rows of two numbers or more after 'time,angle,velocity",
+        ),
         (bytes(range(256)) * 50, "log.csv: is no text (it starts with"),
         (b"\x89HDF\r\n\x1a\n" + b"x" * 900, "log.csv: is a damaged or truncated HDF5 file"),
         (b"PAR1" + b"x" * 900, "log.csv: is a damaged or truncated Parquet file"),
@@ -98,7 +104,10 @@ def test_a_pipe_is_refused_and_not_waited_for(imported, pendulum, write_csv, tmp
     os.mkfifo(tmp_path / "pipe.csv")
     outcome = imported(tmp_path / "pipe.csv")
     assert outcome.code == 2
-    assert "pipe.csv: is a pipe or a device, expected a file; write what comes out of it to one" in outcome.err
+    assert (
+        "pipe.csv: is a pipe or a device, expected a file; write what comes out of it to one"
+        in outcome.err
+    )
     log, folder = str(write_csv(pendulum.columns())), str(tmp_path / "recordings")
     assert run(["import", log, "--map", str(tmp_path / "pipe.csv"), "-o", folder]) == 2
     assert "pipe.csv: is a pipe or a device, expected the file of a map" in capsys.readouterr().err
@@ -110,7 +119,19 @@ def test_a_link_to_nothing_says_to_what(imported, pendulum, write_csv, tmp_path,
     told = "no such file; it is a symbolic link to nowhere.csv, which is not there; link it anew"
     assert f"log.csv: {told}" in imported(tmp_path / "log.csv").err
     log = str(write_csv(pendulum.columns(), name="other.csv"))
-    assert run(["import", log, "--map", str(tmp_path / "map.toml.csv"), "-o", str(tmp_path / "recordings")]) == 2
+    assert (
+        run(
+            [
+                "import",
+                log,
+                "--map",
+                str(tmp_path / "map.toml.csv"),
+                "-o",
+                str(tmp_path / "recordings"),
+            ]
+        )
+        == 2
+    )
     assert told in capsys.readouterr().err
 
 
@@ -121,7 +142,10 @@ def test_a_folder_that_is_called_as_a_recordings_file_is_refused_with_what_is_me
     where = ["--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "made" / "x.parquet")]
     assert run(["import", str(write_csv(pendulum.columns())), *where]) == 2
     err = capsys.readouterr().err
-    assert "x.parquet: ends as a recording's file does, expected the folder for all of them, such as -o" in err
+    assert (
+        "x.parquet: ends as a recording's file does, expected the folder for all of them, such as -o"
+        in err
+    )
     assert 'name = "x" at [[recording]] in the map' in err and len(err.splitlines()) == 1
     assert not (tmp_path / "made").exists()
 
@@ -139,8 +163,16 @@ SLIPS = [
 
 
 ABSURD = [
-    ("", "\n[geometry]\ngravity_m_s2 = 981", "geometry.gravity_m_s2: found 981, expected less than or equal to 30"),
-    ('unit = "N·m"', 'unit = "N·m", scale = 1e300', "scale: found 1e+300, expected 1e-12 to 1e+12 in size"),
+    (
+        "",
+        "\n[geometry]\ngravity_m_s2 = 981",
+        "geometry.gravity_m_s2: found 981, expected less than or equal to 30",
+    ),
+    (
+        'unit = "N·m"',
+        'unit = "N·m", scale = 1e300',
+        "scale: found 1e+300, expected 1e-12 to 1e+12 in size",
+    ),
     ('unit = "N·m"', 'unit = "N·m", scale = 0', "scale: found 0, expected 1e-12 to 1e+12 in size"),
     (
         'unit = "N·m"',
@@ -150,12 +182,20 @@ ABSURD = [
         "leave slips out",
     ),
     ('unit = "N·m"', 'unit = "N·m", gear_ratio = 1e300', "gear_ratio: found 1e+300, expected"),
-    ("", "period_s = 1e9", "recording.period_s: found 1e+09 (train), expected at most the 9.995 s of the run"),
+    (
+        "",
+        "period_s = 1e9",
+        "recording.period_s: found 1e+09 (train), expected at most the 9.995 s of the run",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "parts"), [(a, b, c) for a, b, *c in ABSURD], ids=range(len(ABSURD)))
-def test_what_no_machine_has_is_refused_with_what_is_expected(imported, pendulum, write_csv, right, wrong, parts):
+@pytest.mark.parametrize(
+    ("right", "wrong", "parts"), [(a, b, c) for a, b, *c in ABSURD], ids=range(len(ABSURD))
+)
+def test_what_no_machine_has_is_refused_with_what_is_expected(
+    imported, pendulum, write_csv, right, wrong, parts
+):
     text = MAP.replace(right, wrong, 1) if right else MAP + wrong
     outcome = imported(write_csv(pendulum.columns()), map_text=text)
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1), outcome.err
@@ -174,12 +214,19 @@ def test_a_single_torque_that_no_drive_delivers_is_refused_with_its_instant_unti
     path = write_csv(pendulum.columns() | {"torque": torque})
     outcome = imported(path)
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert "would be 1e+35 N·m at 0.5 s, and beyond 1e+06 N·m, which no drive delivers, in 1 row" in outcome.err
-    mended = imported(path, map_text=MAP.replace('unit = "N·m"', 'unit = "N·m", range = [-100, 100]'))
+    assert (
+        "would be 1e+35 N·m at 0.5 s, and beyond 1e+06 N·m, which no drive delivers, in 1 row"
+        in outcome.err
+    )
+    mended = imported(
+        path, map_text=MAP.replace('unit = "N·m"', 'unit = "N·m", range = [-100, 100]')
+    )
     assert (mended.code, len(mended.recording().frame)) == (0, 1999)
 
 
-def test_a_single_reading_far_from_all_others_is_told_with_its_instant(imported, pendulum, write_csv):
+def test_a_single_reading_far_from_all_others_is_told_with_its_instant(
+    imported, pendulum, write_csv
+):
     torque = pendulum.torque.copy()
     torque[100] = 500.0
     told = imported(write_csv(pendulum.columns() | {"torque": torque})).told
@@ -187,7 +234,9 @@ def test_a_single_reading_far_from_all_others_is_told_with_its_instant(imported,
     assert "far off" not in imported(write_csv(pendulum.columns())).told
 
 
-@pytest.mark.parametrize(("right", "wrong", "parts"), [(a, b, c) for a, b, *c in SLIPS], ids=range(len(SLIPS)))
+@pytest.mark.parametrize(
+    ("right", "wrong", "parts"), [(a, b, c) for a, b, *c in SLIPS], ids=range(len(SLIPS))
+)
 def test_a_slip_in_a_map_is_the_users_to_mend(imported, pendulum, write_csv, right, wrong, parts):
     outcome = imported(write_csv(pendulum.columns()), map_text=MAP.replace(right, wrong, 1))
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1), outcome.err
@@ -199,16 +248,19 @@ def test_a_parquet_file_with_a_column_twice_or_damaged_pages_is_named(imported, 
     twice = pa.Table.from_arrays([*columns.values(), columns["angle"]], [*columns, "angle"])
     pq.write_table(twice, tmp_path / "twice.parquet")
     outcome = imported(tmp_path / "twice.parquet")
-    assert (outcome.code, "twice.parquet: has two columns 'angle'" in outcome.err) == (2, True), outcome.err
+    assert (outcome.code, "twice.parquet: has two columns 'angle'" in outcome.err) == (2, True), (
+        outcome.err
+    )
     path = tmp_path / "damaged.parquet"
     pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=False)
     damaged = bytearray(path.read_bytes())
     damaged[100:9000] = b"\xff" * 8900
     path.write_bytes(damaged)
     outcome = imported(path)
-    assert (outcome.code, "damaged.parquet: is a damaged or truncated Parquet file" in outcome.err) == (2, True), (
-        outcome.err
-    )
+    assert (
+        outcome.code,
+        "damaged.parquet: is a damaged or truncated Parquet file" in outcome.err,
+    ) == (2, True), outcome.err
 
 
 def test_a_data_set_is_no_group_and_an_empty_one_no_column(imported, pendulum, tmp_path):
@@ -219,13 +271,19 @@ def test_a_data_set_is_no_group_and_an_empty_one_no_column(imported, pendulum, t
         file["empty"] = np.empty((0, 3))
     assert imported(tmp_path / "log.h5").code == 0
     outcome = imported(tmp_path / "log.h5", map_text=f'[source]\ntable = "angle"\n{MAP}')
-    assert (outcome.code, "names 'angle', which is a data set, expected the group" in outcome.err) == (2, True)
+    assert (
+        outcome.code,
+        "names 'angle', which is a data set, expected the group" in outcome.err,
+    ) == (2, True)
 
 
 def test_json_that_is_nested_without_end_is_refused(imported, tmp_path):
     (tmp_path / "log.json").write_text('{"a":' * 5000 + "1" + "}" * 5000)
     outcome = imported(tmp_path / "log.json")
-    assert (outcome.code, "log.json: nests lists or tables deeper than any log does" in outcome.err) == (2, True)
+    assert (
+        outcome.code,
+        "log.json: nests lists or tables deeper than any log does" in outcome.err,
+    ) == (2, True)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
@@ -263,10 +321,15 @@ def test_a_recording_that_was_measured_is_never_overwritten(imported, pendulum, 
     metadata = {key: value for key, value in table.metadata.items() if key != "imported"}
     RECORDING.write(first.folder / "whole.parquet", table.frame, metadata)
     outcome = imported(path)
-    assert (outcome.code, "holds a recording that was not imported, not overwritten" in outcome.err) == (2, True)
+    assert (
+        outcome.code,
+        "holds a recording that was not imported, not overwritten" in outcome.err,
+    ) == (2, True)
 
 
-def test_a_name_that_stands_twice_is_told_and_refused_where_the_map_uses_it(imported, pendulum, write_csv):
+def test_a_name_that_stands_twice_is_told_and_refused_where_the_map_uses_it(
+    imported, pendulum, write_csv
+):
     columns = pendulum.columns() | {"again": np.zeros(len(pendulum.time))}
     path = write_csv(columns)
     path.write_text(path.read_text().replace("again", "angle", 1))
@@ -276,7 +339,10 @@ def test_a_name_that_stands_twice_is_told_and_refused_where_the_map_uses_it(impo
     assert "name angle#1, angle#2 ... in the map" in refused.err
     first = imported(path, map_text=MAP.replace('"angle"', '"angle#1"'))
     np.testing.assert_allclose(first.recording().frame["pivot_angle_rad"], pendulum.angle)
-    assert first.recording().metadata["imported"]["notes"][-1] == "columns that stand twice are angle#1, angle#2"
+    assert (
+        first.recording().metadata["imported"]["notes"][-1]
+        == "columns that stand twice are angle#1, angle#2"
+    )
     unused = path.with_name("unused.csv")
     unused.write_text(path.read_text().replace("angle", "note").replace("note", "angle", 1))
     assert imported(path, map_text=MAP.replace('"angle"', '"angle#2"')).code == 0
@@ -297,7 +363,9 @@ def test_two_files_do_not_become_one_recording(imported, pendulum, write_csv):
     assert not outcome.folder.exists()
 
 
-def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, write_csv, tmp_path):
+def test_a_file_that_is_refused_takes_those_before_it_along(
+    imported, pendulum, write_csv, tmp_path
+):
     """Of what was there before nothing changes, and nothing new is half there."""
     text = MAP.replace('"whole"', '"{file}"')
     good, bad = write_csv(pendulum.columns(), name="good.csv"), tmp_path / "bad.csv"
@@ -306,7 +374,10 @@ def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, 
     assert (outcome.code, outcome.out, outcome.folder.exists()) == (2, "", False)
     other = write_csv(pendulum.columns(), name="other.csv")
     outcome = imported(good, other, map_text=text)
-    assert sorted(path.name for path in outcome.folder.iterdir()) == ["good.parquet", "other.parquet"]
+    assert sorted(path.name for path in outcome.folder.iterdir()) == [
+        "good.parquet",
+        "other.parquet",
+    ]
 
 
 def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp_path):
@@ -315,13 +386,21 @@ def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp
     validate = '[[recording]]\nname = "judge"\npurpose = "validate"\n'
     outcome = imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span_s = [5.0, 10.0]\n")
     assert (outcome.code, outcome.folder.exists()) == (2, False)
-    assert "log.csv: 5 to 5.995 s would be to train and to validate, expected no sample in both" in outcome.err
-    assert imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span = [0.6, 1.0]\n").code == 0
+    assert (
+        "log.csv: 5 to 5.995 s would be to train and to validate, expected no sample in both"
+        in outcome.err
+    )
+    assert (
+        imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span = [0.6, 1.0]\n").code == 0
+    )
     again = imported(path, map_text=MAP)
     files = [again.folder / name for name in ("whole.parquet", "judge.parquet")]
     outcome = exoid("identify", *files, "-o", tmp_path / "identified")
     assert outcome.code == 2
-    assert "have 800 rows of log.csv in common, expected none: a model is judged on data that no fit" in outcome.err
+    assert (
+        "have 800 rows of log.csv in common, expected none: a model is judged on data that no fit"
+        in outcome.err
+    )
 
 
 def test_the_map_page_is_up_to_date(request):
@@ -340,12 +419,16 @@ def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
         f"folder = {str(tmp_path)!r}\n"
         f"raise SystemExit(run(['import', {str(path)!r}, '--map', folder + '/map.toml', '-o', folder + '/out']))"
     )
-    stopped = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    stopped = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120
+    )
     assert (stopped.returncode, stopped.stderr) == (130, "exoid: stopped by Ctrl-C\n")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(imported, pendulum, write_csv):
+def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(
+    imported, pendulum, write_csv
+):
     columns = {name: values[:5] for name, values in pendulum.columns().items()}
     path = write_csv(columns)
     outcome = imported(path)
@@ -354,12 +437,17 @@ def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(import
     )  # fmt: skip
 
 
-def test_a_clock_of_which_no_run_is_long_enough_is_told_with_how_long_they_are(imported, pendulum, write_csv):
+def test_a_clock_of_which_no_run_is_long_enough_is_told_with_how_long_they_are(
+    imported, pendulum, write_csv
+):
     columns = {name: values[:30] for name, values in pendulum.columns().items()}
     columns["time"] = np.where(np.arange(30) < 5, columns["time"], np.nan)
     outcome = imported(write_csv(columns))
     assert outcome.code == 2
-    assert "no run of its clock has 10 rows, which a recording needs: the longest has 5 of 30; correct" in outcome.err
+    assert (
+        "no run of its clock has 10 rows, which a recording needs: the longest has 5 of 30; correct"
+        in outcome.err
+    )
 
 
 def test_a_joint_that_never_moves_is_told(imported, pendulum, write_csv):
@@ -368,18 +456,25 @@ def test_a_joint_that_never_moves_is_told(imported, pendulum, write_csv):
 
 
 def test_a_sliding_joints_voltage_asks_for_its_own_gain_and_not_for_a_screw_alone():
-    with pytest.raises(ValueError, match=r"^needs lead_m, or gain_n_v in place of gain_nm_v; add it"):
+    with pytest.raises(
+        ValueError, match=r"^needs lead_m, or gain_n_v in place of gain_nm_v; add it"
+    ):
         gain("voltage", "force", {"gain_nm_v": 2.0}, 1.0)
     with pytest.raises(ValueError, match=r"^needs gain_n_v; add it"):
         gain("voltage", "force", {}, 1.0)
 
 
-def test_one_wild_angle_is_refused_with_its_instant_and_what_leaves_it_out(imported, pendulum, write_csv):
+def test_one_wild_angle_is_refused_with_its_instant_and_what_leaves_it_out(
+    imported, pendulum, write_csv
+):
     columns = {name: np.array(values, dtype=float) for name, values in pendulum.columns().items()}
     columns["angle"][100] = 99.0
     outcome = imported(write_csv(columns))
     assert outcome.code == 2 and len(outcome.err.splitlines()) == 1
-    assert f"beyond it in 1 row of {len(columns['angle'])}, the first 99 at {columns['time'][100]:.6g} s" in outcome.err
+    assert (
+        f"beyond it in 1 row of {len(columns['angle'])}, the first 99 at {columns['time'][100]:.6g} s"
+        in outcome.err
+    )
     assert "leave slips out with range" in outcome.err
 
 

@@ -1,4 +1,5 @@
-"""Other people's Modbus: what is not installed here is skipped, with the command that would bring it."""
+"""Other people's Modbus: what is not installed here is skipped, with the command that would bring
+it."""
 
 import asyncio
 import queue
@@ -40,11 +41,29 @@ def mbpoll():
     need(shutil.which("mbpoll"), "mbpoll", "apt-get install mbpoll")
 
     def poll(port, unit, address, kind, *values, count=1):
-        command = ["mbpoll", "-m", "tcp", "-p", str(port), "-a", str(unit), "-0", "-r", str(address), "-t", kind, "-1"]
+        command = [
+            "mbpoll",
+            "-m",
+            "tcp",
+            "-p",
+            str(port),
+            "-a",
+            str(unit),
+            "-0",
+            "-r",
+            str(address),
+            "-t",
+            kind,
+            "-1",
+        ]
         amount = [] if values else ["-c", str(count)]
         command += ["-B", *amount, "127.0.0.1", *(["--", *map(str, values)] if values else [])]
         done = subprocess.run(command, capture_output=True, text=True, timeout=20)
-        return done.returncode, re.findall(r"^\[\d+\]:\s+(\S+)", done.stdout, re.MULTILINE), done.stderr
+        return (
+            done.returncode,
+            re.findall(r"^\[\d+\]:\s+(\S+)", done.stdout, re.MULTILINE),
+            done.stderr,
+        )
 
     return poll
 
@@ -59,11 +78,14 @@ def libmodbus():
 
 @pytest.fixture(scope="session")
 def leg_on_libmodbus(tmp_path_factory):
-    """Compile the leg that libmodbus serves; calling it serves one, as a context that tells the port."""
+    """Compile the leg that libmodbus serves; calling it serves one, as a context that tells the
+    port."""
     need(shutil.which("gcc"), "gcc", "apt-get install gcc libc6-dev")
     program = tmp_path_factory.mktemp("libmodbus") / "leg_server"
     command = ["gcc", "-Wall", "-Wextra", "-Werror", "-O1", "-o", program, SERVER]
-    built = subprocess.run([*command, "-I/usr/include/modbus", "-lmodbus"], capture_output=True, text=True)
+    built = subprocess.run(
+        [*command, "-I/usr/include/modbus", "-lmodbus"], capture_output=True, text=True
+    )
     need("modbus.h: No such file" not in built.stderr, "libmodbus", "apt-get install libmodbus-dev")
     assert built.returncode == 0, built.stderr
     return lambda: _serving([program])
@@ -72,7 +94,9 @@ def leg_on_libmodbus(tmp_path_factory):
 @pytest.fixture(scope="session")
 def leg_on_pymodbustcp():
     """Return what serves a leg by pyModbusTCP, as a context that tells the port."""
-    pytest.importorskip("pyModbusTCP", reason="pyModbusTCP is not installed; `make install` brings it")
+    pytest.importorskip(
+        "pyModbusTCP", reason="pyModbusTCP is not installed; `make install` brings it"
+    )
     from tests.interop.leg import serving_on_pymodbustcp
 
     return serving_on_pymodbustcp
@@ -93,7 +117,13 @@ def _serving_ours():
     async def serving():
         until = asyncio.Event()
         stop = partial(asyncio.get_running_loop().call_soon_threadsafe, until.set)
-        await serve(rig, plant, 0, lambda place, line: listening.put((int(place.rpartition(":")[2]), stop)), until)
+        await serve(
+            rig,
+            plant,
+            0,
+            lambda place, line: listening.put((int(place.rpartition(":")[2]), stop)),
+            until,
+        )
 
     thread = threading.Thread(target=asyncio.run, args=[serving()])
     thread.start()
@@ -108,7 +138,9 @@ def _serving_ours():
 @contextmanager
 def _serving(command):
     """Run a server that prints its port and ends with its input."""
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         try:
             yield int(process.stdout.readline())
         finally:
@@ -121,10 +153,16 @@ def experiment(tmp_path):
     """Write rig and excitation for a leg at a port; returns their paths."""
 
     def write(port):
-        rig = (datasets() / "rigs" / "plain.toml").read_text().replace("embedded = true", "embedded = false", 1)
+        rig = (
+            (datasets() / "rigs" / "plain.toml")
+            .read_text()
+            .replace("embedded = true", "embedded = false", 1)
+        )
         for key, value in {"ramp_s": 0.8, "settle_s": 0.2}.items():
             rig = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value}", rig, flags=re.MULTILINE)
-        (tmp_path / "rig.toml").write_text(re.sub(r"^(map = .*)$", rf"\1\nport = {port}", rig, flags=re.MULTILINE))
+        (tmp_path / "rig.toml").write_text(
+            re.sub(r"^(map = .*)$", rf"\1\nport = {port}", rig, flags=re.MULTILINE)
+        )
         (tmp_path / "excitation.toml").write_text(EXCITATION)
         return tmp_path / "rig.toml", tmp_path / "excitation.toml"
 

@@ -7,7 +7,11 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pyModbusTCP.constants import EXP_DATA_ADDRESS, EXP_GATEWAY_TARGET_DEVICE_FAILED_TO_RESPOND, EXP_NONE
+from pyModbusTCP.constants import (
+    EXP_DATA_ADDRESS,
+    EXP_GATEWAY_TARGET_DEVICE_FAILED_TO_RESPOND,
+    EXP_NONE,
+)
 from pyModbusTCP.server import DataBank, DataHandler, ModbusServer
 
 DRIVES, SENSORS = (1, 2), (11, 12, 13, 14)
@@ -16,7 +20,8 @@ ENABLE, READ_WRITE = 0x000F, 23
 
 
 class Leg(DataHandler):
-    """In lockstep: a sample lasts until both drives have been exchanged. The joints are where their set-points are."""
+    """In lockstep: a sample lasts until both drives have been exchanged. The joints are where their
+    set-points are."""
 
     def __init__(self) -> None:
         super().__init__(DataBank(virtual_mode=True))
@@ -63,7 +68,11 @@ class Leg(DataHandler):
 
     def _followed(self, unit: int, angle: int) -> int:
         high, low, control = self.words[unit][WRITE : WRITE + 3]
-        return struct.unpack(">i", struct.pack(">HH", high, low))[0] if control & ENABLE == ENABLE else angle
+        return (
+            struct.unpack(">i", struct.pack(">HH", high, low))[0]
+            if control & ENABLE == ENABLE
+            else angle
+        )
 
     def _show(self, unit: int) -> None:
         if unit in DRIVES:
@@ -71,7 +80,8 @@ class Leg(DataHandler):
             angle, control = self.angle[j], self.words[unit][WRITE + 2]
             values = (
                 self.sample, self.clock_us, angle, (angle - self.last_angle[j]) * 20, int(angle / 50) + 1000, angle,
-                250 + self.sample % 10, control & ENABLE == ENABLE,  # halted, a drive is enabled still
+                # Halted, a drive is enabled still.
+                250 + self.sample % 10, control & ENABLE == ENABLE,
             )  # fmt: skip
             raw = struct.pack(">IIiiiihH", *values)
         else:

@@ -1,4 +1,5 @@
-"""exoid on servers, and its rig under clients, that are built on other Modbus implementations than its own."""
+"""exoid on servers, and its rig under clients, that are built on other Modbus implementations than
+its own."""
 
 import ctypes
 
@@ -61,7 +62,9 @@ def libmodbus_client(libmodbus):
 @pytest.fixture
 def pymodbustcp_client():
     """Connect a client of pyModbusTCP to a port and unit; closed at the test's end."""
-    module = pytest.importorskip("pyModbusTCP.client", reason="pyModbusTCP is not installed; `make install` brings it")
+    module = pytest.importorskip(
+        "pyModbusTCP.client", reason="pyModbusTCP is not installed; `make install` brings it"
+    )
     made = []
 
     def connect(port, unit):
@@ -82,7 +85,9 @@ def test_a_whole_run_on_a_foreign_server_is_recorded_with_its_numbers(
     with request.getfixturevalue(server)() as port:
         rig, excitation = experiment(port)
         acquire(rig, settings, excitation, output)
-        controls = [pymodbustcp_client(port, unit).read_holding_registers(202, 1) for unit in (1, 2)]
+        controls = [
+            pymodbustcp_client(port, unit).read_holding_registers(202, 1) for unit in (1, 2)
+        ]
     assert controls == [[DISABLE], [DISABLE]]
 
     table = RECORDING.read(output)
@@ -101,7 +106,9 @@ def test_a_whole_run_on_a_foreign_server_is_recorded_with_its_numbers(
     # 0.1 mA counts of 1000 and a fiftieth of the angle's microradians, times 12 and 9.6 N·m/A.
     assert_allclose(table.stacked("torque"), (0.1 + 2.0 * angle) * [12.0, 9.6], atol=2e-3)
     assert_allclose(frame["hip_temperature_c"], 25.0 + 0.1 * (sample % 2**32 % 10), atol=1e-9)
-    for unit, cuff in zip((11, 12, 13, 14), ("thigh_front", "thigh_back", "shank_front", "shank_back"), strict=True):
+    for unit, cuff in zip(
+        (11, 12, 13, 14), ("thigh_front", "thigh_back", "shank_front", "shank_back"), strict=True
+    ):
         assert (frame[f"{cuff}_force_x_n"] == unit).all()
         assert_allclose(frame[f"{cuff}_force_y_n"], 10.0 * angle[:, 0], atol=1e-5)
         assert_allclose(frame[f"{cuff}_force_z_n"], sample % 2**32 % 100)
@@ -109,7 +116,8 @@ def test_a_whole_run_on_a_foreign_server_is_recorded_with_its_numbers(
 
 @pytest.mark.parametrize("server", SERVERS)
 def test_an_exchange_writes_before_it_reads(server, request, libmodbus_client):
-    # The specification's order. exoid does not rely on it: what it reads is latched, see docs/rig.md.
+    # The specification's order. exoid does not rely on it: what it reads is latched, see
+    # docs/rig.md.
     with request.getfixturevalue(server)() as port:
         client = libmodbus_client(port, 1)
         assert client.exchange(200, [1, 2, DISABLE], 200, 3) == [1, 2, DISABLE]
@@ -138,7 +146,9 @@ def test_mbpoll_reads_identity_and_forces_of_our_rig(mbpoll, our_rig):
         status, forces, _ = mbpoll(port, 12, 102, "4:float", count=3)
         assert status == 0
         # Thigh weight, preload and noise, nothing like the bits of another word order.
-        assert all(abs(float(force)) < 400.0 for force in forces) and any(abs(float(force)) > 1.0 for force in forces)
+        assert all(abs(float(force)) < 400.0 for force in forces) and any(
+            abs(float(force)) > 1.0 for force in forces
+        )
         assert mbpoll(port, 1, 104, "4:int", count=1)[1] == ["0"]  # it hangs at rest
 
 
@@ -160,12 +170,14 @@ def test_pymodbustcp_moves_our_rig_sample_by_sample(our_rig, pymodbustcp_client)
         samples = []
         for microradian in range(0, 5000, 100):
             drives = [
-                drive.write_read_multiple_registers(200, [0, microradian, ENABLE], 100, 14) for drive in (hip, knee)
+                drive.write_read_multiple_registers(200, [0, microradian, ENABLE], 100, 14)
+                for drive in (hip, knee)
             ]
             assert drives[0][:4] == drives[1][:4]  # latched together
             samples.append(drives[0])
         sequence = [words[0] << 16 | words[1] for words in samples]
         assert np.diff(sequence).tolist() == [1] * 49
-        assert [words[11] for words in samples[2:]] == list(range(100, 4900, 100))  # each in force one sample later
+        # Each in force one sample later.
+        assert [words[11] for words in samples[2:]] == list(range(100, 4900, 100))
         assert 1000 < samples[-1][5] < 4900  # the leg follows
         assert hip.write_multiple_registers(200, [0, 0, DISABLE])

@@ -43,7 +43,9 @@ def evidence(
     world: Annotated[World, typer.Option(help="Which world.")] = World.all,
     cases: Annotated[int, typer.Option(min=1, help="Sessions of each world.")] = 400,
     seeds: Annotated[Seeds, typer.Option(help="Which range of seeds.")] = Seeds.tuning,
-    seed_base: Annotated[int | None, typer.Option(help="First seed, instead of the range's.")] = None,
+    seed_base: Annotated[
+        int | None, typer.Option(help="First seed, instead of the range's.")
+    ] = None,
     out: OUT = HERE,
     workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
 ) -> None:
@@ -88,7 +90,8 @@ def cross_validate(
     most: Annotated[int, typer.Option(help="Sessions at most, of each world.")] = 1000,
     workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
 ) -> None:
-    """Learn without each world and each fold of forms, and judge on what was left out, for docs/criteria.md."""
+    """Learn without each world and each fold of forms, and judge on what was left out, for
+    docs/criteria.md."""
     from tests.learn.cross_validation import ABOUT, COLUMNS, TITLE, cross_validated
 
     for variable in ONE_THREAD:
@@ -98,7 +101,9 @@ def cross_validate(
         parts.append(part)
         typer.echo(" ".join(part.as_row()))
     if not parts:
-        raise typer.BadParameter(f"{out} has evidence of no session to learn from; run `make evidence`")
+        raise typer.BadParameter(
+            f"{out} has evidence of no session to learn from; run `make evidence`"
+        )
     about = ABOUT.format(most=most, revisions=parts[0].revisions)
     keep(TITLE, {"about": about, "columns": COLUMNS, "rows": [part.as_row() for part in parts]})
     typer.echo(f"written to {MEASURED}")
@@ -124,9 +129,12 @@ def sensitivity(
 
 @app.command("look-alikes")
 def look_alikes(
-    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = EXAMINED,
+    examined: Annotated[
+        Path, typer.Option(help="Folder of a blind examination on tuning seeds.")
+    ] = EXAMINED,
 ) -> None:
-    """Learn from a blind examination how likely a named cause is an unlisted effect that resembles it."""
+    """Learn from a blind examination how likely a named cause is an unlisted effect that resembles
+    it."""
     from tests.learn.look_alikes import judged_causes, learn_look_alike
 
     judged = list(judged_causes(examined))

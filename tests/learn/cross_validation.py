@@ -1,4 +1,5 @@
-"""Criteria learned without a world, or without a third of all forms, and judged on what was left out."""
+"""Criteria learned without a world, or without a third of all forms, and judged on what was left
+out."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -25,7 +26,8 @@ learned, and the choice of the sets that are compared, come from the shipped cri
 sessions. So these losses are lower bounds. The last two columns are the mean log probability of the truth. The
 evidence was stored by revision {revisions}."""
 AWAY = 2.0
-"""Factor by which each criterion is off where learning starts: none may be right because it was right before."""
+"""Factor by which each criterion is off where learning starts: none may be right because it was
+right before."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,8 @@ def cross_validated(root: Path, most: int, workers: int, shipped: Criteria) -> I
 
 
 def parts(sessions: Sequence[Session]) -> Iterator[tuple[str, list[Session]]]:
-    """Yield the name and the sessions of each part, none for a fold whose forms no session hides."""
+    """Yield the name and the sessions of each part, none for a fold whose forms no session
+    hides."""
     for world in sorted({session.world for session in sessions}):
         yield f"world {world}", [session for session in sessions if session.world == world]
     for fold in range(FOLDS):
@@ -76,7 +79,9 @@ def _folds(session: Session) -> set[int | None]:
 def away(criteria: Criteria) -> Criteria:
     """Return criteria with all learned numbers doubled, and the prior's learned odds at zero."""
     ignorant = {f.name: 0.0 for f in fields(Criteria) if f.name in FEATURES and f.name not in HELD}
-    return replace(from_vector(to_vector(criteria) + np.log(AWAY), criteria), base_rate=0.0, **ignorant)
+    return replace(
+        from_vector(to_vector(criteria) + np.log(AWAY), criteria), base_rate=0.0, **ignorant
+    )
 
 
 def _learned(sessions: Sequence[Session], workers: int, shipped: Criteria) -> Criteria:
@@ -89,6 +94,8 @@ def _learned(sessions: Sequence[Session], workers: int, shipped: Criteria) -> Cr
 def _scores(sessions: Sequence[Session], workers: int, several: Sequence[Criteria]) -> list[float]:
     """Return the mean log probability of the truth under each of several criteria."""
     weigh, sets = LogEvidence(sessions, workers), sets_of(sessions)
-    scores = [float(np.mean(sets.scores(weigh(criteria), weights(criteria)))) for criteria in several]
+    scores = [
+        float(np.mean(sets.scores(weigh(criteria), weights(criteria)))) for criteria in several
+    ]
     weigh.close()
     return scores

@@ -21,16 +21,19 @@ SOURCES = (
     "pipelines", "tests/blind",
     ":!pipelines/diagnosis/criteria.py", ":!pipelines/diagnosis/criteria_measured.json",
 )  # fmt: skip
-"""What evidence depends on, as git names it; of the criteria it depends on those of ``BEFORE_EVIDENCE`` alone."""
+"""What evidence depends on, as git names it; of the criteria it depends on those of
+``BEFORE_EVIDENCE`` alone."""
 CHANGED = ", changed"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def write_evidence(cases: Sequence[Case], root: Path, workers: int, keep: bool = False) -> Iterator[str]:
+def write_evidence(
+    cases: Sequence[Case], root: Path, workers: int, keep: bool = False
+) -> Iterator[str]:
     """Simulate cases and keep their evidence; yield names as they are done.
 
-    What is there already, of the same revision, is left as it is, so that a campaign goes on where it was stopped.
-    Recordings are removed afterwards unless ``keep``.
+    What is there already, of the same revision, is left as it is, so that a campaign goes on where
+    it was stopped. Recordings are removed afterwards unless ``keep``.
     """
     for name in ONE_THREAD:
         os.environ[name] = "1"
@@ -44,15 +47,20 @@ def write_evidence(cases: Sequence[Case], root: Path, workers: int, keep: bool =
 
 
 def current_revision() -> str:
-    """Return the last commit that changed what evidence depends on, and whether it was changed since."""
+    """Return the last commit that changed what evidence depends on, and whether it was changed
+    since."""
 
     def git(*arguments: str) -> str:
         command = ["git", *arguments, "--", *SOURCES]
         folder = Path(__file__).parents[2]
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+        return subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, check=True
+        ).stdout.strip()
 
     values = (f", {name} {getattr(CRITERIA, name):g}" for name in BEFORE_EVIDENCE)
-    return "".join([git("log", "-1", "--format=%h"), *values, CHANGED if git("status", "--porcelain") else ""])
+    return "".join(
+        [git("log", "-1", "--format=%h"), *values, CHANGED if git("status", "--porcelain") else ""]
+    )
 
 
 def _stored_revision(place: Path) -> str | None:

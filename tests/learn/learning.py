@@ -37,7 +37,14 @@ def learn(
         weigh = LogEvidence(sessions, workers)
         criteria, before, after = ascended(weigh, sets_of(sessions), criteria)
         weigh.close()
-        history.append({"sessions": len(sessions), "revision": revisions(sessions), "before": before, "after": after})
+        history.append(
+            {
+                "sessions": len(sessions),
+                "revision": revisions(sessions),
+                "before": before,
+                "after": after,
+            }
+        )
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
     seeds = [session.truth["case"]["seed"] for session in sessions]
     return {

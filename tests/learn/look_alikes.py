@@ -45,17 +45,25 @@ def judged_causes(root: Path) -> Iterator[Judged]:
 
 def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[Judged]:
     there = {(name, h["joint"]) for h in truth["hidden"] for name in (h["effect"], *h["kin"])}
-    named, posterior = {cause_label(cause): cause for cause in verdict["causes"]}, verdict["posterior"]
+    named, posterior = (
+        {cause_label(cause): cause for cause in verdict["causes"]},
+        verdict["posterior"],
+    )
     for label, removed in posterior["systematic_error_removed"].items():
         effect, _, joint = label.partition("@")
-        cause = named.get(label, {"effect": effect, "joint": joint or None, "probability": posterior["causes"][label]})
+        cause = named.get(
+            label,
+            {"effect": effect, "joint": joint or None, "probability": posterior["causes"][label]},
+        )
         places = {(str(effect_named(name).family), at) for name, at in names_of(cause)}
         look_alikes, smooth_laws = _probabilities(posterior["laws"], places)
         before = min(cause["probability"] + look_alikes, 1.0)
         yield Judged(before, removed, smooth_laws / before, bool(there & names_of(cause)))
 
 
-def _probabilities(laws: dict[str, float], places: set[tuple[str, str | None]]) -> tuple[float, float]:
+def _probabilities(
+    laws: dict[str, float], places: set[tuple[str, str | None]]
+) -> tuple[float, float]:
     """Return the probability of look-alikes of families and joints, and of smooth laws."""
     look_alikes = smooth_laws = 0.0
     for label, p in laws.items():
@@ -69,7 +77,8 @@ def _probabilities(laws: dict[str, float], places: set[tuple[str, str | None]]) 
 
 
 def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
-    """Return the criteria that give the truth of judged causes most probability, and what they are worth."""
+    """Return the criteria that give the truth of judged causes most probability, and what they are
+    worth."""
     p, removed, ratio, right = (np.array(column) for column in zip(*judged, strict=True))
 
     def likely(criteria: NDArray) -> NDArray:
@@ -81,10 +90,16 @@ def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
         return float(PENALTY * criteria @ criteria - fitted)
 
     # A cause that removes more is never more likely to be a look-alike: the slope is not negative.
-    found = minimize(loss, np.array(CRITERIA.look_alike), method="L-BFGS-B", bounds=[(None, None), (0.0, None)])
+    found = minimize(
+        loss, np.array(CRITERIA.look_alike), method="L-BFGS-B", bounds=[(None, None), (0.0, None)]
+    )
     worth = {
         name: _worth(likely(np.array(criteria)) if criteria is not None else p, right)
-        for name, criteria in (("without", None), ("now", CRITERIA.look_alike), ("learned", found.x))
+        for name, criteria in (
+            ("without", None),
+            ("now", CRITERIA.look_alike),
+            ("learned", found.x),
+        )
     }
     return {"causes": len(p), "look_alike": [float(x) for x in found.x], **worth}
 

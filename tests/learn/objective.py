@@ -50,7 +50,9 @@ def rows(root: Path, worlds: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
             continue
         row = pq.read_table(file).to_pylist()[0]
         if "revision" not in row:
-            raise ValueError(f"{file}: stored before revisions were; remove it, and run `make evidence`")
+            raise ValueError(
+                f"{file}: stored before revisions were; remove it, and run `make evidence`"
+            )
         if not row["refused"]:
             yield row
 
@@ -65,7 +67,9 @@ def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
     truth, evidence = json.loads(row["truth"]), Evidence.unpacked(row)
     right = right_sets(truth)
     kept = _kept(posterior(evidence, criteria), right)
-    return Session(row["name"], row["world"], row["revision"], truth, *_compact(evidence, kept, right))
+    return Session(
+        row["name"], row["world"], row["revision"], truth, *_compact(evidence, kept, right)
+    )
 
 
 def _kept(found: Posterior, right: Right) -> list[Set]:

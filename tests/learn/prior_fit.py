@@ -51,7 +51,11 @@ class Sets:
             return value, -gradient + off / SPREAD / len(truth)
 
         free = {name: (0.0, 1.0) if name in POSITIVE else (None, None) for name in FEATURES}
-        held = {name: (value, value) for name, value in zip(FEATURES, start.tolist(), strict=True) if name in HELD}
+        held = {
+            name: (value, value)
+            for name, value in zip(FEATURES, start.tolist(), strict=True)
+            if name in HELD
+        }
         bounds = list((free | held).values())
         found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds)
         return found.x, float(self.weights @ self.scores(evidence, found.x))

@@ -1,4 +1,5 @@
-"""How much each criterion matters: what a change by 30 %, or its neutral value, does to the truth's probability."""
+"""How much each criterion matters: what a change by 30 %, or its neutral value, does to the truth's
+probability."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -36,7 +37,9 @@ NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "lines": 1.0, "shape_sd": 1e
 """Neutral values, where they are not zero."""
 
 
-def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, criteria: Criteria) -> dict[str, Any]:
+def sensitivity(
+    root: Path, worlds: Sequence[str], most: int, workers: int, criteria: Criteria
+) -> dict[str, Any]:
     """Return what was measured, as the page of the criteria shows it."""
     criteria = replace(criteria, base_rate=0.0)  # the sessions have one of their own
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
@@ -52,7 +55,9 @@ def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, crit
         shares = [f"{100.0 * (own - share):+.1f} %" for _, own in results]
         rows.append([f"`{name}`", *scores, *shares])
     weigh.close()
-    about = ABOUT.format(sessions=len(sessions), revisions=revisions(sessions), score=score, share=share)
+    about = ABOUT.format(
+        sessions=len(sessions), revisions=revisions(sessions), score=score, share=share
+    )
     return {"about": about, "columns": list(COLUMNS), "rows": rows}
 
 
@@ -69,7 +74,10 @@ def changes(criteria: Criteria) -> Iterator[tuple[str, Criteria, Criteria, Crite
         for k, one in enumerate(value):
             before, after = value[:k], value[k + 1 :]
             parts = ((one * CHANGE,), (one / CHANGE,), ())
-            yield f"{name}[{k}]", *(replace(criteria, **{name: (*before, *part, *after)}) for part in parts)
+            yield (
+                f"{name}[{k}]",
+                *(replace(criteria, **{name: (*before, *part, *after)}) for part in parts),
+            )
 
 
 def told_of(sets: Sets, evidence: NDArray, criteria: Criteria) -> tuple[float, float]:

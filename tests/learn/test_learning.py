@@ -18,7 +18,8 @@ from tests.learn.vector import from_vector, names, to_vector
 
 
 def sessions(count: int = 200) -> tuple[Sets, np.ndarray]:
-    """Return sessions of a law and a cause each beside nothing; the truth is a cause in one of four."""
+    """Return sessions of a law and a cause each beside nothing; the truth is a cause in one of
+    four."""
     rng = np.random.default_rng(5)
     features = np.zeros((count, 3, len(FEATURES)))
     features[:, 1, FEATURES.index("cause")] = 1.0
@@ -56,7 +57,9 @@ def test_each_number_is_changed_alone_and_by_the_same_factor():
     larger, smaller, _ = seen["shape_sd"]
     assert larger.shape_sd == pytest.approx(CHANGE * CRITERIA.shape_sd)
     assert smaller.shape_sd == pytest.approx(CRITERIA.shape_sd / CHANGE)
-    np.testing.assert_allclose(weights(replace(larger, shape_sd=CRITERIA.shape_sd)), weights(CRITERIA))
+    np.testing.assert_allclose(
+        weights(replace(larger, shape_sd=CRITERIA.shape_sd)), weights(CRITERIA)
+    )
     assert seen["amplitudes[1]"][2].amplitudes == CRITERIA.amplitudes[:1]
     assert seen["further"][2].further == 0.0
 
@@ -94,12 +97,19 @@ def test_a_cause_that_no_data_can_tell_from_the_hidden_one_is_as_right():
 
 
 def held(world, *forms):
-    return SimpleNamespace(world=world, truth={"hidden": [{"effect": e, "form": f} for e, f in forms]})
+    return SimpleNamespace(
+        world=world, truth={"hidden": [{"effect": e, "form": f} for e, f in forms]}
+    )
 
 
 def test_each_world_and_each_fold_of_forms_is_left_out_once():
     (one, *_), (other, *_), _ = (sorted(forms) for forms in forms_by_fold())
-    sessions = [held("planar", one), held("mujoco", other), held("mujoco", one, other), held("planar")]
+    sessions = [
+        held("planar", one),
+        held("mujoco", other),
+        held("mujoco", one, other),
+        held("planar"),
+    ]
     left_out = dict(parts(sessions))
     assert left_out["world planar"] == [sessions[0], sessions[3]]
     assert left_out["forms of fold 0"] == [sessions[0], sessions[2]]

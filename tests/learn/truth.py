@@ -53,7 +53,9 @@ def _tied(label: str, truth: Mapping[str, Any]) -> set[str]:
             continue
         for other in names - {name}:
             tied.add("base_tilt" if other == "base_tilt" else f"{other}@{joint or 'hip'}")
-    return {t for t in tied if not (name == "encoder_offset" and joint != "hip" and t == "base_tilt")}
+    return {
+        t for t in tied if not (name == "encoder_offset" and joint != "hip" and t == "base_tilt")
+    }
 
 
 def _outside(truth: Mapping[str, Any]) -> Right:

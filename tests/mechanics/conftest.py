@@ -1,4 +1,5 @@
-"""The leg as the paper draws it (Figure 1, Table 1): two rigid segments, and their energies (eq. 1 to 4)."""
+"""The leg as the paper draws it (Figure 1, Table 1): two rigid segments, and their energies (eq. 1
+to 4)."""
 
 from dataclasses import dataclass
 
@@ -43,7 +44,11 @@ class Segments:
         whole = q[0] + q[1]
         shank = np.array([L1 * np.cos(q[0]), L1 * np.sin(q[0])]) * dq[0]
         shank += np.array([self.c2 * np.cos(whole), self.c2 * np.sin(whole)]) * (dq[0] + dq[1])
-        spin = self.m1 * self.c1**2 * dq[0] ** 2 + self.I1 * dq[0] ** 2 + self.I2 * (dq[0] + dq[1]) ** 2
+        spin = (
+            self.m1 * self.c1**2 * dq[0] ** 2
+            + self.I1 * dq[0] ** 2
+            + self.I2 * (dq[0] + dq[1]) ** 2
+        )
         return 0.5 * spin + 0.5 * self.m2 * shank @ shank
 
     def potential(self, q):
@@ -73,7 +78,12 @@ class Segments:
 
 def gradient(function, x, step=1e-4):
     """Central differences of a scalar function, (2,)."""
-    return np.array([(function(x + step * unit) - function(x - step * unit)) / (2 * step) for unit in np.eye(len(x))])
+    return np.array(
+        [
+            (function(x + step * unit) - function(x - step * unit)) / (2 * step)
+            for unit in np.eye(len(x))
+        ]
+    )
 
 
 @pytest.fixture

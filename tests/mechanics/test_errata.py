@@ -1,4 +1,5 @@
-"""The paper's slips in modelling and excitation: the printed form fails, the mended one holds (docs/errata.md)."""
+"""The paper's slips in modelling and excitation: the printed form fails, the mended one holds
+(docs/errata.md)."""
 
 from dataclasses import replace
 
@@ -43,12 +44,15 @@ def energy_drift(gravity):
     def rates(_, state):
         q, dq = state[:2], state[2:]
         ddq = np.linalg.solve(
-            LEG.mass_matrix(q, TABLE3, GEOMETRY), -LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq - gravity(q)
+            LEG.mass_matrix(q, TABLE3, GEOMETRY),
+            -LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq - gravity(q),
         )
         return np.concatenate([dq, ddq])
 
     states = solve_ivp(rates, (0, 3), [1.2, -0.8, 0, 0], rtol=1e-9, atol=1e-9, max_step=0.02).y.T
-    kinetic = np.array([0.5 * s[2:] @ LEG.mass_matrix(s[:2], TABLE3, GEOMETRY) @ s[2:] for s in states])
+    kinetic = np.array(
+        [0.5 * s[2:] @ LEG.mass_matrix(s[:2], TABLE3, GEOMETRY) @ s[2:] for s in states]
+    )
     energy = kinetic + [potential_energy(s[:2], TABLE3, GEOMETRY) for s in states]
     return np.ptp(energy), potential_energy(states[0, :2], TABLE3, GEOMETRY) - potential_energy(
         [0, 0], TABLE3, GEOMETRY
@@ -76,7 +80,9 @@ def test_the_printed_coriolis_matrix_is_not_the_one_that_takes_no_energy(states)
     for q, dq, _ in states:
         mended = LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY)
         assert_allclose(printed_coriolis(q, dq) @ dq, mended @ dq, atol=1e-12)
-        ahead, behind = (LEG.mass_matrix(q + sign * 1e-6 * dq, TABLE3, GEOMETRY) for sign in (1, -1))
+        ahead, behind = (
+            LEG.mass_matrix(q + sign * 1e-6 * dq, TABLE3, GEOMETRY) for sign in (1, -1)
+        )
         rate = (ahead - behind) / 2e-6
         symmetric = [rate - 2 * C + (rate - 2 * C).T for C in (mended, printed_coriolis(q, dq))]
         assert np.abs(symmetric[0]).max() < 1e-8
@@ -86,9 +92,12 @@ def test_the_printed_coriolis_matrix_is_not_the_one_that_takes_no_energy(states)
 
 def test_lagranges_equation_needs_the_total_derivative_of_time(segments, states):
     for q, dq, ddq in states:
-        mended = np.array(regressor_at(q.copy(), dq.copy(), ddq.copy(), LENGTH, GRAVITY)) @ segments.X
+        mended = (
+            np.array(regressor_at(q.copy(), dq.copy(), ddq.copy(), LENGTH, GRAVITY)) @ segments.X
+        )
         assert_allclose(segments.torque(q, dq, ddq), mended, atol=1e-4)
-        # The momentum does not name time, so its partial derivative is zero and only -dL/dq is left.
+        # The momentum does not name time, so its partial derivative is zero and only -dL/dq is
+        # left.
         assert np.abs(-segments.force(q, dq) - mended).max() > 1e-3
 
 
@@ -96,13 +105,20 @@ def test_a_harmonic_of_order_zero_would_have_no_sine_and_move_the_mean(published
     one_period = np.arange(1000) * published.period_s / 1000
     assert_allclose(published.at(one_period)[0].mean(axis=0), published.theta0, atol=1e-12)
     k, a0, b0 = 0, 0.3, 0.2
-    printed = a0 * np.sin(k * published.omega * one_period) + b0 * np.cos(k * published.omega * one_period)
+    printed = a0 * np.sin(k * published.omega * one_period) + b0 * np.cos(
+        k * published.omega * one_period
+    )
     assert_allclose(printed, b0)
 
 
 def test_no_motion_satisfies_the_printed_bounds_and_the_published_one_keeps_table_2(published):
     q, dq, ddq = published.at(np.linspace(0, published.period_s, 2000))
-    printed = (q[:, 1] > 1.6232) & (q[:, 1] < -0.2269) & (np.abs(dq) > SPEED).all(1) & (np.abs(dq) < SPEED).all(1)
+    printed = (
+        (q[:, 1] > 1.6232)
+        & (q[:, 1] < -0.2269)
+        & (np.abs(dq) > SPEED).all(1)
+        & (np.abs(dq) < SPEED).all(1)
+    )
     assert not printed.any()
     assert q[:, 0].min() > ANGLE[0] and q[:, 0].max() < ANGLE[1]
     assert q[:, 1].min() > -1.6232 and q[:, 1].max() < -0.2269
@@ -115,14 +131,19 @@ def test_the_published_coefficients_are_degrees(published):
     assert np.ptp(published.at(np.linspace(0, 10, 500))[0], axis=0).max() < 1.4
 
 
-def test_row_two_of_the_regressor_has_eight_columns_of_which_the_last_is_the_knees_viscous_friction(states):
+def test_row_two_of_the_regressor_has_eight_columns_of_which_the_last_is_the_knees_viscous_friction(
+    states,
+):
     for q, dq, ddq in states:
         _, knee = regressor_at(q.copy(), dq.copy(), ddq.copy(), LENGTH, GRAVITY)
         A21, A22, A23, A24 = knee
         A25 = A26 = 0.0
         A27, A28 = np.sign(dq[1]), dq[1]
         parameters = np.append(TABLE3, FRICTION)
-        torque = LEG.mass_matrix(q, TABLE3, GEOMETRY) @ ddq + LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq
+        torque = (
+            LEG.mass_matrix(q, TABLE3, GEOMETRY) @ ddq
+            + LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq
+        )
         torque = torque + LEG.gravity_torque(q, TABLE3, GEOMETRY)
         knee_torque = torque[1] + FRICTION[2] * np.sign(dq[1]) + FRICTION[3] * dq[1]
         mended = np.array([A21, A22, A23, A24, A25, A26, A27, A28])
@@ -134,5 +155,7 @@ def test_row_two_of_the_regressor_has_eight_columns_of_which_the_last_is_the_kne
 
 def test_equation_2_is_an_energy_and_cannot_be_compared_with_a_torque(segments, states):
     energies = [segments.kinetic(q, dq) for q, dq, _ in states]
-    torques = [np.array(regressor_at(*(x.copy() for x in s), LENGTH, GRAVITY)) @ segments.X for s in states]
+    torques = [
+        np.array(regressor_at(*(x.copy() for x in s), LENGTH, GRAVITY)) @ segments.X for s in states
+    ]
     assert min(energies) >= 0 and np.min(torques) < 0 < np.max(torques)

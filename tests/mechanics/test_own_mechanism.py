@@ -1,4 +1,5 @@
-"""A mechanism is one file: with it, and with nothing else changed, machines of its kind are known everywhere."""
+"""A mechanism is one file: with it, and with nothing else changed, machines of its kind are known
+everywhere."""
 
 import json
 import os
@@ -16,7 +17,9 @@ from pipelines.contracts import PARAMETERS, RECORDING
 from tests.diagnosis.machines import PERIOD_S, RATE_HZ, excitation
 
 ROOT = Path(__file__).parents[2]
-(STAGE,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "mechanisms.md").read_text(encoding="utf-8"), re.DOTALL)
+(STAGE,) = re.findall(
+    r"```python\n(.*?)```", (ROOT / "docs" / "mechanisms.md").read_text(encoding="utf-8"), re.DOTALL
+)
 """A reader copies what the page shows."""
 WITH_FOLDER = """
 import sys
@@ -34,22 +37,32 @@ LOWER_KG, UPPER_KG, ANGLE = 60.0, 30.0, np.pi / 3
 
 
 def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
-    """Return a recording of two slides at 60°, by Newton's law in the plane for each of the two bodies.
+    """Return a recording of two slides at 60°, by Newton's law in the plane for each of the two
+    bodies.
 
-    20 N of dry and 200 N·s/m of viscous friction in each; in the upper one, so much more forwards than backwards.
+    20 N of dry and 200 N·s/m of viscous friction in each; in the upper one, so much more forwards
+    than backwards.
     """
     references = [excitation(10 * seed + j, 0.06) for j in range(2)]
     kp, kd = np.array([2e5, 7e4]), np.array([6e3, 2e3])
     along = np.array([[1.0, 0.0], [np.cos(ANGLE), np.sin(ANGLE)]])
 
     def drives(t, x, v):
-        wanted, rate = (np.array([reference[k](t)[0] for reference in references]) for k in range(2))
+        wanted, rate = (
+            np.array([reference[k](t)[0] for reference in references]) for k in range(2)
+        )
         return kp * (wanted - x) + kd * (rate - v)
 
     def rates(t, s):
         x, v = s[:2], s[2:]
-        push = drives(t, x, v) - 20.0 * np.tanh(v / 0.001) - 200.0 * v - [0.0, 0.5 * asymmetry * abs(v[1])]
-        # Unknown: both accelerations along the slides, and the force across that keeps the upper body on its slide.
+        push = (
+            drives(t, x, v)
+            - 20.0 * np.tanh(v / 0.001)
+            - 200.0 * v
+            - [0.0, 0.5 * asymmetry * abs(v[1])]
+        )
+        # Unknown: both accelerations along the slides, and the force across that keeps the upper
+        # body on its slide.
         across = np.array([-along[1][1], along[1][0]])
         lower = [LOWER_KG, 0.0, across[0]]
         upper = UPPER_KG * np.outer(along[0], [1, 0, 0]) + UPPER_KG * np.outer(along[1], [0, 1, 0])
@@ -59,7 +72,9 @@ def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
 
     time = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     begin = [reference[k](0.0)[0] for k in range(2) for reference in references]
-    path = solve_ivp(rates, (0, seconds), begin, t_eval=time, rtol=1e-5, atol=1e-7, max_step=0.01).y.T
+    path = solve_ivp(
+        rates, (0, seconds), begin, t_eval=time, rtol=1e-5, atol=1e-7, max_step=0.01
+    ).y.T
     force = np.array([drives(t, s[:2], s[2:]) for t, s in zip(time, path, strict=True)])
     force += np.random.default_rng(seed).normal(0, 0.5, force.shape)
     columns = {"time_s": time}
@@ -77,13 +92,16 @@ def recordings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
     for seed, purpose in enumerate(("train", "validate")):
         RECORDING.write(folder / f"{purpose}.parquet", *stage(purpose, seed))
-        RECORDING.write(folder / f"asymmetric_{purpose}.parquet", *stage(purpose, seed, asymmetry=150.0))
+        RECORDING.write(
+            folder / f"asymmetric_{purpose}.parquet", *stage(purpose, seed, asymmetry=150.0)
+        )
     return folder
 
 
 @pytest.fixture(scope="module")
 def exoid_with_it(tmp_path_factory):
-    """Run one command line where the page's file, and what else is given, stands beside exoid's own mechanisms."""
+    """Run one command line where the page's file, and what else is given, stands beside exoid's own
+    mechanisms."""
 
     def run(*arguments, **others):
         folder = tmp_path_factory.mktemp("mechanisms") if others else known
@@ -124,13 +142,25 @@ def test_what_is_hidden_in_it_is_named(exoid_with_it, recordings, tmp_path):
     assert done.returncode == 0, done.stderr
     verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
     (cause,) = verdict["causes"]
-    assert (cause["effect"], cause["joint"], verdict["status"]) == ("viscous_asymmetry", "y", "explained")
+    assert (cause["effect"], cause["joint"], verdict["status"]) == (
+        "viscous_asymmetry",
+        "y",
+        "explained",
+    )
     assert cause["parameters"][0]["value"] == pytest.approx(75.0, rel=0.03)
 
 
 def test_it_moves_as_it_was_recorded(exoid_with_it, recordings, identified, tmp_path):
     replayed = tmp_path / "replay.parquet"
-    done = exoid_with_it("simulate", identified, "--replay", recordings / "validate.parquet", "-o", replayed, "--json")
+    done = exoid_with_it(
+        "simulate",
+        identified,
+        "--replay",
+        recordings / "validate.parquet",
+        "-o",
+        replayed,
+        "--json",
+    )
     assert done.returncode == 0, done.stderr
     assert max(json.loads(done.stdout)["simulation_rmse_rad"].values()) < 0.0005
 
@@ -141,25 +171,45 @@ def test_it_is_exported_where_no_bodies_are_asked_for(exoid_with_it, identified,
     assert "rigid_body_X3 * at->ddq[1]" in (tmp_path / "stage.c").read_text(encoding="utf-8")
     done = exoid_with_it("export", identified, "--to", "urdf", "-o", tmp_path / "stage.urdf")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "stage (two level prismatic joints, the second carried by the first) has no bodies that" in done.stderr
+    assert (
+        "stage (two level prismatic joints, the second carried by the first) has no bodies that"
+        in done.stderr
+    )
     assert not (tmp_path / "stage.urdf").exists()
 
 
-def test_without_its_file_it_is_refused_with_what_there_is(exoid, recordings, tmp_path, monkeypatch):
+def test_without_its_file_it_is_refused_with_what_there_is(
+    exoid, recordings, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert "train.parquet has joints x (prismatic), y (prismatic) and gravity 0 m/s², expected those of" in outcome.err
-    assert "two revolute joints in series, whose axes are parallel, under gravity; two revolute joints" in outcome.err
+    assert (
+        "train.parquet has joints x (prismatic), y (prismatic) and gravity 0 m/s², expected those of"
+        in outcome.err
+    )
+    assert (
+        "two revolute joints in series, whose axes are parallel, under gravity; two revolute joints"
+        in outcome.err
+    )
     assert "; one revolute joint under gravity; " in outcome.err
     (tmp_path / "exoid.toml").write_text(NAMED, encoding="utf-8")
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert "exoid.toml: mechanism.name: found 'stage', expected a mechanism's name, or a file for a new" in outcome.err
+    assert (
+        "exoid.toml: mechanism.name: found 'stage', expected a mechanism's name, or a file for a new"
+        in outcome.err
+    )
 
 
-def test_two_mechanisms_that_no_recording_could_tell_apart_are_refused(exoid_with_it, recordings, tmp_path):
-    other = STAGE.replace('name="stage"', 'name="table"').replace("has_gravity=None", "has_gravity=True")
+def test_two_mechanisms_that_no_recording_could_tell_apart_are_refused(
+    exoid_with_it, recordings, tmp_path
+):
+    other = STAGE.replace('name="stage"', 'name="table"').replace(
+        "has_gravity=None", "has_gravity=True"
+    )
     done = exoid_with_it("identify", recordings / "train.parquet", "-o", tmp_path, table=other)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert done.stderr.startswith("exoid: two mechanisms have the joints prismatic, prismatic: stage (two level ")
+    assert done.stderr.startswith(
+        "exoid: two mechanisms have the joints prismatic, prismatic: stage (two level "
+    )

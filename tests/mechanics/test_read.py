@@ -9,7 +9,9 @@ from pipelines.settings import Experiment
 
 
 def joints(*kinds):
-    return "".join(f'[[mechanism.joints]]\nname = "q{i}"\nkind = "{kind}"\n' for i, kind in enumerate(kinds))
+    return "".join(
+        f'[[mechanism.joints]]\nname = "q{i}"\nkind = "{kind}"\n' for i, kind in enumerate(kinds)
+    )
 
 
 def experiment(folder, text):
@@ -56,6 +58,8 @@ def test_a_mechanism_that_there_is_not_is_refused_with_what_to_do(tmp_path, text
 
 
 def test_a_mechanism_that_there_is_gives_its_geometry_and_none_gives_none(tmp_path):
-    given = experiment(tmp_path, '[mechanism]\nname = "single"\ngravity_m_s2 = 0.0\n' + joints("prismatic"))
+    given = experiment(
+        tmp_path, '[mechanism]\nname = "single"\ngravity_m_s2 = 0.0\n' + joints("prismatic")
+    )
     assert geometry_from(given) == Geometry(gravity_m_s2=0.0)
     assert geometry_from(experiment(tmp_path, "")) is None

@@ -22,10 +22,18 @@ def test_a_pendulum_that_swings_freely_needs_no_torque():
     mass, length = 0.7, 0.4
     time = np.linspace(0, 3, 400)
     swing = solve_ivp(
-        lambda _, s: [s[1], -9.81 / length * np.sin(s[0])], (0, 3), [1.2, 0.3], t_eval=time, rtol=1e-11, atol=1e-11
+        lambda _, s: [s[1], -9.81 / length * np.sin(s[0])],
+        (0, 3),
+        [1.2, 0.3],
+        t_eval=time,
+        rtol=1e-11,
+        atol=1e-11,
     )
     q, dq = swing.y[:, :, np.newaxis]
-    torque = PENDULUM.regressor(q, dq, -9.81 / length * np.sin(q), EARTH) @ [mass * length**2, mass * length]
+    torque = PENDULUM.regressor(q, dq, -9.81 / length * np.sin(q), EARTH) @ [
+        mass * length**2,
+        mass * length,
+    ]
     assert_allclose(torque, 0, atol=1e-9)
     assert np.abs(PENDULUM.gravity_torque([0.5], [0.0, mass * length], EARTH)) == pytest.approx(
         mass * 9.81 * length * np.sin(0.5)
@@ -39,7 +47,10 @@ def test_the_parts_of_a_mechanism_add_up_to_its_regressor(mechanism):
     X = draw.uniform(0.5, 3.0, p)
     for q, dq, ddq in draw.uniform(-2, 2, (20, 3, joints)):
         whole = mechanism.regressor(q[None], dq[None], ddq[None], EARTH)[0] @ X
-        parts = mechanism.mass_matrix(q, X, EARTH) @ ddq + mechanism.coriolis_matrix(q, dq, X, EARTH) @ dq
+        parts = (
+            mechanism.mass_matrix(q, X, EARTH) @ ddq
+            + mechanism.coriolis_matrix(q, dq, X, EARTH) @ dq
+        )
         assert_allclose(parts + mechanism.gravity_torque(q, X, EARTH), whole, atol=1e-12)
 
 
@@ -65,7 +76,9 @@ def test_the_torque_at_an_instant_is_that_along_a_motion(mechanism):
         mechanism.reactions["rigid_body"](
             Instant(0.0, q, dq, ddq, none, none, none), np.zeros(0), X, geometry, -1, torque
         )
-        assert_allclose(torque, mechanism.regressor(q[None], dq[None], ddq[None], EARTH)[0] @ X, atol=1e-12)
+        assert_allclose(
+            torque, mechanism.regressor(q[None], dq[None], ddq[None], EARTH)[0] @ X, atol=1e-12
+        )
 
 
 def test_a_slide_and_a_turntable_are_inertia_alone_and_a_lift_has_weight():
@@ -109,4 +122,6 @@ def test_what_cannot_exist_is_told_and_what_can_is_not(mechanism):
 def test_units_at_a_prismatic_joint_are_metres_and_newtons():
     assert unit_at("prismatic", "N·m·s/rad") == "N·s/m"
     assert unit_at("prismatic", "Hz") == "Hz"
-    assert all(unit_at("revolute", unit) == unit and "rad/s" not in UNITS[unit].prismatic for unit in UNITS)
+    assert all(
+        unit_at("revolute", unit) == unit and "rad/s" not in UNITS[unit].prismatic for unit in UNITS
+    )

@@ -131,7 +131,13 @@ def test_a_table_whose_samples_and_coefficients_differ_is_refused(tmp_path, rand
     )
 
 
-GOOD = {"unit": '"deg"', "omega_rad_s": "0.6", "theta0_rad": "[0.6, -0.9]", "a": "[[1], [2]]", "b": "[[1], [2]]"}
+GOOD = {
+    "unit": '"deg"',
+    "omega_rad_s": "0.6",
+    "theta0_rad": "[0.6, -0.9]",
+    "a": "[[1], [2]]",
+    "b": "[[1], [2]]",
+}
 
 
 @pytest.mark.parametrize(
@@ -155,7 +161,9 @@ GOOD = {"unit": '"deg"', "omega_rad_s": "0.6", "theta0_rad": "[0.6, -0.9]", "a":
 )
 def test_a_bad_coefficient_file_is_refused_in_one_line(tmp_path, change, told):
     path = tmp_path / "t.toml"
-    path.write_text("\n".join(f"{key} = {value}" for key, value in (GOOD | change).items() if value))
+    path.write_text(
+        "\n".join(f"{key} = {value}" for key, value in (GOOD | change).items() if value)
+    )
     with pytest.raises(SettingsError) as error:
         read_trajectory(path)
     assert str(error.value) == f"{path}: {told}"

@@ -43,7 +43,9 @@ def test_words_mean_what_the_standards_say(kind, order, words, value):
     ],
 )
 def test_words_and_bytes_can_come_in_any_order(word_order, byte_order, words):
-    block = Block({"x": Register(address=7, type="uint32", word_order=word_order, byte_order=byte_order)})
+    block = Block(
+        {"x": Register(address=7, type="uint32", word_order=word_order, byte_order=byte_order)}
+    )
     assert block.decode(words) == {"x": float(0x0A0B0C0D)}
     assert block.encode({"x": float(0x0A0B0C0D)}) == words
 
@@ -58,15 +60,22 @@ def raws(kind):
 
 @st.composite
 def blocks(draw):
-    """Return a block of registers of any type, order, scale and distance, and a raw count or float for each."""
+    """Return a block of registers of any type, order, scale and distance, and a raw count or float
+    for each."""
     registers, address = {}, draw(st.integers(0, 65000))
-    for i, kind in enumerate(draw(st.lists(st.sampled_from(list(REGISTERS)), min_size=1, max_size=6))):
-        orders = {key: draw(st.sampled_from(["big", "little"])) for key in ("word_order", "byte_order")}
+    for i, kind in enumerate(
+        draw(st.lists(st.sampled_from(list(REGISTERS)), min_size=1, max_size=6))
+    ):
+        orders = {
+            key: draw(st.sampled_from(["big", "little"])) for key in ("word_order", "byte_order")
+        }
         address += draw(st.integers(0, 3))
         registers[f"v{i}"] = Register(address=address, type=kind, **orders)
         address += REGISTERS[kind]
     names = draw(st.permutations(list(registers)))
-    return {name: registers[name] for name in names}, {name: draw(raws(registers[name].type)) for name in names}
+    return {name: registers[name] for name in names}, {
+        name: draw(raws(registers[name].type)) for name in names
+    }
 
 
 @patient
@@ -85,7 +94,10 @@ def test_whatever_a_register_can_hold_comes_back_in_any_type_and_order(drawn):
 def test_a_value_is_where_its_register_is_and_nowhere_else(drawn, data):
     registers, values = drawn
     block, name = Block(registers), data.draw(st.sampled_from(list(registers)))
-    before, after = block.encode(values), block.encode({**values, name: data.draw(raws(registers[name].type))})
+    before, after = (
+        block.encode(values),
+        block.encode({**values, name: data.draw(raws(registers[name].type))}),
+    )
     first = registers[name].address - block.address
     changed = {place for place in range(block.count) if before[place] != after[place]}
     assert changed <= set(range(first, first + registers[name].registers))
@@ -113,7 +125,12 @@ def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset
     value = (low + share * (min(high, 2**40) - low)) * scale + offset
     block = Block({"x": Register(address=0, type=kind, scale=scale, offset=offset)})
     rounding = 4 * np.finfo(float).eps * (abs(value) + abs(offset))
-    assert_allclose(block.decode(block.encode({"x": value}))["x"], value, rtol=0, atol=0.500001 * abs(scale) + rounding)
+    assert_allclose(
+        block.decode(block.encode({"x": value}))["x"],
+        value,
+        rtol=0,
+        atol=0.500001 * abs(scale) + rounding,
+    )
 
 
 @patient
@@ -127,7 +144,9 @@ def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
     if abs(first - second) >= 2:
         assert SensorMap.model_validate({"read": told}).read.force_y.address == second
     else:
-        with pytest.raises(ValidationError, match=rf"register {max(first, second)} is part of force_x too"):
+        with pytest.raises(
+            ValidationError, match=rf"register {max(first, second)} is part of force_x too"
+        ):
             SensorMap.model_validate({"read": told})
 
 
@@ -140,12 +159,20 @@ def test_a_value_too_large_saturates_as_in_a_device():
 
 def test_units_become_si():
     block = Block(
-        {"time": Register(address=0, type="uint32", unit="us"), "f": Register(address=2, type="int16", unit="kN")}
+        {
+            "time": Register(address=0, type="uint32", unit="us"),
+            "f": Register(address=2, type="int16", unit="kN"),
+        }
     )
     assert block.decode([0x000F, 0x4240, 2]) == {"time": pytest.approx(1.0), "f": 2000.0}
 
 
 def test_an_unsigned_counter_begins_anew_after_its_span():
-    block = Block({"time": Register(address=0, type="uint32", unit="us"), "n": Register(address=2, type="int32")})
+    block = Block(
+        {
+            "time": Register(address=0, type="uint32", unit="us"),
+            "n": Register(address=2, type="int32"),
+        }
+    )
     assert block.span("time") == pytest.approx(2**32 * 1e-6)
     assert block.span("n") == 0.0

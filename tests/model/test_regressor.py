@@ -35,7 +35,10 @@ def test_the_drives_rows_are_the_same_with_and_without_those_of_the_cuffs(motion
 
 
 def test_cuffs_measure_what_the_wearer_exerts_and_no_torque_sensor_changes_it(motions):
-    terms = (Term(TorqueGain("hip"), np.array([1.2])), Term.of(PassiveJointTorque("knee"), (0.2, 0.1)))
+    terms = (
+        Term(TorqueGain("hip"), np.array([1.2])),
+        Term.of(PassiveJointTorque("knee"), (0.2, 0.1)),
+    )
     alone, worn = (model(*terms).regressor(motion, cuffs=True) for motion in motions)
     assert not alone[:, 2:].any()
     wearer = [4, 5, 6, 7]

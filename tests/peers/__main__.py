@@ -1,4 +1,5 @@
-"""``make peers``: the same recordings through exoid and other tools, and docs/peers.md from what came of it."""
+"""``make peers``: the same recordings through exoid and other tools, and docs/peers.md from what
+came of it."""
 
 import argparse
 import os
@@ -21,10 +22,15 @@ def main() -> None:
     asked.add_argument("page", type=Path, help="where the page goes")
     asked.add_argument("--legs", type=int, default=8, help="simulated legs with nothing hidden")
     asked.add_argument("--sprung", type=int, default=4, help="simulated legs with a hidden spring")
-    asked.add_argument("--resume", type=Path, help="folder that keeps results; those that are there are used again")
+    asked.add_argument(
+        "--resume", type=Path, help="folder that keeps results; those that are there are used again"
+    )
     told, data = asked.parse_args(), real_data_folder()
     # Spawned: numba's threads do not survive a fork.
-    with tempfile.TemporaryDirectory() as anew, ProcessPoolExecutor(2, get_context("spawn")) as pool:
+    with (
+        tempfile.TemporaryDirectory() as anew,
+        ProcessPoolExecutor(2, get_context("spawn")) as pool,
+    ):
         out = told.resume or Path(anew)
         plain = [pool.submit(compare.leg, k, False, out) for k in range(told.legs)]
         sprung = [pool.submit(compare.leg, k, True, out) for k in range(told.sprung)]

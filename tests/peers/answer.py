@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from tests.blind.excitation import baseline_columns
 
 NAMES = ("X1", "X2", "X3", "X4", "hip coulomb", "knee coulomb", "hip viscous", "knee viscous")
-"""Of the rigid leg and its friction, in the order of ``baseline_columns``: the model that every tool is given."""
+"""Of the rigid leg and its friction, in the order of ``baseline_columns``: the model that every
+tool is given."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""One leg or one real machine through every tool, and what came of it in numbers that a page can show."""
+"""One leg or one real machine through every tool, and what came of it in numbers that a page can
+show."""
 
 import json
 import tempfile
@@ -34,7 +35,8 @@ def leg(number: int, spring: bool, out: Path) -> dict[str, Any]:
 
 
 def double_pendulum(data: Path, out: Path) -> dict[str, Any]:
-    """Compare them on the double pendulum's Fourier run; no controller was logged for MuJoCo to follow."""
+    """Compare them on the double pendulum's Fourier run; no controller was logged for MuJoCo to
+    follow."""
     kept = out / "double-pendulum.json"
     if not kept.exists():
         with tempfile.TemporaryDirectory() as folder:
@@ -62,7 +64,9 @@ def _keep(path: Path, what: dict[str, Any]) -> None:
     part.rename(path)
 
 
-def _compared(files: Sequence[Path], answers: list[Answer], judged: Log, truth: NDArray | None) -> dict[str, Any]:
+def _compared(
+    files: Sequence[Path], answers: list[Answer], judged: Log, truth: NDArray | None
+) -> dict[str, Any]:
     ours, held_out = exoid_fit.identify(files)
     said = exoid_fit.diagnose(files)
     return {
@@ -74,10 +78,15 @@ def _compared(files: Sequence[Path], answers: list[Answer], judged: Log, truth: 
 
 
 def _errors(held_out: HeldOut, predicted: NDArray) -> dict[str, list[float]]:
-    return {"error": held_out.error(predicted).tolist(), "slow_error": held_out.slow_error(predicted).tolist()}
+    return {
+        "error": held_out.error(predicted).tolist(),
+        "slow_error": held_out.slow_error(predicted).tolist(),
+    }
 
 
-def _scored(answer: Answer, held_out: HeldOut, judged: Log, truth: NDArray | None) -> dict[str, Any]:
+def _scored(
+    answer: Answer, held_out: HeldOut, judged: Log, truth: NDArray | None
+) -> dict[str, Any]:
     motion = held_out.motion
     predicted = answer.torque(motion.q, motion.dq, motion.ddq, judged)
     found = {"seconds": answer.seconds, "says": list(answer.says)} | _errors(held_out, predicted)

@@ -21,7 +21,8 @@ from tests.real.relative_error import slow_error
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The validation run, on which every tool's torque (n, 2) N·m is held against the measured one."""
+    """The validation run, on which every tool's torque (n, 2) N·m is held against the measured
+    one."""
 
     motion: Motion
 
@@ -61,7 +62,9 @@ def identify(files: Sequence[Path]) -> tuple[Answer, HeldOut]:
     values = table["value"].to_numpy(float)
     half_width = (table["ci95_high"] - table["ci95_low"]).to_numpy(float) / 2.0
     says = (*found.unrealizable, *found.collinear, *found.angle_noise, *found.remarks)
-    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds, says), HeldOut(_judged(motions))
+    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds, says), HeldOut(
+        _judged(motions)
+    )
 
 
 def diagnose(files: Sequence[Path]) -> Diagnosed:

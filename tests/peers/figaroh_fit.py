@@ -1,8 +1,9 @@
-"""FIGAROH as its documentation recommends: a URDF, a configuration, a subclass that loads the data, ``solve``.
+"""FIGAROH as its documentation recommends: a URDF, a configuration, a subclass that loads the data,
+``solve``.
 
-Friction is on; weighted least squares and the relative rank tolerance are set as in its own example of an arm whose
-joints carry different torques; decimation by 10 is its default. It fits its own base parameters, which hold what
-exoid takes for zero: masses beside the links' axes.
+Friction is on; weighted least squares and the relative rank tolerance are set as in its own example
+of an arm whose joints carry different torques; decimation by 10 is its default. It fits its own
+base parameters, which hold what exoid takes for zero: masses beside the links' axes.
 """
 
 import contextlib
@@ -28,7 +29,8 @@ LINK = """<link name="{name}"><inertial><origin xyz="0 0 {along}"/><mass value="
 
 
 def identify(log: Log, held_out: Log, masses: NDArray) -> Answer:
-    """Fit a leg; ``masses`` (2,) kg are what its URDF says, and do not matter for base parameters."""
+    """Fit a leg; ``masses`` (2,) kg are what its URDF says, and do not matter for base
+    parameters."""
     begun = time.process_time()
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         fit = _fit(log, held_out, masses, Path(folder))
@@ -46,8 +48,12 @@ def identify(log: Log, held_out: Log, masses: NDArray) -> Answer:
 
 def _fit(log: Log, held_out: Log, masses: NDArray, folder: Path) -> BaseIdentification:
     urdf, config = folder / "leg.urdf", folder / "leg.yaml"
-    links = LINK.format(name="thigh", joint="hip", parent="world", at=0, along=-log.length / 2, mass=masses[0])
-    links += LINK.format(name="shank", joint="knee", parent="thigh", at=-log.length, along=-0.2, mass=masses[1])
+    links = LINK.format(
+        name="thigh", joint="hip", parent="world", at=0, along=-log.length / 2, mass=masses[0]
+    )
+    links += LINK.format(
+        name="shank", joint="knee", parent="thigh", at=-log.length, along=-0.2, mass=masses[1]
+    )
     urdf.write_text(f'<robot name="leg"><link name="world"/>{links}</robot>')
     config.write_text(yaml.safe_dump(_configuration(log.rate_hz)))
 
@@ -111,8 +117,15 @@ def _base_parameters(fit: BaseIdentification, log: Log) -> NDArray:
     q, dq, ddq = (fit.processed_data[key] for key in ("positions", "velocities", "accelerations"))
     columns = baseline_columns(q, dq, ddq, log.length, log.gravity)
     # A mass beside an axis is one on it, a quarter turn further on.
-    beside = [baseline_columns(q + turn, dq, ddq, log.length, log.gravity)[:, :, i] for i, turn in _QUARTERS]
-    ours = np.concatenate([columns, np.stack(beside, axis=2)], axis=2).transpose(1, 0, 2).reshape(-1, 10)
+    beside = [
+        baseline_columns(q + turn, dq, ddq, log.length, log.gravity)[:, :, i]
+        for i, turn in _QUARTERS
+    ]
+    ours = (
+        np.concatenate([columns, np.stack(beside, axis=2)], axis=2)
+        .transpose(1, 0, 2)
+        .reshape(-1, 10)
+    )
     kept = np.delete(fit.dynamic_regressor, fit._idx_eliminated, axis=1)[:, fit._base_indices]
     return np.linalg.lstsq(kept, ours, rcond=None)[0]
 

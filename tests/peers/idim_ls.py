@@ -1,8 +1,9 @@
-"""Plain identification by the inverse dynamic model and least squares, as textbooks have it; no code of exoid in it.
+"""Plain identification by the inverse dynamic model and least squares, as textbooks have it; no
+code of exoid in it.
 
-Khalil and Dombre (2002), Modeling, Identification and Control of Robots, chapter 12: angles through a zero-phase
-Butterworth filter and central differences, ordinary least squares on torque, and intervals from the variance of
-the residual as if every sample were news.
+Khalil and Dombre (2002), Modeling, Identification and Control of Robots, chapter 12: angles through
+a zero-phase Butterworth filter and central differences, ordinary least squares on torque, and
+intervals from the variance of the residual as if every sample were news.
 """
 
 import time
@@ -35,4 +36,6 @@ def identify(log: Log) -> Answer:
     values, squares, *_ = np.linalg.lstsq(A, b, rcond=None)
     variance = squares[0] / (len(b) - len(values))
     half_width = 1.96 * np.sqrt(variance * np.diag(np.linalg.inv(A.T @ A)))
-    return Answer("IDIM-LS", values, NAMES, values, half_width, np.asarray, time.process_time() - begun)
+    return Answer(
+        "IDIM-LS", values, NAMES, values, half_width, np.asarray, time.process_time() - begun
+    )

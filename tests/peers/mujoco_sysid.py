@@ -1,8 +1,9 @@
-"""MuJoCo's sysid toolbox, used as its tests and examples are: a model with position actuators, rolled out.
+"""MuJoCo's sysid toolbox, used as its tests and examples are: a model with position actuators,
+rolled out.
 
-The leg is simulated under its drives' gains and set-points, and angle, speed and actuator torque are compared with
-what was recorded. Free are the hip's armature, the shank's inertia, both centres of mass, and friction: as many
-as the torques can tell apart.
+The leg is simulated under its drives' gains and set-points, and angle, speed and actuator torque
+are compared with what was recorded. Free are the hip's armature, the shank's inertia, both centres
+of mass, and friction: as many as the torques can tell apart.
 """
 
 import contextlib
@@ -94,7 +95,9 @@ def identify(log: Log, given: Given) -> Answer:
     )  # fmt: skip
     residual = sysid.build_residual_fn(models_sequences=[sequences])
     with contextlib.redirect_stdout(io.StringIO()):
-        found, result = sysid.optimize(_parameters(), residual, optimizer="scipy", verbose=False, x_scale="jac")
+        found, result = sysid.optimize(
+            _parameters(), residual, optimizer="scipy", verbose=False, x_scale="jac"
+        )
     left, *_ = residual(found.as_vector(), found)
     _, half_width = sysid.calculate_intervals([r.ravel() for r in left], result.jac)
     insights = AutomatedInsights("Automated Insights", found).get_context()["insights"]

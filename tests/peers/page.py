@@ -13,8 +13,11 @@ TOOLS = ("IDIM-LS", "FIGAROH", "MuJoCo sysid", "exoid")
 INTRODUCTION = Path(__file__).with_name("introduction.md")
 
 
-def page(plain: Sequence[dict[str, Any]], sprung: Sequence[dict[str, Any]], real: dict[str, Any] | None) -> str:
-    """Return the page for simulated legs without and with a hidden spring, and for the double pendulum."""
+def page(
+    plain: Sequence[dict[str, Any]], sprung: Sequence[dict[str, Any]], real: dict[str, Any] | None
+) -> str:
+    """Return the page for simulated legs without and with a hidden spring, and for the double
+    pendulum."""
     introduction = INTRODUCTION.read_text(encoding="utf-8").format(
         figaroh=version("figaroh"), mujoco=version("mujoco"), duration_s=DURATION_S
     )
@@ -25,7 +28,15 @@ def page(plain: Sequence[dict[str, Any]], sprung: Sequence[dict[str, Any]], real
 
 
 def _without(legs: Sequence[dict[str, Any]]) -> str:
-    rows = [_row("tool", "true values in 95 % intervals", "median / worst parameter error", "held-out torque", "s")]
+    rows = [
+        _row(
+            "tool",
+            "true values in 95 % intervals",
+            "median / worst parameter error",
+            "held-out torque",
+            "s",
+        )
+    ]
     rows.append("|---|---|---|---|---|")
     for tool in TOOLS:
         found = [leg["tools"][tool] for leg in legs]
@@ -41,7 +52,9 @@ def _without(legs: Sequence[dict[str, Any]]) -> str:
             )
         )
     statuses = [leg["diagnosed"]["status"] for leg in legs]
-    told = ", ".join(f"`{status}` {statuses.count(status)} of {len(legs)}" for status in sorted(set(statuses)))
+    told = ", ".join(
+        f"`{status}` {statuses.count(status)} of {len(legs)}" for status in sorted(set(statuses))
+    )
     named = [f"{cause}" for leg in legs for cause in leg["diagnosed"]["causes"]]
     seconds = np.median([leg["diagnosed"]["seconds"] for leg in legs])
     return f"""## {len(legs)} legs with nothing hidden
@@ -54,7 +67,14 @@ Held-out torque: RMS error at hip / knee, N·m, of {_pooled([leg["torque_rms"] f
 
 
 def _with(legs: Sequence[dict[str, Any]]) -> str:
-    rows = [_row("tool", "held-out torque", "farthest parameter of each leg, half-widths off", "what it says")]
+    rows = [
+        _row(
+            "tool",
+            "held-out torque",
+            "farthest parameter of each leg, half-widths off",
+            "what it says",
+        )
+    ]
     rows.append("|---|---|---|---|")
     for tool in TOOLS:
         found = [leg["tools"][tool] for leg in legs]
@@ -74,7 +94,10 @@ The spring rests at {REST:g} rad. No tool is told of it.
 
 
 def _real(real: dict[str, Any]) -> str:
-    rows = [_row("tool", "held-out torque", "below 5 Hz", "s", "what it says"), "|---|---|---|---|---|"]
+    rows = [
+        _row("tool", "held-out torque", "below 5 Hz", "s", "what it says"),
+        "|---|---|---|---|---|",
+    ]
     said = real["diagnosed"]
     causes = f"`{said['status']}`: {', '.join(said['causes']) or 'no cause'}"
     diagnosed = {"`exoid diagnose`": said | {"says": [causes]}}

@@ -1,4 +1,5 @@
-"""Simulated legs: the plant of the blind examination, with a spring of known stiffness at the knee or without."""
+"""Simulated legs: the plant of the blind examination, with a spring of known stiffness at the knee
+or without."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,8 +75,13 @@ def logs_by_purpose(files: list[Path]) -> dict[str, Log]:
 
 
 def _log(table: Table) -> Log:
-    """Return a run on a uniform grid: a log with irregular instants is laid on its mean rate by straight lines."""
-    frame, geometry, controller = table.frame, table.metadata["geometry"], table.metadata.get("controller") or {}
+    """Return a run on a uniform grid: a log with irregular instants is laid on its mean rate by
+    straight lines."""
+    frame, geometry, controller = (
+        table.frame,
+        table.metadata["geometry"],
+        table.metadata.get("controller") or {},
+    )
     recorded = frame["time_s"].to_numpy()
     time = np.linspace(recorded[0], recorded[-1], len(recorded))
 
@@ -83,10 +89,16 @@ def _log(table: Table) -> Log:
         names = [f"{joint.name}_{quantity}" for joint in table.joints]
         if not set(names) <= set(frame):
             return None
-        return np.column_stack([np.interp(time, recorded, frame[name].to_numpy()) for name in names])
+        return np.column_stack(
+            [np.interp(time, recorded, frame[name].to_numpy()) for name in names]
+        )
 
     def gains(name: str) -> NDArray | None:
-        return np.array([controller[joint.name][name] for joint in table.joints]) if controller else None
+        return (
+            np.array([controller[joint.name][name] for joint in table.joints])
+            if controller
+            else None
+        )
 
     return Log(
         time=time, angle=pair("angle_rad"), torque=pair("torque_nm"), length=geometry["thigh_length_m"],

@@ -1,4 +1,5 @@
-"""``make real``: what docs/real-data.md says of other people's machines, measured on ../shared/data.
+"""``make real``: what docs/real-data.md says of other people's machines, measured on
+../shared/data.
 
 python -m tests.real docs/real-data.md --machines emps A0-fourier
 """
@@ -24,7 +25,9 @@ IMAGES = {"emps": "verdict", "A0-fourier": "dependence", "xl330": "verdict"}
 
 def written(page: str, name: str, measured: str) -> str:
     """Return the page with what was measured between the marks of that name."""
-    between = re.compile(f"(?<=<!-- measured: {re.escape(name)} -->\n).*?(?={re.escape(END)})", re.DOTALL)
+    between = re.compile(
+        f"(?<=<!-- measured: {re.escape(name)} -->\n).*?(?={re.escape(END)})", re.DOTALL
+    )
     return between.sub(lambda old: f"\n{measured}\n\n", page, count=1)
 
 
@@ -33,11 +36,19 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
     made = {"verdicts": tables.verdicts(found)} if set(found) == set(LOGS) else {}
     if "emps" in found:
         made |= {"emps": tables.emps(found), "emps-pulses": tables.flexibility(found["emps"])}
-    for mark, keys in {"A0": ("A0-fourier", "A0-swings"), "C1": ("C1-swings",), "C1-known": ("C1-known",)}.items():
+    for mark, keys in {
+        "A0": ("A0-fourier", "A0-swings"),
+        "C1": ("C1-swings",),
+        "C1-known": ("C1-known",),
+    }.items():
         if here := [found[key] for key in keys if key in found]:
-            made[mark] = tables.pendulum(here, data / "double_pendulum" / f"{mark[:2]}_published_parameters.yml")
+            made[mark] = tables.pendulum(
+                here, data / "double_pendulum" / f"{mark[:2]}_published_parameters.yml"
+            )
     if any(len(one.motions[0].joints) == 2 for one in found.values()):
-        made["timing"] = tables.timing({key: one for key, one in found.items() if not LOGS[key].known})
+        made["timing"] = tables.timing(
+            {key: one for key, one in found.items() if not LOGS[key].known}
+        )
     if "A0-swings" in found:
         published = data / "double_pendulum" / "A0_published_parameters.yml"
         made["A0-swings-zeros"] = tables.with_zeros(found["A0-swings"], published)
@@ -50,7 +61,10 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         if LOGS[key].known:
             made[f"{key}-known"] = tables.sizes(one, "known")
         made[f"{key}-sizes"] = tables.sizes(one, "causes")
-        made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
+        made |= {
+            f"{key}-depends": tables.depends(one),
+            f"{key}-says": f"> {one.verdict['summary']}",
+        }
     return made
 
 
@@ -63,13 +77,19 @@ def main() -> None:
     if not data.is_dir():
         parser.error(f"no real data in {data}; EXOID_REAL_DATA names their folder")
     with TemporaryDirectory() as folder:
-        found = {name: diagnosed(LOGS[name], data, Path(folder) / name, figures=True) for name in chosen.machines}
+        found = {
+            name: diagnosed(LOGS[name], data, Path(folder) / name, figures=True)
+            for name in chosen.machines
+        }
         text = chosen.page.read_text(encoding="utf-8")
         for name, table in measured(found, data).items():
             text = written(text, name, table)
         for name, figure in IMAGES.items():
             if name in found:
-                shutil.copy(found[name].folder / f"{figure}.png", chosen.page.parent / "images" / f"real-{name}.png")
+                shutil.copy(
+                    found[name].folder / f"{figure}.png",
+                    chosen.page.parent / "images" / f"real-{name}.png",
+                )
     chosen.page.write_text(text, encoding="utf-8")
 
 

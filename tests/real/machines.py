@@ -1,4 +1,5 @@
-"""The machines that other people recorded: from their logs to motions and verdicts, by the commands a user has."""
+"""The machines that other people recorded: from their logs to motions and verdicts, by the commands
+a user has."""
 
 import json
 from dataclasses import dataclass
@@ -53,10 +54,16 @@ class Logs:
 LOGS = {
     "emps": Logs("EMPS", "emps/*.mat", "emps.toml"),
     "A0-fourier": Logs(
-        "Double pendulum A0, Fourier run", "double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"
+        "Double pendulum A0, Fourier run",
+        "double_pendulum/A0_fourier_75s.csv",
+        "double_pendulum_fourier.toml",
     ),
-    "A0-swings": Logs("Double pendulum A0, swings", "double_pendulum/A0_swing_*.csv", "double_pendulum.toml"),
-    "C1-swings": Logs("Double pendulum C1, swings", "double_pendulum/C1_swing_*.csv", "double_pendulum_C1.toml"),
+    "A0-swings": Logs(
+        "Double pendulum A0, swings", "double_pendulum/A0_swing_*.csv", "double_pendulum.toml"
+    ),
+    "C1-swings": Logs(
+        "Double pendulum C1, swings", "double_pendulum/C1_swing_*.csv", "double_pendulum_C1.toml"
+    ),
     "C1-known": Logs(
         "Double pendulum C1, its rotor known",
         "double_pendulum/C1_swing_*.csv",
@@ -103,32 +110,44 @@ class Diagnosed:
     def model_of(self, motion: Motion) -> Model:
         """Return the extended model with what a run has for itself."""
         own = {
-            cause_label(cause): {name: value for name, value in one["values"].items() if value is not None}
+            cause_label(cause): {
+                name: value for name, value in one["values"].items() if value is not None
+            }
             for cause in self.verdict["causes"]
             for one in cause["each_run"]
             if one["file"] == motion.file
         }
-        return Model(tuple(_with_values(term, own.get(term.effect.label, {})) for term in self.model))
+        return Model(
+            tuple(_with_values(term, own.get(term.effect.label, {})) for term in self.model)
+        )
 
     def error_on(self, motion: Motion) -> TorqueError:
         """Return the extended model's error below 5 Hz on a run, reversals included.
 
-        Of a run that no fit has seen and that has a zero of its own, on the halves that the zero was not learnt on.
+        Of a run that no fit has seen and that has a zero of its own, on the halves that the zero
+        was not learnt on.
         """
         error = slow_error(self.model_of(motion).torque(motion), motion)
-        if motion.purpose == "train" or not any(cause["each_run"] for cause in self.verdict["causes"]):
+        if motion.purpose == "train" or not any(
+            cause["each_run"] for cause in self.verdict["causes"]
+        ):
             return error
         left = RESIDUALS.read(self.folder / "residuals.parquet").frame
         here = left[(left["file"] == motion.file) & (left["model"] == "extended")]
-        rms = np.array([np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints])
+        rms = np.array(
+            [np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints]
+        )
         return TorqueError(rms, error.percent * rms / error.rms)
 
     def identify(self, name: str, *asked: str) -> dict[str, Model]:
-        """Return what ``exoid identify`` finds, asked for something besides, of each run by its file.
+        """Return what ``exoid identify`` finds, asked for something besides, of each run by its
+        file.
 
         ``name`` is that of a folder for it.
         """
-        recorded = {motion.file: self.folder.parent / "recordings" / motion.file for motion in self.motions}
+        recorded = {
+            motion.file: self.folder.parent / "recordings" / motion.file for motion in self.motions
+        }
         out = self.folder.parent / name
         _exoid("identify", *map(str, recorded.values()), "-o", str(out), *asked)
         table = PARAMETERS.read(out / "parameters.parquet")
@@ -136,11 +155,15 @@ class Diagnosed:
         return {file: with_own_values(model, table, path)[0] for file, path in recorded.items()}
 
     def identified(self) -> dict[str, Model]:
-        """Return what is named as ``exoid identify`` fits it to every sample, those near reversals too."""
-        return self.identify("refitted", "--causes", str(self.folder / "parameters.parquet"), "--reversals")
+        """Return what is named as ``exoid identify`` fits it to every sample, those near reversals
+        too."""
+        return self.identify(
+            "refitted", "--causes", str(self.folder / "parameters.parquet"), "--reversals"
+        )
 
     def refitted(self, order: int = ORDER) -> dict[str, Model]:
-        """Return the extended model of each run, by its file, by least squares below 5 Hz on the runs to train on.
+        """Return the extended model of each run, by its file, by least squares below 5 Hz on the
+        runs to train on.
 
         What a run has for itself stays what the diagnosis found.
         """
@@ -149,17 +172,23 @@ class Diagnosed:
         free = [effect.label not in own for effect, _ in self.model.linear_parameters]
         trained = of_purpose(self.motions, "train")
         values = slow_values([of_runs[motion.file] for motion in trained], trained, free, order)
-        return {file: model.with_linear(np.where(free, values, model.linear_values)) for file, model in of_runs.items()}
+        return {
+            file: model.with_linear(np.where(free, values, model.linear_values))
+            for file, model in of_runs.items()
+        }
 
     def strayed(self, motion: Motion) -> NDArray:
-        """Return the rms angle error (J,) of 1 s simulations of the extended model under a run's torque."""
+        """Return the rms angle error (J,) of 1 s simulations of the extended model under a run's
+        torque."""
         return replay(self.model_of(motion), motion).rmse
 
 
 def _with_values(term: Term, values: dict[str, float]) -> Term:
     """Return a term with some of its parameters at other values, by the names that files use."""
     names = [p.name for p in term.effect.parameters]
-    return term_from(term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | values)
+    return term_from(
+        term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | values
+    )
 
 
 def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Diagnosed:
@@ -169,7 +198,9 @@ def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Di
     drawn = "--figures" if figures else "--no-figures"
     _exoid("diagnose", *map(str, recorded), *logs.told, "--out", str(out), drawn)
     told = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
-    return Diagnosed(motions(recorded), told, PARAMETERS.read(out / "parameters.parquet").frame, out)
+    return Diagnosed(
+        motions(recorded), told, PARAMETERS.read(out / "parameters.parquet").frame, out
+    )
 
 
 def _exoid(*arguments: str) -> None:
@@ -191,6 +222,9 @@ def with_rotor(motion: Motion) -> Model:
 
 
 def symmetric(d: Diagnosed) -> dict[str, Model]:
-    """Return rigid body, friction and each drive's offset as ``exoid identify`` fits them to every sample."""
-    offsets = [word for name in d.motions[0].joints for word in ("--effect", f"torque_offset@{name}")]
+    """Return rigid body, friction and each drive's offset as ``exoid identify`` fits them to every
+    sample."""
+    offsets = [
+        word for name in d.motions[0].joints for word in ("--effect", f"torque_offset@{name}")
+    ]
     return d.identify("symmetric", *offsets, "--reversals")

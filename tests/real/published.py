@@ -19,15 +19,18 @@ EMPS_ERRORS = {"symmetric": (4.09, 6.16), "asymmetric": (3.12, 5.6)}
 
 def double_pendulum(file: Path) -> dict[str, float]:
     """Return the parameters that the makers of the double pendulum give, by their names."""
-    lines = (line.split(":") for line in file.read_text(encoding="utf-8").splitlines() if ":" in line)
+    lines = (
+        line.split(":") for line in file.read_text(encoding="utf-8").splitlines() if ":" in line
+    )
     return {name.strip(): float(value) for name, value in lines}
 
 
 def their_torque(p: dict[str, float], motion: Motion) -> NDArray:
     """Return the torque (n, 2) N·m that the makers' model has along a motion.
 
-    Inertias I are about the joints' axes, r are the centres of mass. A rotor Ir behind a gear gr is carried by the
-    link before it and turns against it: Ir + gr² Ir at the first joint, gr² Ir at the second, -gr Ir between them.
+    Inertias I are about the joints' axes, r are the centres of mass. A rotor Ir behind a gear gr is
+    carried by the link before it and turns against it: Ir + gr² Ir at the first joint, gr² Ir at
+    the second, -gr Ir between them.
     """
     on, second = motion.machine, motion.joints[1]
     reflected = p["gr"] ** 2 * p["Ir"]

@@ -1,4 +1,5 @@
-"""100 |e| / |tau|, as the people who published these data count it, and the error in N·m beside it."""
+"""100 |e| / |tau|, as the people who published these data count it, and the error in N·m beside
+it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,9 +19,11 @@ SLOW_HZ = 5.0
 
 
 def decimated(x: NDArray, times: int = 10) -> NDArray:
-    """Put (n, ...) behind the authors' parallel filter: low-pass without delay, then every tenth sample.
+    """Put (n, ...) behind the authors' parallel filter: low-pass without delay, then every tenth
+    sample.
 
-    ``scipy.signal.decimate`` is MATLAB's ``decimate``: Chebyshev I of order 8 at 0.8 of the new Nyquist frequency.
+    ``scipy.signal.decimate`` is MATLAB's ``decimate``: Chebyshev I of order 8 at 0.8 of the new
+    Nyquist frequency.
     """
     return np.asarray(decimate(x, times, axis=0)[EDGE:-EDGE])
 
@@ -42,28 +45,36 @@ def torque_error(left: NDArray, torque: NDArray) -> TorqueError:
 
 
 def _slow(x: NDArray, motion: Motion, order: int) -> NDArray:
-    """Put (n, ...) behind a zero-phase low-pass of 5 Hz, on a uniform grid over the samples that are valid."""
+    """Put (n, ...) behind a zero-phase low-pass of 5 Hz, on a uniform grid over the samples that
+    are valid."""
     inside = np.flatnonzero(motion.valid)
     grid = np.arange(motion.time[0], motion.time[-1], 1.0 / motion.sample_rate_hz)
     kept = (grid >= motion.time[inside[0]]) & (grid <= motion.time[inside[-1]])
-    uniform = np.column_stack([np.interp(grid, motion.time, column) for column in x.reshape(len(x), -1).T])
+    uniform = np.column_stack(
+        [np.interp(grid, motion.time, column) for column in x.reshape(len(x), -1).T]
+    )
     return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ, order)[kept].reshape(-1, *x.shape[1:])
 
 
 def slow_error(predicted: NDArray, motion: Motion, order: int = ORDER) -> TorqueError:
     """Return the error below 5 Hz, reversals included, of a predicted torque (n, J)."""
-    return torque_error(_slow(motion.torque - predicted, motion, order), _slow(motion.torque, motion, order))
+    return torque_error(
+        _slow(motion.torque - predicted, motion, order), _slow(motion.torque, motion, order)
+    )
 
 
 def slow_fit(model: Model, motions: Sequence[Motion], order: int = ORDER) -> Model:
     """Return the model by ordinary least squares below 5 Hz, as the README of the data fits it."""
-    return model.with_linear(slow_values([model] * len(motions), motions, [True] * len(model.linear_parameters), order))
+    return model.with_linear(
+        slow_values([model] * len(motions), motions, [True] * len(model.linear_parameters), order)
+    )
 
 
 def slow_values(
     models: Sequence[Model], motions: Sequence[Motion], free: Sequence[bool], order: int = ORDER
 ) -> NDArray:
-    """Return the linear values (p,) of models, one for each motion, by ordinary least squares below 5 Hz.
+    """Return the linear values (p,) of models, one for each motion, by ordinary least squares below
+    5 Hz.
 
     Those that are not ``free`` stay what they are in each run.
     """
@@ -72,7 +83,9 @@ def slow_values(
     for model, motion in zip(models, motions, strict=True):
         columns, values = model.regressor(motion), model.linear_values
         parts.append(_slow(columns[:, :, chosen], motion, order))
-        rights.append(_slow(motion.torque - columns[:, :, ~chosen] @ values[~chosen], motion, order))
+        rights.append(
+            _slow(motion.torque - columns[:, :, ~chosen] @ values[~chosen], motion, order)
+        )
     A, b = np.concatenate(parts), np.concatenate(rights)
     values = models[0].linear_values.copy()
     values[chosen] = np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0]
@@ -87,7 +100,8 @@ def fitted(model: Model, motion: Motion) -> Model:
 
 
 def error_by_place(model: Model, motion: Motion) -> tuple[float, float]:
-    """Return the first joint's error, rms in N·m or N, behind that filter: near its reversals, and away from them.
+    """Return the first joint's error, rms in N·m or N, behind that filter: near its reversals, and
+    away from them.
 
     Near is what no fit of ``exoid diagnose`` takes.
     """

@@ -12,10 +12,18 @@ from pipelines.mechanics.motion import Motion
 from pipelines.wording.label import cause_label, effect_told
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
-from tests.real.relative_error import TorqueError, decimated_error, error_by_place, fitted, slow_error, slow_fit
+from tests.real.relative_error import (
+    TorqueError,
+    decimated_error,
+    error_by_place,
+    fitted,
+    slow_error,
+    slow_fit,
+)
 
 SHIFTS_S = np.linspace(-0.012, 0.012, 13)
-"""By which a prediction is moved along the stamps; positive where the angles are older than their stamps."""
+"""By which a prediction is moved along the stamps; positive where the angles are older than their
+stamps."""
 
 RUNS = ("without pulses", "with pulses")
 
@@ -28,7 +36,13 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def verdicts(found: Mapping[str, Diagnosed]) -> str:
     """Return what the diagnosis says of each machine."""
-    headings = ("machine", "verdict", "named (probability)", "torque error, rigid + friction", "with the causes")
+    headings = (
+        "machine",
+        "verdict",
+        "named (probability)",
+        "torque error, rigid + friction",
+        "with the causes",
+    )
     return table(headings, (_verdict(LOGS[name].title, d) for name, d in found.items()))
 
 
@@ -40,7 +54,13 @@ def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
     def errors(key: str) -> str:
         return ", ".join(f"{told[key][joint]:.3g} {unit}" for joint, unit in units.items())
 
-    return title, told["status"], "; ".join(causes) or "–", errors("baseline_rmse_nm"), errors("extended_rmse_nm")
+    return (
+        title,
+        told["status"],
+        "; ".join(causes) or "–",
+        errors("baseline_rmse_nm"),
+        errors("extended_rmse_nm"),
+    )
 
 
 def _label(cause: Mapping[str, Any]) -> str:
@@ -54,9 +74,16 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     d = found["emps"]
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     plain, named = symmetric(d)[train.file], d.identified()[train.file]
-    values = dict(zip((p.symbol for _, p in plain.linear_parameters), plain.linear_values, strict=True))
+    values = dict(
+        zip((p.symbol for _, p in plain.linear_parameters), plain.linear_values, strict=True)
+    )
     rows = [
-        (symbol, f"{theirs:.4f}", f"{values[symbol]:.4f}", f"{100 * (values[symbol] / theirs - 1):+.2f} %")
+        (
+            symbol,
+            f"{theirs:.4f}",
+            f"{values[symbol]:.4f}",
+            f"{100 * (values[symbol] / theirs - 1):+.2f} %",
+        )
         for symbol, theirs in EMPS.items()
     ]
     said = [
@@ -67,7 +94,10 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
         ("the same, refitted behind this filter", fitted(d.model, train), "asymmetric"),
     ]
     where = [
-        (title, *(f"{error:.2f}" for run in (train, pulses) for error in error_by_place(model, run)))
+        (
+            title,
+            *(f"{error:.2f}" for run in (train, pulses) for error in error_by_place(model, run)),
+        )
         for title, model, _ in said
     ]
     errors = [
@@ -81,14 +111,24 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     return "\n\n".join(
         [
             table(("parameter", "published", "found", "difference"), rows),
-            table(("model", "relative error (asked for)", "cross-validation, pulses (asked for)"), errors),
-            table(("error, N rms", *(f"{run}, {at}" for run in RUNS for at in ("at reversals", "away"))), where),
+            table(
+                ("model", "relative error (asked for)", "cross-validation, pulses (asked for)"),
+                errors,
+            ),
+            table(
+                (
+                    "error, N rms",
+                    *(f"{run}, {at}" for run in RUNS for at in ("at reversals", "away")),
+                ),
+                where,
+            ),
         ]
     )
 
 
 def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
-    """Return the torque error of every run of a double pendulum, beside that of its makers' parameters."""
+    """Return the torque error of every run of a double pendulum, beside that of its makers'
+    parameters."""
     theirs = double_pendulum(published)
     rows = []
     for d in found:
@@ -96,7 +136,10 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
         plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.identified()
         for motion in d.motions:
             made = [
-                *(slow_error(torque, motion) for torque in (their_torque(theirs, motion), plain.torque(motion))),
+                *(
+                    slow_error(torque, motion)
+                    for torque in (their_torque(theirs, motion), plain.torque(motion))
+                ),
                 d.error_on(motion),
                 slow_error(refitted[motion.file].torque(motion), motion),
             ]
@@ -110,7 +153,12 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
 def sizes(d: Diagnosed, of: str) -> str:
     """Return how large the ``known`` effects, or the named ``causes``, were found to be."""
     rows = [
-        (cause_label(one), p["name"], _sized(p, ".3g"), " … ".join(f"{end:.3g}" for end in p["ci95"]))
+        (
+            cause_label(one),
+            p["name"],
+            _sized(p, ".3g"),
+            " … ".join(f"{end:.3g}" for end in p["ci95"]),
+        )
         for one in d.verdict[of]
         for p in one["parameters"]
     ]
@@ -122,22 +170,35 @@ def _sized(parameter: Mapping[str, Any], digits: str) -> str:
 
 
 def by_order(d: Diagnosed) -> str:
-    """Return the error on the held-out run for each steepness that the low-pass of 5 Hz may have."""
+    """Return the error on the held-out run for each steepness that the low-pass of 5 Hz may
+    have."""
     trained, (held_out,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for order in (1, 2, 3, 4):
         plain = slow_fit(with_rotor(trained[0]), trained, order)
-        errors = [slow_error(plain.torque(motion), motion, order).percent for motion in (*trained, held_out)]
+        errors = [
+            slow_error(plain.torque(motion), motion, order).percent
+            for motion in (*trained, held_out)
+        ]
         for model in (d.model_of(held_out), d.refitted(order)[held_out.file]):
             errors.append(slow_error(model.torque(held_out), held_out, order).percent)
         rows.append((str(order), *(" / ".join(f"{e:.1f}" for e in error) for error in errors)))
-    headings = ("order of the filter", "least squares, 70 %, %", "least squares, %", "extended, %", "refitted, %")
+    headings = (
+        "order of the filter",
+        "least squares, 70 %, %",
+        "least squares, %",
+        "extended, %",
+        "refitted, %",
+    )
     return table(headings, rows)
 
 
 def turning(d: Diagnosed) -> str:
     """Return what the verdict says of friction at reversals."""
-    return "\n>\n".join(f"> But {caveat}." for caveat in d.verdict["caveats"] if "reversals" in caveat) or "> Nothing."
+    return (
+        "\n>\n".join(f"> But {caveat}." for caveat in d.verdict["caveats"] if "reversals" in caveat)
+        or "> Nothing."
+    )
 
 
 def _both(error: TorqueError) -> tuple[str, str]:
@@ -161,32 +222,51 @@ def of_each_run(d: Diagnosed) -> str:
 
 
 def with_zeros(d: Diagnosed, file: Path) -> str:
-    """Return the makers' error on each run without and with the zeros that the diagnosis found, beside its own."""
+    """Return the makers' error on each run without and with the zeros that the diagnosis found,
+    beside its own."""
     theirs, rows = double_pendulum(file), []
     for motion in d.motions:
         model = d.model_of(motion)
         zeroed = replace(model.sensed(motion), torque=model.delivered(motion))
         errors = [slow_error(their_torque(theirs, moved), moved) for moved in (motion, zeroed)]
-        rows.append((motion.file.removesuffix(".parquet"), *(_both(e)[0] for e in (*errors, d.error_on(motion)))))
-    return table(("run", "published, N·m", "published, with these zeros, N·m", "extended, N·m"), rows)
+        rows.append(
+            (
+                motion.file.removesuffix(".parquet"),
+                *(_both(e)[0] for e in (*errors, d.error_on(motion))),
+            )
+        )
+    return table(
+        ("run", "published, N·m", "published, with these zeros, N·m", "extended, N·m"), rows
+    )
 
 
 def timing(found: Mapping[str, Diagnosed]) -> str:
-    """Return at which shift of the predicted torque each run's error is least, and how much less than as stamped."""
+    """Return at which shift of the predicted torque each run's error is least, and how much less
+    than as stamped."""
     rows = []
     for d in found.values():
         for motion in d.motions if len(d.motions[0].joints) == 2 else []:
             predicted = d.model_of(motion).torque(motion)
-            errors = np.array([slow_error(_shifted(predicted, motion, s), motion).rms for s in SHIFTS_S])
+            errors = np.array(
+                [slow_error(_shifted(predicted, motion, s), motion).rms for s in SHIFTS_S]
+            )
             best = errors.argmin(axis=0)
             gain = 1.0 - errors.min(axis=0) / errors[len(SHIFTS_S) // 2]
             told = " / ".join(f"{1e3 * SHIFTS_S[b]:+.0f} ms" for b in best)
-            rows.append((motion.file.removesuffix(".parquet"), told, " / ".join(f"{100 * g:.1f} %" for g in gain)))
+            rows.append(
+                (
+                    motion.file.removesuffix(".parquet"),
+                    told,
+                    " / ".join(f"{100 * g:.1f} %" for g in gain),
+                )
+            )
     return table(("run", "least error at a shift of", "which is less by"), rows)
 
 
 def _shifted(torque: NDArray, motion: Motion, by_s: float) -> NDArray:
-    return np.column_stack([np.interp(motion.time + by_s, motion.time, column) for column in torque.T])
+    return np.column_stack(
+        [np.interp(motion.time + by_s, motion.time, column) for column in torque.T]
+    )
 
 
 def depends(d: Diagnosed, most: int = 4) -> str:
@@ -194,19 +274,34 @@ def depends(d: Diagnosed, most: int = 4) -> str:
     rows = []
     for joint, variables in d.verdict["depends_on"].items():
         left = sorted(variables, key=lambda one: -one["share_after"])[:most]
-        rows += [(joint, v["variable"], f"{v['share_before']:.2f}", f"{v['share_after']:.2f}") for v in left]
+        rows += [
+            (joint, v["variable"], f"{v['share_before']:.2f}", f"{v['share_after']:.2f}")
+            for v in left
+        ]
     return table(("joint", "variable", "share foretold before", "share foretold after"), rows)
 
 
 def flexibility(d: Diagnosed) -> str:
-    """Return where on the pulses run the force error is in frequency, and how large the acceleration's is."""
+    """Return where on the pulses run the force error is in frequency, and how large the
+    acceleration's is."""
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for title, motion in zip(RUNS, (train, pulses), strict=True):
         left = (motion.torque - d.model.torque(motion))[motion.valid, 0]
-        mass = dict(zip((p.symbol for _, p in d.model.linear_parameters), d.model.linear_values, strict=True))["X1"]
+        mass = dict(
+            zip(
+                (p.symbol for _, p in d.model.linear_parameters), d.model.linear_values, strict=True
+            )
+        )["X1"]
         acceleration = motion.ddq[motion.valid, 0]
         share = 100.0 * np.linalg.norm(left) / mass / np.linalg.norm(acceleration)
         replayed = d.strayed(motion)
-        rows.append((title, f"{np.sqrt(np.mean(left**2)):.2f} N", f"{share:.1f} %", f"{1e3 * replayed[0]:.2f} mm"))
+        rows.append(
+            (
+                title,
+                f"{np.sqrt(np.mean(left**2)):.2f} N",
+                f"{share:.1f} %",
+                f"{1e3 * replayed[0]:.2f} mm",
+            )
+        )
     return table(("run", "force error at full rate", "acceleration error", "1 s simulation"), rows)

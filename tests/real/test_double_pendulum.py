@@ -1,4 +1,5 @@
-"""A double pendulum whose makers published its parameters: joint torques are foretold better than by these."""
+"""A double pendulum whose makers published its parameters: joint torques are foretold better than
+by these."""
 
 import numpy as np
 import pytest
@@ -25,7 +26,8 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
     for motion in fourier.motions:
         published = slow_error(their_torque(theirs, motion), motion)
         ours, by_identify = (
-            slow_error(model.torque(motion), motion).rms for model in (fourier.model_of(motion), refitted[motion.file])
+            slow_error(model.torque(motion), motion).rms
+            for model in (fourier.model_of(motion), refitted[motion.file])
         )
         assert (ours < published.rms).all(), motion.file
         assert (by_identify < published.rms).all(), motion.file
@@ -39,25 +41,36 @@ def test_identify_refits_what_is_named_as_least_squares_by_other_code_do(fourier
     refitted, otherwise = fourier.identified(), fourier.refitted()
     for motion in fourier.motions:
         by_identify, again = (
-            slow_error(model.torque(motion), motion).rms for model in (refitted[motion.file], otherwise[motion.file])
+            slow_error(model.torque(motion), motion).rms
+            for model in (refitted[motion.file], otherwise[motion.file])
         )
-        # Where the form is not exact, other weights of the joints trade one joint's error for the other's.
-        assert np.linalg.norm(by_identify) == pytest.approx(np.linalg.norm(again), rel=0.02), motion.file
+        # Where the form is not exact, other weights of the joints trade one joint's error for the
+        # other's.
+        assert np.linalg.norm(by_identify) == pytest.approx(np.linalg.norm(again), rel=0.02), (
+            motion.file
+        )
 
 
 def test_friction_that_goes_with_the_load_is_named_at_both_joints(fourier):
-    assert {("load_dependent_friction", joint) for joint in ("shoulder", "elbow")} <= set(fourier.causes)
+    assert {("load_dependent_friction", joint) for joint in ("shoulder", "elbow")} <= set(
+        fourier.causes
+    )
 
 
-def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foretells_what_no_fit_has_seen(fourier):
+def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foretells_what_no_fit_has_seen(
+    fourier,
+):
     assert fourier.causes[0] == ("load_dependent_friction", "shoulder")
     assert not any(
-        fault["channel"] == "time_s" for fault in fourier.verdict["data_faults"] if "rebuild" in fault["what"]
+        fault["channel"] == "time_s"
+        for fault in fourier.verdict["data_faults"]
+        if "rebuild" in fault["what"]
     )
     (seen_by_none,) = of_purpose(fourier.motions, "validate")
     plain = slow_fit(with_rotor(seen_by_none), of_purpose(fourier.motions, "train"))
     ours, theirs = (
-        slow_error(model.torque(seen_by_none), seen_by_none) for model in (fourier.model_of(seen_by_none), plain)
+        slow_error(model.torque(seen_by_none), seen_by_none)
+        for model in (fourier.model_of(seen_by_none), plain)
     )
     assert (ours.percent < (6.0, 13.2)).all()
     assert (ours.rms < theirs.rms).all()
@@ -67,7 +80,8 @@ def test_at_reversals_friction_builds_up_over_a_travel_of_some_counts_of_the_enc
     count = 0.000381
     told, *others = fourier.verdict["reversals"]
     assert told["joint"] == "shoulder"
-    # The elbow's is hardly three counts: to turn round at once by the angle as it is read does nearly as well.
+    # The elbow's is hardly three counts: to turn round at once by the angle as it is read does
+    # nearly as well.
     assert all(one["joint"] == "elbow" and one["travel"] < 3.0 * count for one in others)
     assert 2.0 * count < told["travel"] < 10.0 * count
     assert told["over_travel_rmse_nm"] ** 2 < 0.8 * told["otherwise_rmse_nm"] ** 2
@@ -75,13 +89,17 @@ def test_at_reversals_friction_builds_up_over_a_travel_of_some_counts_of_the_enc
 
 
 def errors(found, theirs):
-    """Return the errors (R, J) N·m of the extended model and of the published parameters on every run."""
+    """Return the errors (R, J) N·m of the extended model and of the published parameters on every
+    run."""
     ours = [found.error_on(motion).rms for motion in found.motions]
-    return np.array(ours), np.array([slow_error(their_torque(theirs, m), m).rms for m in found.motions])
+    return np.array(ours), np.array(
+        [slow_error(their_torque(theirs, m), m).rms for m in found.motions]
+    )
 
 
 def assert_noise_of_the_angles_passes_for_nothing(found):
-    """Inertia and gravity nearly cancel in a free swing: noise must pass for no cause, travel or wrong sign."""
+    """Inertia and gravity nearly cancel in a free swing: noise must pass for no cause, travel or
+    wrong sign."""
     assert found.verdict["reversals"] == []
     assert not any("reversed" in fault["what"] for fault in found.verdict["data_faults"])
     assert any("no torque goes with" in caveat for caveat in found.verdict["caveats"])
@@ -117,12 +135,16 @@ def test_half_a_swing_foretells_the_shoulder_better_than_its_makers_and_names_th
     swings = diagnosed(LOGS["C1-swings"], real_data, tmp_path_factory.mktemp("C1"))
     assert set(swings.causes) <= {("rotor_inertia", "elbow")}
     assert_noise_of_the_angles_passes_for_nothing(swings)
-    ours, published = errors(swings, double_pendulum(real_data / "double_pendulum" / "C1_published_parameters.yml"))
+    ours, published = errors(
+        swings, double_pendulum(real_data / "double_pendulum" / "C1_published_parameters.yml")
+    )
     assert (ours[:, 0] < published[:, 0]).all()
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="friction by the angle is named at the elbow, whose gears have play")
+@pytest.mark.xfail(
+    strict=True, reason="friction by the angle is named at the elbow, whose gears have play"
+)
 def test_with_the_rotor_that_its_makers_know_half_a_swing_foretells_every_run_better_than_they_do(
     real_data, tmp_path_factory
 ):

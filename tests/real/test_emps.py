@@ -28,21 +28,30 @@ def _errors(model, runs):
 
 @pytest.mark.parametrize("fit", ["command", "benchmark"])
 def test_the_symmetric_model_is_the_published_one(diagnosis, fit):
-    """All four parameters within 1 %, errors no larger than the authors': by exoid's blocks and their filter."""
+    """All four parameters within 1 %, errors no larger than the authors': by exoid's blocks and
+    their filter."""
     runs = diagnosis.motions
     (train,) = of_purpose(runs, "train")
     found = symmetric(diagnosis)[train.file]
     found = found if fit == "command" else fitted(found, train)
-    values = dict(zip((p.symbol for _, p in found.linear_parameters), found.linear_values, strict=True))
+    values = dict(
+        zip((p.symbol for _, p in found.linear_parameters), found.linear_values, strict=True)
+    )
     assert values == pytest.approx(EMPS, rel=0.01)
-    assert all(e <= asked for e, asked in zip(_errors(found, runs), EMPS_ERRORS["symmetric"], strict=True))
+    assert all(
+        e <= asked for e, asked in zip(_errors(found, runs), EMPS_ERRORS["symmetric"], strict=True)
+    )
 
 
 @pytest.mark.parametrize("fit", ["command", "benchmark"])
-def test_diagnose_names_the_worn_screw_and_what_it_names_reaches_the_published_error(diagnosis, fit):
+def test_diagnose_names_the_worn_screw_and_what_it_names_reaches_the_published_error(
+    diagnosis, fit
+):
     assert ("viscous_asymmetry", "axis") in diagnosis.causes
     (train,) = of_purpose(diagnosis.motions, "train")
-    found = diagnosis.identified()[train.file] if fit == "command" else fitted(diagnosis.model, train)
+    found = (
+        diagnosis.identified()[train.file] if fit == "command" else fitted(diagnosis.model, train)
+    )
     relative, crossed = _errors(found, diagnosis.motions)
     assert relative <= EMPS_ERRORS["asymmetric"][0]
     assert crossed <= EMPS_ERRORS["asymmetric"][1]

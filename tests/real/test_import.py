@@ -1,4 +1,5 @@
-"""The logs that other people made import with the maps that exoid brings, and say what is wrong with them."""
+"""The logs that other people made import with the maps that exoid brings, and say what is wrong
+with them."""
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,9 @@ from pipelines.settings.datasets import datasets
 def imported(real_data, tmp_path, capsys):
     def call(pattern: str, map_name: str):
         files = sorted(str(file) for file in real_data.glob(pattern))
-        code = run(["import", *files, "--map", str(datasets() / "maps" / map_name), "-o", str(tmp_path)])
+        code = run(
+            ["import", *files, "--map", str(datasets() / "maps" / map_name), "-o", str(tmp_path)]
+        )
         captured = capsys.readouterr()
         assert (code, captured.err) == (0, "")
         tables = {path.stem: RECORDING.read(path) for path in sorted(tmp_path.glob("*.parquet"))}
@@ -56,7 +59,9 @@ def test_currents_of_the_xl330_get_their_sign_back(imported):
     assert len(tables) == 16
     assert "a signed register of 16 bits logged without its sign" in told
     # 1.5 A is what the servo's data sheet has it stall at.
-    assert max(np.abs(table.frame["pivot_torque_nm"]).max() for table in tables.values()) < 0.59 * 1.6
+    assert (
+        max(np.abs(table.frame["pivot_torque_nm"]).max() for table in tables.values()) < 0.59 * 1.6
+    )
     warm = [table.frame["pivot_temperature_c"].max() for table in tables.values()]
     assert max(warm) >= 40.0
 
@@ -81,7 +86,9 @@ def test_what_is_wrong_with_the_logs_of_modexo_is_told(imported):
         ),
     ],
 )
-def test_a_guess_of_a_real_log_says_what_its_map_says(real_data, tmp_path, capsys, pattern, map_name, joints):
+def test_a_guess_of_a_real_log_says_what_its_map_says(
+    real_data, tmp_path, capsys, pattern, map_name, joints
+):
     files = sorted(str(file) for file in real_data.glob(pattern))
     guess = tmp_path / "guess.toml"
     assert run(["import", *files, "--guess", "--map", str(guess)]) == 0
@@ -90,7 +97,9 @@ def test_a_guess_of_a_real_log_says_what_its_map_says(real_data, tmp_path, capsy
     capsys.readouterr()
     # Where a log is to be cut it does not say: all of it is compared.
     known, guessed = (
-        pd.concat([RECORDING.read(path).frame for path in sorted((tmp_path / folder).glob("*.parquet"))])
+        pd.concat(
+            [RECORDING.read(path).frame for path in sorted((tmp_path / folder).glob("*.parquet"))]
+        )
         for folder in ("known", "guessed")
     )
     guessed.columns = [_renamed(name, joints) for name in guessed.columns]
@@ -111,5 +120,7 @@ def test_a_guess_of_the_xl330_asks_for_its_torque_constant(real_data, tmp_path, 
     text = (tmp_path / "guess.toml").read_text(encoding="utf-8")
     assert "make 2^12 of a turn in rad" in text  # the servo's encoder has 4096 steps
     assert "signed_bits = 16" in text
-    (tmp_path / "guess.toml").write_text(text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.59 #"))
+    (tmp_path / "guess.toml").write_text(
+        text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.59 #")
+    )
     assert run(["import", file, "--map", str(tmp_path / "guess.toml"), "-o", str(tmp_path)]) == 0

@@ -9,7 +9,9 @@ from pipelines.report.report import report
 from pipelines.report.session import find
 from tests.report.sessions import write_session
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +26,8 @@ def page_file(session_folder, tmp_path_factory):
     return path
 
 
-# Not for the whole session: while it is there, an event loop runs in this thread, and nobody else's would start.
+# Not for the whole session: while it is there, an event loop runs in this thread, and nobody else's
+# would start.
 @pytest.fixture(scope="module")
 def chromium():
     if CHROMIUM is None:
@@ -43,11 +46,16 @@ def opened(chromium):
 
     @contextmanager
     def open_(path, width=1280, height=900, **options):
-        context = chromium.new_context(viewport={"width": width, "height": height}, offline=True, **options)
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, offline=True, **options
+        )
         page, complaints = context.new_page(), []
         page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("dialog", lambda dialog: complaints.append(f"dialog: {dialog.message}") or dialog.dismiss())
+        page.on(
+            "dialog",
+            lambda dialog: complaints.append(f"dialog: {dialog.message}") or dialog.dismiss(),
+        )
         try:
             page.goto(path.as_uri())
             yield page

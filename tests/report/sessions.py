@@ -1,4 +1,5 @@
-"""Sessions as stages would write them, small and quick: the numbers are made up, but every file keeps its contract."""
+"""Sessions as stages would write them, small and quick: the numbers are made up, but every file
+keeps its contract."""
 
 import json
 
@@ -32,7 +33,12 @@ def motion_of(joints, time):
     for j, joint in enumerate(joints):
         angle = 0.4 * np.sin(2 * time + j) - 0.3 * j
         torque = 12 * np.sin(2 * time + j + 0.4)
-        states[joint.name] = (angle, 0.8 * np.cos(2 * time + j), -1.6 * np.sin(2 * time + j), torque)
+        states[joint.name] = (
+            angle,
+            0.8 * np.cos(2 * time + j),
+            -1.6 * np.sin(2 * time + j),
+            torque,
+        )
     return states
 
 
@@ -43,7 +49,12 @@ def write_recording(folder, joints=LEG, seconds=20.0, rate_hz=200.0, name=RUN, *
         angle, _, _, torque = motion_of(joints, time)[joint.name]
         columns |= {joint.column("angle"): angle, joint.column("torque"): torque}
     told = (
-        {"run": "with_human", "purpose": "validate", "sample_rate_hz": rate_hz, "joints": named(joints)}
+        {
+            "run": "with_human",
+            "purpose": "validate",
+            "sample_rate_hz": rate_hz,
+            "joints": named(joints),
+        }
         | describe()
         | metadata
     )
@@ -52,15 +63,25 @@ def write_recording(folder, joints=LEG, seconds=20.0, rate_hz=200.0, name=RUN, *
 
 
 def write_parameters(folder, joints=LEG, extended=False, shift=0.0, inputs=()):
-    rows = [("rigid_body", f"X{i + 1}", None, "with_human", 2.0 + i + shift, "kg·m²") for i in range(2)]
-    rows += [("friction", "coulomb", joint.name, None, 5.0 + shift, joint.unit("torque")) for joint in joints]
+    rows = [
+        ("rigid_body", f"X{i + 1}", None, "with_human", 2.0 + i + shift, "kg·m²") for i in range(2)
+    ]
+    rows += [
+        ("friction", "coulomb", joint.name, None, 5.0 + shift, joint.unit("torque"))
+        for joint in joints
+    ]
     if extended:
-        rows.append(("cogging", "amplitude", joints[-1].name, None, 1.5 + shift, joints[-1].unit("torque")))
+        rows.append(
+            ("cogging", "amplitude", joints[-1].name, None, 1.5 + shift, joints[-1].unit("torque"))
+        )
     frame = pd.DataFrame(rows, columns=["effect", "name", "joint", "run", "value", "unit"])
     frame["symbol"], frame["std_error"] = frame["name"], 0.01
     frame["ci95_low"], frame["ci95_high"] = frame["value"] - 0.025, frame["value"] + 0.025
     frame["step"] = "inertia"
-    about = {"joints": named(joints), "covariance": (1e-4 * np.eye(len(frame))).tolist()} | describe(inputs)
+    about = {
+        "joints": named(joints),
+        "covariance": (1e-4 * np.eye(len(frame))).tolist(),
+    } | describe(inputs)
     path = folder / ("diagnosed" if extended else "identified") / "parameters.parquet"
     PARAMETERS.write(path, frame, about)
     return path
@@ -79,7 +100,9 @@ def write_residuals(folder, joints=LEG, seconds=20.0, inputs=()):
             residual = left * np.sin(20 * angle) + 0.2 * rng.standard_normal(len(time))
             values = (angle, speed, acceleration, torque, torque - residual, residual)
             quantities = ("angle", "velocity", "acceleration", "torque", "predicted", "residual")
-            columns |= {joint.column(name): value for name, value in zip(quantities, values, strict=True)}
+            columns |= {
+                joint.column(name): value for name, value in zip(quantities, values, strict=True)
+            }
         parts.append(pd.DataFrame(columns))
     RESIDUALS.write(
         folder / "diagnosed" / "residuals.parquet", pd.concat(parts, ignore_index=True),
@@ -89,7 +112,13 @@ def write_residuals(folder, joints=LEG, seconds=20.0, inputs=()):
 
 def write_candidates(folder, joints=LEG, reason="nothing smaller explains as much"):
     rows = [
-        (1, ["cogging@" + joints[-1].name], [{"name": "amplitude", "value": 1.5, "unit": "N·m"}], "named", reason),
+        (
+            1,
+            ["cogging@" + joints[-1].name],
+            [{"name": "amplitude", "value": 1.5, "unit": "N·m"}],
+            "named",
+            reason,
+        ),
         (2, ["parallel_spring@" + joints[-1].name], [], "rejected", "adds too little"),
     ]
     frame = pd.DataFrame(rows, columns=["rank", "causes", "parameters", "verdict", "reason"])
@@ -97,7 +126,9 @@ def write_candidates(folder, joints=LEG, reason="nothing smaller explains as muc
         frame[joint.column("rmse_before")], frame[joint.column("rmse_after")] = 0.72, 0.31
     frame["train_score"], frame["probability"] = 100.0, 0.9
     frame["gain_nm"], frame["gain_low_nm"], frame["gain_high_nm"] = 0.41, 0.37, 0.45
-    CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", frame, {"joints": named(joints)} | describe())
+    CANDIDATES.write(
+        folder / "diagnosed" / "candidates.parquet", frame, {"joints": named(joints)} | describe()
+    )
 
 
 def verdict_of(joints=LEG, **changes):
@@ -146,7 +177,8 @@ def verdict_of(joints=LEG, **changes):
 
 
 def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
-    """What a verdict of the decision says besides: cogging at the last joint, and what is tied with it."""
+    """What a verdict of the decision says besides: cogging at the last joint, and what is tied with
+    it."""
     last = joints[-1].name
     effects = ("cogging", *ties)
     # The named cause is twice as probable as each that is tied with it.
@@ -186,12 +218,18 @@ def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
 
 
 def write_verdict(folder, joints=LEG, inputs=(), **changes):
-    said = verdict_of(joints, **changes) | {"provenance": {"joints": named(joints)} | describe(inputs)}
+    said = verdict_of(joints, **changes) | {
+        "provenance": {"joints": named(joints)} | describe(inputs)
+    }
     (folder / "diagnosed").mkdir(parents=True, exist_ok=True)
-    (folder / "diagnosed" / "verdict.json").write_text(json.dumps(said, ensure_ascii=False), encoding="utf-8")
+    (folder / "diagnosed" / "verdict.json").write_text(
+        json.dumps(said, ensure_ascii=False), encoding="utf-8"
+    )
 
 
-def write_replay(folder, parameters, recording, joints=LEG, seconds=20.0, rate_hz=200.0, off=0.02, spike=None):
+def write_replay(
+    folder, parameters, recording, joints=LEG, seconds=20.0, rate_hz=200.0, off=0.02, spike=None
+):
     time = np.arange(round(seconds * rate_hz)) / rate_hz
     columns = {"time_s": time, "window": (time // 1.0).astype(np.int64)}
     for joint in joints:
@@ -201,7 +239,9 @@ def write_replay(folder, parameters, recording, joints=LEG, seconds=20.0, rate_h
             error[spike] = 1.0
         values = (angle, angle - error, speed, error, torque, np.full(len(time), np.nan))
         quantities = ("reference", "angle", "velocity", "error", "torque", "network")
-        columns |= {joint.column(name): value for name, value in zip(quantities, values, strict=True)}
+        columns |= {
+            joint.column(name): value for name, value in zip(quantities, values, strict=True)
+        }
     about = {
         "joints": named(joints),
         "windows": 2 * int(seconds) - 1,
@@ -220,7 +260,9 @@ def write_loop(folder, parameters, joints=LEG):
         error = 0.01 * np.exp(-time)
         values = (angle, angle - error, speed, error, torque, 0.5 * torque)
         quantities = ("reference", "angle", "velocity", "error", "torque", "network")
-        columns |= {joint.column(name): value for name, value in zip(quantities, values, strict=True)}
+        columns |= {
+            joint.column(name): value for name, value in zip(quantities, values, strict=True)
+        }
     about = {
         "joints": named(joints),
         "plant": {"run": "with_human"},
@@ -228,7 +270,9 @@ def write_loop(folder, parameters, joints=LEG):
     }
     path = folder / "simulated" / parameters.parent.name / "rbf.parquet"
     SIMULATION.write(
-        path, pd.DataFrame(columns), about | describe([parameters], {"simulate": {"settled_after_s": 5.0}})
+        path,
+        pd.DataFrame(columns),
+        about | describe([parameters], {"simulate": {"settled_after_s": 5.0}}),
     )
     gains = {"feedback_gain_nm_s_rad": [100.0, 200.0, 300.0]}
     gains |= {joint.column("error"): [0.02, 0.012, 0.009] for joint in joints}

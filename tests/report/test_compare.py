@@ -1,4 +1,5 @@
-"""Two sessions side by side: what did not change is marked no more often than 95 % intervals allow."""
+"""Two sessions side by side: what did not change is marked no more often than 95 % intervals
+allow."""
 
 import re
 from dataclasses import replace
@@ -23,11 +24,16 @@ from tests.report.sessions import (
 
 
 def estimate(value, half, name="X1"):
-    return Estimate("rigid_body", name, name, "", "with_human", "kg·m²", value, value - half, value + half)
+    return Estimate(
+        "rigid_body", name, name, "", "with_human", "kg·m²", value, value - half, value + half
+    )
 
 
 def pair(folder, shift):
-    return [find([write_session(folder / name, shift=by)]) for name, by in (("monday", 0.0), ("tuesday", shift))]
+    return [
+        find([write_session(folder / name, shift=by)])
+        for name, by in (("monday", 0.0), ("tuesday", shift))
+    ]
 
 
 @pytest.mark.parametrize("widths", [(1.0, 1.0), (0.2, 3.0)])
@@ -40,15 +46,21 @@ def test_of_parameters_that_did_not_change_one_in_twenty_is_marked(widths):
 
 
 def test_intervals_from_few_periods_mark_no_more_than_they_promise():
-    # Student's t with 5 degrees of freedom, whose 97.5 % point is 2.57: the halves are that many standard errors.
+    # Student's t with 5 degrees of freedom, whose 97.5 % point is 2.57: the halves are that many
+    # standard errors.
     rng = np.random.default_rng(8)
     sets = []
     for _ in range(2):
         scatter = np.sqrt(rng.chisquare(5, 4000) / 5)
         sets.append(
-            [estimate(z, 2.57 * s, str(k)) for k, (z, s) in enumerate(zip(rng.normal(size=4000), scatter, strict=True))]
+            [
+                estimate(z, 2.57 * s, str(k))
+                for k, (z, s) in enumerate(zip(rng.normal(size=4000), scatter, strict=True))
+            ]
         )
-    assert np.mean([change.is_beyond for change in changes(*sets)]) < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 4000)
+    assert np.mean([change.is_beyond for change in changes(*sets)]) < 0.05 + 3 * np.sqrt(
+        0.05 * 0.95 / 4000
+    )
 
 
 def test_a_change_beyond_the_intervals_is_marked_and_a_smaller_one_is_not():
@@ -92,7 +104,10 @@ NOTHING = {"status": "unknown_cause", "causes": []}
 
 def test_a_verdict_that_changed_is_told_before_parameters_that_did_not(tmp_path):
     page = told_apart(tmp_path, **NOTHING)
-    assert page.headline == "The verdict went from explained to cause unknown; no parameter changed beyond its interval"
+    assert (
+        page.headline
+        == "The verdict went from explained to cause unknown; no parameter changed beyond its interval"
+    )
     assert f"<h1>{page.headline}</h1>" in page.text
 
 
@@ -120,7 +135,9 @@ def test_settings_that_differ_are_listed_and_those_that_do_not_or_only_draw_are_
         write_recording(tmp_path / name, config=one)
         sessions.append(find([tmp_path / name]))
     page = compare(*sessions, ("a", "b"))
-    assert [(one.name, one.first, one.second) for one in page.settings] == [("filter.cutoff_hz", '"auto"', "20.0")]
+    assert [(one.name, one.first, one.second) for one in page.settings] == [
+        ("filter.cutoff_hz", '"auto"', "20.0")
+    ]
     assert "<code>filter.cutoff_hz</code>" in page.text
     assert "No setting differs" in compare(sessions[0], sessions[0], ("a", "a")).text
 
@@ -153,7 +170,10 @@ def test_a_hostile_session_is_escaped_beside_another(tmp_path, opened):
 
 
 def test_sessions_of_different_machines_are_refused_by_what_differs(tmp_path):
-    leg, axis = (find([write_session(tmp_path / name, joints)]) for name, joints in (("leg", LEG), ("axis", AXIS)))
+    leg, axis = (
+        find([write_session(tmp_path / name, joints)])
+        for name, joints in (("leg", LEG), ("axis", AXIS))
+    )
     says = r"leg is of another machine than axis \(hip \(revolute\), knee \(revolute\), and axis \(prismatic\)\)"
     with pytest.raises(InputError, match=says):
         compare(leg, axis, ("leg", "axis"))
@@ -165,7 +185,9 @@ def test_a_parameter_of_another_unit_is_never_subtracted(tmp_path):
     table = PARAMETERS.read(path)
     table.frame.loc[0, "unit"] = "kg·m"
     PARAMETERS.write(path, table.frame, table.metadata)
-    with pytest.raises(InputError, match=r"X1 \(with_human\) is in kg·m² and in kg·m, expected one unit"):
+    with pytest.raises(
+        InputError, match=r"X1 \(with_human\) is in kg·m² and in kg·m, expected one unit"
+    ):
         compare(first, find(second.folders), ("a", "b"))
 
 
@@ -174,4 +196,7 @@ def test_without_verdicts_the_page_says_why_no_errors_are_laid_side_by_side(tmp_
     for name in ("monday", "tuesday"):
         write_parameters(tmp_path / name)
         sessions.append(find([tmp_path / name]))
-    assert "a verdict of each session, so no errors can be laid side by side" in compare(*sessions, ("a", "b")).text
+    assert (
+        "a verdict of each session, so no errors can be laid side by side"
+        in compare(*sessions, ("a", "b")).text
+    )

@@ -32,7 +32,10 @@ def test_a_gap_of_one_sample_survives(recording):
 def test_no_fiftieth_of_the_recording_loses_what_it_reaches(recording):
     kept, longest = extremes(recording, ROWS), len(recording) * 9 // ROWS + 1
     for part in np.array_split(np.arange(len(recording)), 50):
-        stays, inner = recording[kept[(kept >= part[0]) & (kept <= part[-1])]], recording[part[longest:-longest]]
+        stays, inner = (
+            recording[kept[(kept >= part[0]) & (kept <= part[-1])]],
+            recording[part[longest:-longest]],
+        )
         assert (stays.max(axis=0) >= inner.max(axis=0)).all()
         assert (stays.min(axis=0) <= inner.min(axis=0)).all()
 
@@ -47,11 +50,15 @@ def test_what_fits_stays_whole(recording):
 
 def chart(key, rows):
     time = np.arange(rows) / 100
-    return Chart(key, key, "", "time, s", time, (Panel("y", (Series("y", np.sin(time**2), Role.AFTER),)),))
+    return Chart(
+        key, key, "", "time, s", time, (Panel("y", (Series("y", np.sin(time**2), Role.AFTER),)),)
+    )
 
 
 def test_charts_share_the_room_and_the_short_one_keeps_all():
-    short, long, longer = thinned_alike([chart("a", 500), chart("b", 30_000), chart("c", 90_000)], 12_000)
+    short, long, longer = thinned_alike(
+        [chart("a", 500), chart("b", 30_000), chart("c", 90_000)], 12_000
+    )
     assert (len(short.x), short.rows) == (500, 0)
     assert (long.rows, longer.rows) == (30_000, 90_000)
     assert sum(len(one.x) * one.width for one in (short, long, longer)) <= 12_000

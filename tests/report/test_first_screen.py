@@ -15,7 +15,10 @@ FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's
 
 def cause(effect="cogging", joint="knee", ties=()):
     first = verdict_of()["causes"][0]
-    rivals = [{"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1} for e, j in ties]
+    rivals = [
+        {"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1}
+        for e, j in ties
+    ]
     return first | {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
 
 
@@ -26,7 +29,10 @@ def cause(effect="cogging", joint="knee", ties=()):
         ([("backlash", "knee")], "cogging or backlash at the knee"),
         ([("backlash", "hip")], "cogging at the knee or backlash at the hip"),
         ([("base_tilt", None)], "cogging at the knee or base tilt"),
-        ([("backlash", "knee"), ("backlash", "hip")], "cogging at the knee or 2 others that these data cannot tell"),
+        (
+            [("backlash", "knee"), ("backlash", "hip")],
+            "cogging at the knee or 2 others that these data cannot tell",
+        ),
     ],
 )
 def test_the_headline_claims_no_cause_that_is_tied(ties, said):
@@ -34,7 +40,9 @@ def test_the_headline_claims_no_cause_that_is_tied(ties, said):
 
 
 def test_a_tie_that_would_differ_from_run_to_run_is_called_so():
-    tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {"each_run": [{"file": "a", "values": {}}]}
+    tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {
+        "each_run": [{"file": "a", "values": {}}]
+    }
     tied["indistinguishable_from"][0]["per_run"] = True
     assert causes_in_words([tied]) == "per-run torque offset or per-run encoder offset at the knee"
 
@@ -47,7 +55,9 @@ def test_two_causes_are_parted_by_a_comma_where_one_of_them_is_tied():
 
 
 def test_labels_in_a_sentence_are_said_in_words_and_longer_ones_are_not_cut():
-    said = labels_in_words("load@hip is not cogging@hip, nor base_tilt", ["cogging@hip", "base_tilt", "cogging"])
+    said = labels_in_words(
+        "load@hip is not cogging@hip, nor base_tilt", ["cogging@hip", "base_tilt", "cogging"]
+    )
     assert said == "load@hip is not cogging at the hip, nor base tilt"
 
 
@@ -72,9 +82,17 @@ def test_an_error_is_told_beside_the_torque_that_was_measured(tmp_path):
 
 def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_path):
     folder = write_session(tmp_path / "leg")
-    write_verdict(folder, summary="Found. Guessed. Faulty.", finding="Found.", data_faults=[FAULT, FAULT, FAULT])
+    write_verdict(
+        folder,
+        summary="Found. Guessed. Faulty.",
+        finding="Found.",
+        data_faults=[FAULT, FAULT, FAULT],
+    )
     assert '<p class="lead">Found.</p>' in top(folder)
-    assert "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s angle" in top(folder)
+    assert (
+        "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s angle"
+        in top(folder)
+    )
     assert 'href="#faults"' in top(folder)
     write_verdict(folder, finding="Found.", data_faults=[FAULT])
     assert "Beside it, a fault of acquisition: run_1.parquet" in top(folder)
@@ -105,7 +123,9 @@ def test_a_gain_is_of_the_error_that_the_other_causes_leave(tmp_path):
     (alone,) = gains(folder, cause())
     assert (alone.big, alone.unit) == ("0.504", "N·m")
     assert alone.small == "0.818 → 0.314 N·m at the knee; 95 %: 0.450 … 0.550"
-    of_two, _ = gains(folder, cause() | {"gain": cause()["gain"] | {"rmse_reduction_nm": 0.1}}, cause("backlash"))
+    of_two, _ = gains(
+        folder, cause() | {"gain": cause()["gain"] | {"rmse_reduction_nm": 0.1}}, cause("backlash")
+    )
     assert of_two.small.startswith("0.414 → 0.314 N·m at the knee, beside the other causes;")
 
 
@@ -154,7 +174,10 @@ def test_of_an_unlisted_law_the_headline_says_what_it_is_a_law_of(tmp_path):
         "path": told["findings"][0]["path"][:4],
     }
     write_verdict(folder, status="unknown_cause", causes=[], **told | {"findings": [found]})
-    assert "The simulation misses a law of the knee&#39;s angle, and no listed cause explains it" in top(folder)
+    assert (
+        "The simulation misses a law of the knee&#39;s angle, and no listed cause explains it"
+        in top(folder)
+    )
 
 
 def test_a_verdict_of_an_older_version_has_no_cards_of_the_decision(tmp_path):

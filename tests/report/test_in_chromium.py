@@ -41,7 +41,9 @@ def test_the_page_loads_without_a_complaint_and_every_chart_is_drawn(opened, pag
             assert all(colours > 5 for colours in page.evaluate(DRAWN, key)), key
 
 
-def test_dragging_zooms_every_chart_of_the_run_and_a_double_click_shows_all_again(opened, page_file):
+def test_dragging_zooms_every_chart_of_the_run_and_a_double_click_shows_all_again(
+    opened, page_file
+):
     with opened(page_file) as page:
         draw_all(page)
         first, second = "torque-with_human_validate-hip", "angle-with_human_validate-knee"
@@ -100,7 +102,9 @@ def test_a_printed_page_shows_every_chart_on_white(opened, page_file):
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         page.wait_for_function("exoid.plots.size === Object.keys(exoid.data.charts).length")
         assert page.evaluate("[...document.querySelectorAll('details')].every(d => d.open)")
-        paper = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--paper')")
+        paper = page.evaluate(
+            "getComputedStyle(document.documentElement).getPropertyValue('--paper')"
+        )
         assert paper.strip() == "#ffffff"
         page.wait_for_function("[...exoid.plots.values()].flat().every(u => u.status === 1)")
         for key in page.evaluate("Object.keys(exoid.data.charts)"):
@@ -154,7 +158,9 @@ def test_a_pendulum_that_swings_up_stays_in_the_picture(opened, tmp_path):
         stage = page.locator("[data-stage]").first
         stage.scroll_into_view_if_needed()
         for part in range(0, 1000, 100):
-            stage.locator("input").evaluate("(e, k) => { e.value = k; e.dispatchEvent(new Event('input')); }", part)
+            stage.locator("input").evaluate(
+                "(e, k) => { e.value = k; e.dispatchEvent(new Event('input')); }", part
+            )
             assert min(page.evaluate(ROOM)) > 2
 
 
@@ -192,7 +198,10 @@ def test_text_from_a_hostile_file_is_shown_and_never_run(opened, tmp_path):
 def test_even_a_script_that_got_in_would_not_run(opened, chromium, page_file, tmp_path):
     broken = tmp_path / "broken.html"
     text = page_file.read_text(encoding="utf-8")
-    broken.write_text(text.replace("</main>", "<script>document.title = 'broken in'</script></main>"), encoding="utf-8")
+    broken.write_text(
+        text.replace("</main>", "<script>document.title = 'broken in'</script></main>"),
+        encoding="utf-8",
+    )
     page = chromium.new_page()
     page.goto(broken.as_uri())
     assert page.title() != "broken in"
@@ -201,11 +210,15 @@ def test_even_a_script_that_got_in_would_not_run(opened, chromium, page_file, tm
 
 def test_a_million_samples_stay_fluid_and_a_spike_among_them_is_seen(opened, tmp_path):
     recording = write_recording(tmp_path, AXIS)
-    baseline, extended = (write_parameters(tmp_path, AXIS, extended=which) for which in (False, True))
+    baseline, extended = (
+        write_parameters(tmp_path, AXIS, extended=which) for which in (False, True)
+    )
     write_residuals(tmp_path, AXIS, seconds=1000.0)
     write_verdict(tmp_path, AXIS)
     for parameters in (baseline, extended):
-        write_replay(tmp_path, parameters, recording, AXIS, seconds=1000.0, rate_hz=1000.0, spike=654_321)
+        write_replay(
+            tmp_path, parameters, recording, AXIS, seconds=1000.0, rate_hz=1000.0, spike=654_321
+        )
     text = report(find([tmp_path]))
     assert len(text.encode()) < 5_000_000
     page_file = tmp_path / "report.html"
@@ -271,15 +284,19 @@ PRINTED = """async () => {
     }
     return told;
 }"""
-"""As a browser lays a page out for paper: how wide it is, how large its charts' letters get and how far apart, px."""
+"""As a browser lays a page out for paper: how wide it is, how large its charts' letters get and how
+far apart, px."""
 
 
 @pytest.mark.parametrize("paper", [695, 718])
-def test_on_paper_nothing_sticks_out_and_no_axis_outgrows_the_text_or_has_labels_that_meet(opened, tmp_path, paper):
+def test_on_paper_nothing_sticks_out_and_no_axis_outgrows_the_text_or_has_labels_that_meet(
+    opened, tmp_path, paper
+):
     folder = write_session(tmp_path / "leg")
     path = folder / "diagnosed" / "residuals.parquet"
     table = RESIDUALS.read(path)
-    table.frame["knee_angle_rad"] *= 0.126 / table.frame["knee_angle_rad"].abs().max()  # ticks of three decimals
+    # Ticks of three decimals.
+    table.frame["knee_angle_rad"] *= 0.126 / table.frame["knee_angle_rad"].abs().max()
     RESIDUALS.write(path, table.frame, table.metadata)
     page_file = tmp_path / "report.html"
     page_file.write_text(report(find([folder])), encoding="utf-8")

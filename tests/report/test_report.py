@@ -50,7 +50,11 @@ def test_numbers_on_the_page_equal_those_in_the_files(session_folder, page_file)
             assert shown[f"error_budget.{joint}.{key}"][0] == share
     for folder in ("identified", "diagnosed"):
         rows = PARAMETERS.read(session_folder / folder / "parameters.parquet").frame
-        values = sorted(value for key, (value, _) in shown.items() if key.startswith(f"{folder}/parameters.parquet:"))
+        values = sorted(
+            value
+            for key, (value, _) in shown.items()
+            if key.startswith(f"{folder}/parameters.parquet:")
+        )
         assert values == sorted(rows["value"])
 
 
@@ -82,7 +86,11 @@ def test_a_session_of_many_long_runs_stays_under_five_megabytes(tmp_path):
 
 def test_the_page_tells_what_it_was_made_of_as_every_result_does(session_folder, page_file):
     told = provenance_of(page_file)
-    made_of = {sha256(path) for path in session_folder.rglob("*") if path.suffix in (".parquet", ".json", ".csv")}
+    made_of = {
+        sha256(path)
+        for path in session_folder.rglob("*")
+        if path.suffix in (".parquet", ".json", ".csv")
+    }
     assert {one["sha256"] for one in told["inputs"]} == made_of
 
 
@@ -101,7 +109,9 @@ def test_the_page_asks_for_nothing_outside_itself(page_file):
         ("recordings", "Not here yet: recordings"),
     ],
 )
-def test_an_experiment_that_lacks_a_stage_has_a_page_that_says_so(session_folder, tmp_path, gone, says):
+def test_an_experiment_that_lacks_a_stage_has_a_page_that_says_so(
+    session_folder, tmp_path, gone, says
+):
     folder = tmp_path / "part"
     shutil.copytree(session_folder, folder, ignore=shutil.ignore_patterns(gone))
     page = report(find([folder]))
@@ -133,22 +143,34 @@ def test_what_was_made_of_an_older_recording_is_said_at_the_top(tmp_path):
 
 
 def imported(folder, **given):
-    """Write a recording that was imported of a log and a map, the map beside it and the log elsewhere."""
+    """Write a recording that was imported of a log and a map, the map beside it and the log
+    elsewhere."""
     folder.mkdir()
     log, table = folder / "log.csv", folder / "machine.toml"
     log.write_text("t,q\n0,1\n")
     table.write_text("[time]\n")
-    write_recording(folder, imported={"source": "log.csv", "given": given}, **describe([log, table]))
+    write_recording(
+        folder, imported={"source": "log.csv", "given": given}, **describe([log, table])
+    )
     log.unlink()
     return folder
 
 
-def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_path_it_was_given(tmp_path):
+def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_path_it_was_given(
+    tmp_path,
+):
     folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
     lines = [command.line for command in provenance.commands(find([folder]))]
-    assert lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o {folder / 'recordings'}/"
+    assert (
+        lines[0]
+        == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o {folder / 'recordings'}/"
+    )
     (log,) = provenance.outside(find([folder]))
-    assert (log.name, log.role, log.made_of_it) == ("../logs/log.csv", "a log", (f"recordings/{RUN}",))
+    assert (log.name, log.role, log.made_of_it) == (
+        "../logs/log.csv",
+        "a log",
+        (f"recordings/{RUN}",),
+    )
     assert "Made of files that are not in these folders" in report(find([folder]))
     (folder / "machine.toml").write_text("[joint]\n")
     assert "--map old/machine.toml" in provenance.commands(find([folder]))[0].line
@@ -183,7 +205,10 @@ def test_a_set_that_holds_what_is_named_tells_what_it_adds_in_words(tmp_path):
     rows = table.frame.copy()
     rows["causes"] = [["cogging@knee"], ["cogging@knee", "base_tilt"]]
     rows["rmse_after_hip_nm"], rows["rmse_after_knee_nm"] = [0.31, 0.30], [0.31, 0.29]
-    rows["gain_nm"], rows.loc[1, "reason"] = [0.41, 0.43], "base_tilt adds too little beside cogging@knee"
+    rows["gain_nm"], rows.loc[1, "reason"] = (
+        [0.41, 0.43],
+        "base_tilt adds too little beside cogging@knee",
+    )
     CANDIDATES.write(path, rows, table.metadata)
     line = re.search(r"<tr><td class=\"n\">2</td>.*?</tr>", report(find([folder])))[0]
     assert "<small>what is named, and</small><br>base tilt</td>" in line
@@ -193,16 +218,24 @@ def test_a_set_that_holds_what_is_named_tells_what_it_adds_in_words(tmp_path):
 
 def test_versions_are_told_where_files_have_them_and_nothing_where_they_do_not(tmp_path):
     path = write_parameters(tmp_path)
-    assert f"Made with Python {platform.python_version()}, numpy {np.__version__}" in report(find([tmp_path]))
+    assert f"Made with Python {platform.python_version()}, numpy {np.__version__}" in report(
+        find([tmp_path])
+    )
     table = PARAMETERS.read(path)
-    PARAMETERS.write(path, table.frame, {key: value for key, value in table.metadata.items() if key != "software"})
+    PARAMETERS.write(
+        path,
+        table.frame,
+        {key: value for key, value in table.metadata.items() if key != "software"},
+    )
     assert "Made with Python" not in report(find([tmp_path]))
 
 
 def test_two_verdicts_are_refused_in_a_line_that_says_what_to_do(tmp_path):
     for name in ("one", "two"):
         write_verdict(tmp_path / name)
-    with pytest.raises(InputError, match=r"holds 2 verdicts \(one/diagnosed/verdict.json, two/.*--compare"):
+    with pytest.raises(
+        InputError, match=r"holds 2 verdicts \(one/diagnosed/verdict.json, two/.*--compare"
+    ):
         report(find([tmp_path]))
 
 
@@ -243,25 +276,44 @@ def test_where_the_causes_make_it_worse_that_is_said_on_the_tile_and_below(tmp_p
     assert re.search(r"22\.4 → 36\.7 <span>mrad</span></div><small>worse with the causes", top)
     assert "the knee&#39;s torque error is 2.95 → 3.38 N·m with the causes" in top
     assert "What is named raises the most that can hold it" in top
-    assert "the knee strays 22.4 → 36.7 mrad with the causes: nothing corrects such a simulation" in top
+    assert (
+        "the knee strays 22.4 → 36.7 mrad with the causes: nothing corrects such a simulation"
+        in top
+    )
     assert "the hip strays" not in top
 
 
-def test_errors_are_told_away_from_reversals_and_with_them_as_the_residuals_have_them(session_folder, page_file):
+def test_errors_are_told_away_from_reversals_and_with_them_as_the_residuals_have_them(
+    session_folder, page_file
+):
     rows = RESIDUALS.read(session_folder / "diagnosed" / "residuals.parquet").frame
-    rows = rows[rows["model"] == "extended"]["knee_residual_nm"], rows[rows["model"] == "extended"]["scored"]
+    rows = (
+        rows[rows["model"] == "extended"]["knee_residual_nm"],
+        rows[rows["model"] == "extended"]["scored"],
+    )
     shown = page_file.read_text(encoding="utf-8")
-    for words, error in (("away from reversals", rows[0][rows[1]]), ("reversals included", rows[0])):
+    for words, error in (
+        ("away from reversals", rows[0][rows[1]]),
+        ("reversals included", rows[0]),
+    ):
         line = re.search(rf"<td>knee torque, computed, {words}, N·m</td>(.*?)</tr>", shown)[1]
-        assert float(re.findall(r'value="([^"]*)"', line)[1]) == pytest.approx(np.sqrt(np.mean(error**2)))
+        assert float(re.findall(r'value="([^"]*)"', line)[1]) == pytest.approx(
+            np.sqrt(np.mean(error**2))
+        )
 
 
 def test_seconds_in_which_a_joint_stands_are_told_from_those_in_which_it_moves_throughout():
     time = np.arange(0, 3.0, 0.005)
-    place = np.where(time < 1.0, time, np.where(time < 1.6, 1.0, time - 0.6))  # stands from 1.0 to 1.6 s
+    # Stands from 1.0 to 1.6 s.
+    place = np.where(time < 1.0, time, np.where(time < 1.6, 1.0, time - 0.6))
     noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
     frame = pd.DataFrame(
-        {"time_s": time, "window": (time // 1.0).astype(int), "knee_reference_rad": place + noise, "x": 0}
+        {
+            "time_s": time,
+            "window": (time // 1.0).astype(int),
+            "knee_reference_rad": place + noise,
+            "x": 0,
+        }
     )
     assert set(frame.loc[moving(frame, Joint("knee")), "window"]) == {0, 2}
 
@@ -269,7 +321,12 @@ def test_seconds_in_which_a_joint_stands_are_told_from_those_in_which_it_moves_t
 @pytest.mark.parametrize("status", ["nothing_missing", "unknown_cause"])
 def test_a_verdict_without_causes_shows_the_model_without_them_alone(tmp_path, status):
     folder = write_session(tmp_path / "leg")
-    write_verdict(folder, status=status, causes=[], error_budget={j: {"noise_floor": 0.07} for j in ("hip", "knee")})
+    write_verdict(
+        folder,
+        status=status,
+        causes=[],
+        error_budget={j: {"noise_floor": 0.07} for j in ("hip", "knee")},
+    )
     session = find([folder])
     page = report(session)
     drawn = {series.label for chart in charts(session).all for series in chart.all_series}
@@ -326,7 +383,9 @@ def test_what_the_fits_say_against_a_model_stands_beside_its_parameters(tmp_path
         assert page.count(words) == 2
 
 
-def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value_is_listed(tmp_path):
+def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value_is_listed(
+    tmp_path,
+):
     folder = write_session(tmp_path / "leg")
     sure = [0.0512, 0.0712]
     each_run = [
@@ -344,7 +403,9 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     tried.frame["causes"] = [["encoder_offset@knee"], ["encoder_offset@knee", "cogging@hip"]]
     CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", tried.frame, tried.metadata)
     table = PARAMETERS.read(folder / "diagnosed" / "parameters.parquet")
-    frame = table.frame.replace({"effect": {"cogging": "encoder_offset"}, "name": {"amplitude": "offset"}})
+    frame = table.frame.replace(
+        {"effect": {"cogging": "encoder_offset"}, "name": {"amplitude": "offset"}}
+    )
     frame["each_run"] = frame["effect"] == "encoder_offset"
     PARAMETERS.write(folder / "diagnosed" / "parameters.parquet", frame, table.metadata)
     page = report(find([folder]))
@@ -352,7 +413,8 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     assert "Why per-run encoder offset at the knee" in page
     assert '<li class="key cause1">per-run encoder offset at the knee: ' in page
     assert re.search(
-        '<td>per-run encoder offset at the knee</td><td class="n">0.90</td><td><span class="pill [^"]*">named', page
+        '<td>per-run encoder offset at the knee</td><td class="n">0.90</td><td><span class="pill [^"]*">named',
+        page,
     )
     shown = told(page)
     assert shown["each_run:encoder_offset/knee/first.parquet/offset"] == (0.0612, "0.061")
@@ -362,7 +424,9 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     (never,) = re.findall('<tr><td class="file">absent.parquet.*?</tr>', page)
     assert "never came" in never and "data-key" not in never
     # The model's table holds the first run's: it says so of that value, and of no other.
-    assert re.findall('<td class="nowrap">([^<]*|<abbr[^>]*>[^<]*</abbr>) <small>encoder offset</small>', page)
+    assert re.findall(
+        '<td class="nowrap">([^<]*|<abbr[^>]*>[^<]*</abbr>) <small>encoder offset</small>', page
+    )
     assert page.count("(per run: the first training run") == 1
 
 

@@ -1,4 +1,5 @@
-"""What a run's table says beside its numbers: where the causes make it worse, and why it has none with them."""
+"""What a run's table says beside its numbers: where the causes make it worse, and why it has none
+with them."""
 
 import pandas as pd
 import pytest
@@ -26,12 +27,18 @@ PENDULUM = (Joint("joint"),)
 
 
 def session_with(folder, effect, **values):
-    """Write a pendulum's session whose model with one effect was never simulated, and that without it was."""
+    """Write a pendulum's session whose model with one effect was never simulated, and that without
+    it was."""
     recording = write_recording(folder, PENDULUM)
-    baseline, extended = (write_parameters(folder, PENDULUM, extended=which) for which in (False, True))
+    baseline, extended = (
+        write_parameters(folder, PENDULUM, extended=which) for which in (False, True)
+    )
     table = PARAMETERS.read(extended)
     kept = table.frame[table.frame["effect"] != "cogging"]
-    rows = [("friction", "viscous", 1.0), *((effect, name, value) for name, value in values.items())]
+    rows = [
+        ("friction", "viscous", 1.0),
+        *((effect, name, value) for name, value in values.items()),
+    ]
     more = pd.concat([kept.tail(1)] * len(rows), ignore_index=True)
     more[["effect", "name", "value"]] = rows
     about = {key: value for key, value in table.metadata.items() if key != "covariance"}
@@ -43,9 +50,13 @@ def session_with(folder, effect, **values):
     return find([folder])
 
 
-def test_a_model_that_cannot_move_is_said_to_with_the_reason_where_its_numbers_are_missing(tmp_path):
+def test_a_model_that_cannot_move_is_said_to_with_the_reason_where_its_numbers_are_missing(
+    tmp_path,
+):
     session = session_with(tmp_path, "backlash", play=0.01)
-    assert unmoved(session, RUN).startswith("backlash at the joint: the teeth that a simulation has are those of an")
+    assert unmoved(session, RUN).startswith(
+        "backlash at the joint: the teeth that a simulation has are those of an"
+    )
     page = report(session)
     assert "With the causes this run could not be simulated" in page
     assert "too hard for a machine of another size." in page
@@ -68,12 +79,16 @@ def test_a_run_that_was_simulated_with_the_causes_lacks_nothing(session_folder):
 @pytest.mark.parametrize(
     ("away", "says"), [(0.5, "larger with the causes; only about"), (2.5, "larger with the causes")]
 )
-def test_the_row_in_which_the_causes_make_a_run_worse_says_so_and_whether_only_about_reversals(tmp_path, away, says):
+def test_the_row_in_which_the_causes_make_a_run_worse_says_so_and_whether_only_about_reversals(
+    tmp_path, away, says
+):
     folder = write_session(tmp_path / "leg")
     path = folder / "diagnosed" / "residuals.parquet"
     table = RESIDUALS.read(path)
     extended = table.frame["model"] == "extended"
-    table.frame.loc[extended, "knee_residual_nm"] = table.frame.loc[extended, "scored"].map({True: away, False: 5.0})
+    table.frame.loc[extended, "knee_residual_nm"] = table.frame.loc[extended, "scored"].map(
+        {True: away, False: 5.0}
+    )
     RESIDUALS.write(path, table.frame, table.metadata)
     notes = {score.words: score.note for score in scores(find([folder]), RUN)}
     assert notes["knee torque, computed, reversals included, N·m"].startswith(says)
@@ -88,7 +103,10 @@ def test_a_refit_of_the_causes_is_called_that_and_taken_for_no_baseline(tmp_path
     table = PARAMETERS.read(diagnosed)
     of = {"name": "parameters.parquet", "sha256": sha256(diagnosed)}
     inputs = [*table.metadata["inputs"], of]
-    about = {k: v for k, v in table.metadata.items() if k != "contract"} | {"inputs": inputs, "method": {"causes": of}}
+    about = {k: v for k, v in table.metadata.items() if k != "contract"} | {
+        "inputs": inputs,
+        "method": {"causes": of},
+    }
     PARAMETERS.write(tmp_path / "a_refit" / "parameters.parquet", table.frame, about)
     session = find([tmp_path])
     assert [model.title for model in models(session)] == [

@@ -15,4 +15,6 @@ def excitation():
 @pytest.fixture
 def silent():
     """A plant whose sensors make no error."""
-    return PlantSettings(ripple_nm=(0.0, 0.0), counts_per_turn=(0.0, 0.0), cuff=CuffSettings(noise_n=0.0))
+    return PlantSettings(
+        ripple_nm=(0.0, 0.0), counts_per_turn=(0.0, 0.0), cuff=CuffSettings(noise_n=0.0)
+    )

@@ -34,5 +34,7 @@ app.main()
 def test_a_signal_that_falls_into_compiled_code_ends_the_rig_nevertheless(number, code, line):
     words = ["rig", "serve", str(datasets() / "rigs" / "plain.toml"), "--port", "0"]
     program = SERVE.replace("NUMBER", str(int(number)))
-    done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, timeout=180)
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, timeout=180
+    )
     assert (done.returncode, done.stderr) == (code, line)

@@ -19,7 +19,9 @@ def talk():
 
     def run(client):
         async def serving():
-            device = SimDevice(1, simdata=[SimData(0, values=[0] * 100, datatype=DataType.REGISTERS)])
+            device = SimDevice(
+                1, simdata=[SimData(0, values=[0] * 100, datatype=DataType.REGISTERS)]
+            )
             server = guarded(ModbusTcpServer([device], address=("127.0.0.1", 0)))
             assert await server.listen()
             line = socket.socket()
@@ -42,7 +44,9 @@ def test_who_asks_and_never_fetches_is_hung_up_on(talk):
     async def greedy(loop, line, server):
         await asyncio.sleep(0.01)
         (handler,) = server.active_connections.values()
-        handler.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+        handler.transport.get_extra_info("socket").setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, 1
+        )
         for _ in range(5_000):
             await loop.sock_sendall(line, READ)
             await asyncio.sleep(0.001)  # of requests that come together only the first is answered

@@ -36,6 +36,9 @@ def test_a_link_whose_port_is_somebody_elses_by_now_is_said_to_be_a_leftover_per
 
 def test_a_file_in_the_place_of_the_link_stays(link):
     link.write_text("a month of work")
-    with pytest.raises(DeviceError, match="is there already, where the link"), _linked(str(link), "/dev/null"):
+    with (
+        pytest.raises(DeviceError, match="is there already, where the link"),
+        _linked(str(link), "/dev/null"),
+    ):
         raise AssertionError("the place is taken")
     assert link.read_text() == "a month of work"

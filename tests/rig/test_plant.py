@@ -29,7 +29,9 @@ def test_the_drives_deliver_what_the_true_parameters_ask_for(silent, excitation,
     measured = move(Plant(silent, run), excitation)
     X = np.array(silent.exo_inertial) + (run == "with_human") * np.array(silent.human_inertial)
     q, dq, ddq = (np.ascontiguousarray(measured.truth[:, i]) for i in range(3))
-    needed = LEG.regressor(q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)) @ X + friction(silent, dq)
+    needed = LEG.regressor(
+        q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)
+    ) @ X + friction(silent, dq)
     moving = (np.abs(dq) > 0.1).all(axis=1)
     assert np.std((measured.torque - needed)[moving]) < 0.1
     assert np.std(measured.torque) > 5.0
@@ -47,9 +49,9 @@ def test_cuff_forces_tell_the_torque_on_the_persons_own_leg(silent, excitation):
     plant = Plant(silent, "with_human")
     measured = move(plant, excitation)
     q, dq, ddq = (np.ascontiguousarray(measured.truth[:, i]) for i in range(3))
-    own = LEG.regressor(q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)) @ np.array(
-        silent.human_inertial
-    )
+    own = LEG.regressor(
+        q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)
+    ) @ np.array(silent.human_inertial)
     thigh, shank = measured.forces[:, :2].sum(axis=1), measured.forces[:, 2:].sum(axis=1)
     assert_allclose(cuff_torque(thigh, shank, q, plant.geometry), own, atol=1e-9)
 
@@ -97,7 +99,9 @@ def test_a_recording_by_arrays_keeps_the_contract(excitation, run):
 def test_a_recording_begins_where_the_motion_repeats(silent, excitation):
     frame, _ = record(Plant(silent, "with_human"), excitation, 4.0)
     period = round(excitation.period_s * RATE)
-    assert_allclose(frame["hip_angle_rad"][:period], frame["hip_angle_rad"][period : 2 * period], atol=2e-4)
+    assert_allclose(
+        frame["hip_angle_rad"][:period], frame["hip_angle_rad"][period : 2 * period], atol=2e-4
+    )
 
 
 def test_a_disabled_drive_applies_no_torque(silent):
@@ -123,7 +127,10 @@ def test_a_leg_that_cannot_exist_is_refused():
 @pytest.mark.parametrize(
     ("effect", "wanted"),
     [
-        (PlantEffect(effect="stribeck_friction", joint="hip", values={"stribeck_torque": 2.0}), "stribeck_velocity"),
+        (
+            PlantEffect(effect="stribeck_friction", joint="hip", values={"stribeck_torque": 2.0}),
+            "stribeck_velocity",
+        ),
         (PlantEffect(effect="encoder_offset", values={"offset": 0.1}), "expected a joint"),
         (PlantEffect(effect="stribek_friction", joint="hip", values={}), "stribeck_friction"),
     ],

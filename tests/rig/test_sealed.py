@@ -13,7 +13,9 @@ def with_seed(tmp_path):
         path = tmp_path / f"{seed}.toml"
         text = SHIPPED.read_text()
         old_seed = next(line for line in text.splitlines() if line.startswith("seed"))
-        path.write_text(text.replace(old_seed, f"seed = {seed}").replace("hidden = 1", f"hidden = {hidden}"))
+        path.write_text(
+            text.replace(old_seed, f"seed = {seed}").replace("hidden = 1", f"hidden = {hidden}")
+        )
         return path
 
     return write

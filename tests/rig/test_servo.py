@@ -14,7 +14,9 @@ RATE = 1000.0
 def servo():
     def make(samples_per_cycle):
         registers = load_rig(datasets() / "rigs" / "recorder.toml").map.drive["servo"]
-        return Servo(registers, 0.0, (-3.0, 3.0), RATE, 8.0, None, samples_per_cycle), registers.enable
+        return Servo(
+            registers, 0.0, (-3.0, 3.0), RATE, 8.0, None, samples_per_cycle
+        ), registers.enable
 
     return make
 
@@ -44,7 +46,8 @@ def speeds(drive, enable, came):
 @pytest.mark.parametrize("phase", range(5))
 def test_set_points_that_come_a_sample_early_or_late_move_the_drive_no_less_evenly(servo, phase):
     came = 5 * np.arange(400) + phase + np.random.default_rng(phase).integers(-1, 2, 400)
-    # Once it is in step with them it goes at their speed, and at no other: its cycles follow them but slowly.
+    # Once it is in step with them it goes at their speed, and at no other: its cycles follow them
+    # but slowly.
     np.testing.assert_allclose(speeds(*servo(5), came)[100:], 0.001, rtol=0.05)
 
 
@@ -70,7 +73,8 @@ def test_set_points_that_come_irregularly_do_not_swing_the_drive_up(servo, cycle
         late = int(draw.choice([cycle, max(cycle - 2, 1), cycle + 3, 7 * cycle, 20 * cycle]))
         path += [drive.next(0.0)[0] for _ in range(late)]
         now += late
-    # At most at its highest speed for as long as it goes on by itself, and until it has slowed down.
+    # At most at its highest speed for as long as it goes on by itself, and until it has slowed
+    # down.
     fastest = 0.02 * 2 * np.pi
     assert np.abs(path).max() < 0.02 + fastest * EXTRAPOLATED * cycle / RATE + fastest**2 / 8.0
 

@@ -12,7 +12,9 @@ LAB = (datasets() / "rigs" / "lab.toml").read_text()
 
 
 def loaded(tmp_path, key, value, text=LAB):
-    changed, count = re.subn(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
+    changed, count = re.subn(
+        rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE
+    )
     assert count, key
     path = tmp_path / "rig.toml"
     path.write_text(changed)
@@ -43,7 +45,9 @@ def test_a_limit_that_would_keep_nobody_from_harm_is_refused(tmp_path, key, valu
 
 def test_a_stop_that_leads_beyond_all_angles_of_a_joint_is_refused_though_it_is_short(tmp_path):
     text = LAB.replace("speed_rad_s = 1.0", "speed_rad_s = 6.0")
-    with pytest.raises(SettingsError, match=r"takes 0.75 s and 2.25 rad to stop from its 6 rad/s \(exo_alone\)"):
+    with pytest.raises(
+        SettingsError, match=r"takes 0.75 s and 2.25 rad to stop from its 6 rad/s \(exo_alone\)"
+    ):
         loaded(tmp_path, "deceleration_rad_s2", 8.0, text)
 
 

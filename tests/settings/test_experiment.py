@@ -34,20 +34,25 @@ def test_a_file_that_begins_with_a_byte_order_mark_is_read_as_any_other(tmp_path
 def test_a_thigh_that_no_leg_has_is_refused(tmp_path):
     (tmp_path / "exoid.toml").write_text("[mechanism]\nthigh_length_m = 389.52\n")
     with pytest.raises(
-        SettingsError, match=r"mechanism\.thigh_length_m: found 389\.52, expected less than or equal to 5"
+        SettingsError,
+        match=r"mechanism\.thigh_length_m: found 389\.52, expected less than or equal to 5",
     ):
         Experiment.load(tmp_path / "exoid.toml")
 
 
 def test_files_are_named_relative_to_the_experiment(tmp_path):
     (tmp_path / "exoid.toml").write_text("")
-    assert Experiment.load(tmp_path / "exoid.toml").file("rigs/a.toml") == tmp_path / "rigs" / "a.toml"
+    assert (
+        Experiment.load(tmp_path / "exoid.toml").file("rigs/a.toml") == tmp_path / "rigs" / "a.toml"
+    )
 
 
 @pytest.mark.parametrize(("heading", "model"), TABLES, ids=[heading for heading, _ in TABLES])
 def test_every_key_stands_in_the_default_file_and_is_described(heading, model):
     text = DEFAULT.read_text(encoding="utf-8")
-    keys = [name for name, field in model.model_fields.items() if not any(models_in(field.annotation))]
+    keys = [
+        name for name, field in model.model_fields.items() if not any(models_in(field.annotation))
+    ]
     assert not keys or heading in text
     for key in keys:
         assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), f"{heading} {key}"
@@ -55,7 +60,9 @@ def test_every_key_stands_in_the_default_file_and_is_described(heading, model):
 
 
 def test_the_settings_page_is_current():
-    assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == reference(), "run `make docs`"
+    assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == reference(), (
+        "run `make docs`"
+    )
 
 
 @pytest.mark.parametrize(
@@ -70,8 +77,14 @@ def test_the_settings_page_is_current():
         ("[design]\nharmonics = '3'\n", "design.harmonics: found '3', expected a valid integer"),
         ("[design]\nseed = true\n", "design.seed: found True, expected a valid integer"),
         ("[design]\nseconds = inf\n", "design.seconds: found inf, expected a finite number"),
-        ("[filter]\ncutoff_hz = 'none'\n", "filter.cutoff_hz: found 'none', expected 'auto' or a valid number"),
-        ("[filter]\ncutoff_hz = -1\n", "filter.cutoff_hz: found -1, expected 'auto' or greater than 0"),
+        (
+            "[filter]\ncutoff_hz = 'none'\n",
+            "filter.cutoff_hz: found 'none', expected 'auto' or a valid number",
+        ),
+        (
+            "[filter]\ncutoff_hz = -1\n",
+            "filter.cutoff_hz: found -1, expected 'auto' or greater than 0",
+        ),
         (
             "[design]\ncriterion = 'best'\n",
             "design.criterion: found 'best', expected 'log_det', 'condition' or 'scaled_condition'",
@@ -84,7 +97,10 @@ def test_the_settings_page_is_current():
             "[design.bounds.hip]\nangle_deg = [5, 70]\n",
             "design.bounds.hip.angle_deg: unknown key; did you mean angle_rad? (and 1 more)",
         ),
-        ("[design.bounds.hip]\nvelocity_rad_s = 1\n", "design.bounds.hip.angle_rad: missing; add it"),
+        (
+            "[design.bounds.hip]\nvelocity_rad_s = 1\n",
+            "design.bounds.hip.angle_rad: missing; add it",
+        ),
         ("run = []", "run: found no run, expected at least one; add a [[run]]"),
         (
             '[[mechanism.joints]]\nname = "a"\n[[mechanism.joints]]\nname = "a"\n',
@@ -101,7 +117,10 @@ def test_the_settings_page_is_current():
         ),
         (RUN + RUN, "run: found the name a twice, expected each once; rename one run"),
         (RUN.replace("name", "nam"), "run[0].nam: unknown key; did you mean name? (and 1 more)"),
-        (RUN.replace('"a"', '"a b"'), "run[0].name: found 'a b', expected text matching '^[a-z0-9][a-z0-9_]*$'"),
+        (
+            RUN.replace('"a"', '"a b"'),
+            "run[0].name: found 'a b', expected text matching '^[a-z0-9][a-z0-9_]*$'",
+        ),
     ],
 )
 def test_a_bad_key_is_one_line_with_its_path(tmp_path, text, told):
@@ -148,7 +167,10 @@ def test_bounds_in_degrees_are_refused_with_their_radians():
             'trajectory = "b.toml"',
             "run a.trajectory: .*b.toml: no such file",
         ),
-        ('[acquire]\nrig = "exoid.toml"\n[filter]\ncutoff_hz = 100.0', "filter.cutoff_hz: found 100, expected less"),
+        (
+            '[acquire]\nrig = "exoid.toml"\n[filter]\ncutoff_hz = 100.0',
+            "filter.cutoff_hz: found 100, expected less",
+        ),
     ],
 )
 def test_what_cannot_run_is_refused_before_anything_runs(tmp_path, text, complaint):

@@ -145,7 +145,9 @@ def test_fault_bits_are_told_by_their_names_and_those_without_by_their_number():
 def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
     line = "[line.leg]\ntransport = 'tls'\nca = 'secret/ca.pem'\n"
     text = (RIGS / "plain.toml").read_text().replace('map = "servo"', 'map = "servo"\nline = "leg"')
-    (tmp_path / "rig.toml").write_text(text.replace("[map.drive.servo]\n", line + "[map.drive.servo]\n"))
+    (tmp_path / "rig.toml").write_text(
+        text.replace("[map.drive.servo]\n", line + "[map.drive.servo]\n")
+    )
     rig = load_rig(tmp_path / "rig.toml")
     assert rig.line["leg"].ca == tmp_path / "secret" / "ca.pem"
     assert rig.public()["line"]["leg"]["transport"] == "tls"

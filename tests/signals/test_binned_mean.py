@@ -1,4 +1,5 @@
-"""A running mean is the mean of what stands in each bin, and of nothing where there is hardly anything."""
+"""A running mean is the mean of what stands in each bin, and of nothing where there is hardly
+anything."""
 
 import numpy as np
 import pytest
@@ -19,7 +20,9 @@ def test_each_bin_has_the_mean_of_its_own_values_both_ends_included():
 
 def test_bins_of_too_few_are_joined_and_what_lies_outside_counts_nowhere():
     rng = np.random.default_rng(1)
-    x = np.concatenate([rng.uniform(0.0, 0.1, 5 * FEWEST), rng.uniform(0.5, 1.0, FEWEST + 3), [-1.0, 2.0]])
+    x = np.concatenate(
+        [rng.uniform(0.0, 0.1, 5 * FEWEST), rng.uniform(0.5, 1.0, FEWEST + 3), [-1.0, 2.0]]
+    )
     places, means = binned_mean(x, 2.0 * x, 0.0, 1.0)
     assert 2 <= len(places) < BINS
     assert np.all(np.diff(places) > 0)

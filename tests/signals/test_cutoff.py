@@ -31,7 +31,10 @@ def test_more_noise_hides_more_of_the_signal():
     rng = np.random.default_rng(0)
     # Corners, as reversals of a sticking joint leave them: a spectrum without an end.
     rough = moving() + 0.02 * np.abs(np.sin(2 * np.pi * 0.5 * TIME)) ** 1.5
-    meets = [spectrum(rough + s * rng.standard_normal(len(TIME)), RATE_HZ).meets_floor_hz for s in (1e-6, 1e-5, 1e-4)]
+    meets = [
+        spectrum(rough + s * rng.standard_normal(len(TIME)), RATE_HZ).meets_floor_hz
+        for s in (1e-6, 1e-5, 1e-4)
+    ]
     assert meets[0] > meets[1] > meets[2]
 
 
@@ -42,9 +45,12 @@ def test_at_200_hz_the_cutoff_lies_above_the_highest_harmonic_and_below_a_sixtee
     assert chosen.reason.startswith("the hip angle's spectrum meets its noise floor")
 
 
-@pytest.mark.parametrize(("rate_hz", "highest"), [(50.0, 6.25), (100.0, 12.5), (200.0, 12.5), (500.0, 31.25)])
+@pytest.mark.parametrize(
+    ("rate_hz", "highest"), [(50.0, 6.25), (100.0, 12.5), (200.0, 12.5), (500.0, 31.25)]
+)
 def test_the_highest_cutoff_is_12_5_hz_between_100_and_200_hz(rate_hz, highest):
-    """At 100 Hz a cut-off of 6 Hz would smear the steps of friction beyond the samples that are left out."""
+    """At 100 Hz a cut-off of 6 Hz would smear the steps of friction beyond the samples that are
+    left out."""
     time = np.arange(0.0, 60.0, 1.0 / rate_hz)
     corners = np.abs(np.sin(2 * np.pi * 0.5 * time)) ** 1.5
     assert choose_cutoff(corners[:, None], rate_hz, ("hip",)).hz == pytest.approx(highest)
@@ -54,14 +60,20 @@ def test_the_noisier_joint_decides():
     rng = np.random.default_rng(0)
     both = np.column_stack([moving(), moving()])
     rough = both + 0.02 * np.abs(np.sin(2 * np.pi * 0.5 * TIME))[:, None] ** 1.5
-    coarse_hip = choose_cutoff(rough + rng.standard_normal(both.shape) * [1e-4, 1e-6], RATE_HZ, ("hip", "knee"))
-    alone = choose_cutoff(rough[:, :1] + 1e-4 * rng.standard_normal((len(TIME), 1)), RATE_HZ, ("hip",))
+    coarse_hip = choose_cutoff(
+        rough + rng.standard_normal(both.shape) * [1e-4, 1e-6], RATE_HZ, ("hip", "knee")
+    )
+    alone = choose_cutoff(
+        rough[:, :1] + 1e-4 * rng.standard_normal((len(TIME), 1)), RATE_HZ, ("hip",)
+    )
     assert "hip" in coarse_hip.reason
     assert coarse_hip.hz == pytest.approx(alone.hz, rel=0.3)
 
 
 def test_a_fast_joint_keeps_its_motion_beside_a_slow_one():
     noise = 1e-3 * np.random.default_rng(0).standard_normal((len(TIME), 2))
-    chosen = choose_cutoff(np.column_stack([moving(5, 0.1), moving(5, 1.0)]) + noise, RATE_HZ, ("hip", "knee"))
+    chosen = choose_cutoff(
+        np.column_stack([moving(5, 0.1), moving(5, 1.0)]) + noise, RATE_HZ, ("hip", "knee")
+    )
     assert chosen.hz > 5.0
     assert "knee moves" in chosen.reason

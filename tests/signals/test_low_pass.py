@@ -24,7 +24,12 @@ def test_the_cutoff_is_where_two_passes_leave_half_the_amplitude():
 def test_derivatives_of_a_sine_are_those_of_calculus(order):
     w = 2 * np.pi * 1.0
     exact = w * np.cos(w * TIME) if order == 1 else -(w**2) * np.sin(w * TIME)
-    assert_allclose(derivative(np.sin(w * TIME), RATE_HZ, order)[5:-5], exact[5:-5], rtol=0, atol=1e-5 * w**order)
+    assert_allclose(
+        derivative(np.sin(w * TIME), RATE_HZ, order)[5:-5],
+        exact[5:-5],
+        rtol=0,
+        atol=1e-5 * w**order,
+    )
 
 
 def test_derivatives_of_a_parabola_are_exact_to_the_very_edge():

@@ -1,4 +1,5 @@
-"""Legs to simulate: the paper's Table 3, a lighter one, and a recording of it made by its own drives."""
+"""Legs to simulate: the paper's Table 3, a lighter one, and a recording of it made by its own
+drives."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +28,10 @@ NAMES = ("hip", "knee")
 
 
 def leg(X, hip, knee) -> Model:
-    frictions = (Term(Friction(name), np.array(values)) for name, values in zip(NAMES, (hip, knee), strict=True))
+    frictions = (
+        Term(Friction(name), np.array(values))
+        for name, values in zip(NAMES, (hip, knee), strict=True)
+    )
     return Model((Term(RigidBody(), np.array(X)), *frictions))
 
 
@@ -43,7 +47,9 @@ def light() -> Plant:
 
 def rows_of(values, run: str, causes=()) -> pd.DataFrame:
     X, hip, knee = values
-    rows = [("rigid_body", f"X{i + 1}", f"X{i + 1}", None, run, x, "kg·m²") for i, x in enumerate(X)]
+    rows = [
+        ("rigid_body", f"X{i + 1}", f"X{i + 1}", None, run, x, "kg·m²") for i, x in enumerate(X)
+    ]
     for joint, pair in zip(NAMES, (hip, knee), strict=True):
         rows += [
             ("friction", name, symbol, joint, None, value, "N·m")
@@ -55,7 +61,9 @@ def rows_of(values, run: str, causes=()) -> pd.DataFrame:
             (effect.name, p.name, p.symbol, effect.joint, None, value, p.unit)
             for p, value in zip(effect.parameters, effect.physical(term.values), strict=True)
         ]
-    frame = pd.DataFrame(rows, columns=["effect", "name", "symbol", "joint", "run", "value", "unit"])
+    frame = pd.DataFrame(
+        rows, columns=["effect", "name", "symbol", "joint", "run", "value", "unit"]
+    )
     return frame.assign(std_error=0.1, ci95_low=0.0, ci95_high=1.0, step="inertia")
 
 
@@ -64,7 +72,10 @@ def parameters_file(tmp_path) -> Callable[..., Path]:
     """Write a parameters/1 file."""
 
     def write(values=TABLE3, run="with_human", causes=(), **metadata) -> Path:
-        path, geometry = tmp_path / "parameters.parquet", {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}
+        path, geometry = (
+            tmp_path / "parameters.parquet",
+            {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8},
+        )
         frame = rows_of(values, run, causes)
         own = {(t.effect.name, p.name) for t in causes for p in t.effect.parameters if p.per_run}
         frame["each_run"] = [row in own for row in zip(frame["effect"], frame["name"], strict=True)]
@@ -87,7 +98,9 @@ def driven() -> dict[str, np.ndarray]:
     plant = make_plant(leg(*LIGHT), Geometry(), HIP_AND_KNEE, "with_human")
     time = (np.arange(round(20 * RATE_HZ)) + 0.5) / RATE_HZ
     reference = excitation(time)
-    drives = make_drives(np.array(KP), np.array(KD), np.array(LIMIT), np.array([409600.0] * 2), 1000.0, RATE_HZ)
+    drives = make_drives(
+        np.array(KP), np.array(KD), np.array(LIMIT), np.array([409600.0] * 2), 1000.0, RATE_HZ
+    )
     loop = loop_at_rest(plant.assembly, reference[0])
     angle, velocity, torque, truth = follow(plant.assembly, drives, loop, reference, 0.0)
     return {"time": time, "reference": reference, "angle": angle, "velocity": velocity, "torque": torque,
@@ -96,21 +109,33 @@ def driven() -> dict[str, np.ndarray]:
 
 def controller() -> dict[str, Any]:
     return {
-        name: {"type": "pd", "kp_nm_rad": KP[j], "kd_nm_s_rad": KD[j], "rate_hz": 1000.0, "limit_nm": LIMIT[j]}
+        name: {
+            "type": "pd",
+            "kp_nm_rad": KP[j],
+            "kd_nm_s_rad": KD[j],
+            "rate_hz": 1000.0,
+            "limit_nm": LIMIT[j],
+        }
         for j, name in enumerate(NAMES)
     }
 
 
 @pytest.fixture
 def recording_file(tmp_path, driven) -> Callable[..., Path]:
-    """Write the driven leg as a recording/1 file; keywords change its metadata, None drops a key."""
+    """Write the driven leg as a recording/1 file; keywords change its metadata, None drops a
+    key."""
 
     def write(rows=slice(None), columns=(), **metadata) -> Path:
         frame = pd.DataFrame({"time_s": driven["time"]})
         for quantity, unit in (("angle", "rad"), ("torque", "nm"), ("reference", "rad")):
             for j, name in enumerate(NAMES):
                 frame[f"{name}_{quantity}_{unit}"] = driven[quantity][:, j]
-        about = {"run": "with_human", "purpose": "validate", "sample_rate_hz": RATE_HZ, "controller": controller()}
+        about = {
+            "run": "with_human",
+            "purpose": "validate",
+            "sample_rate_hz": RATE_HZ,
+            "controller": controller(),
+        }
         about = {key: value for key, value in (about | metadata).items() if value is not None}
         path = tmp_path / "recording.parquet"
         RECORDING.write(path, frame.drop(columns=list(columns)).iloc[rows], about)

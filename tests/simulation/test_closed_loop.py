@@ -15,8 +15,8 @@ SETTINGS = SimulateSettings()
 OVERPOWERED = SETTINGS.model_copy(update={"disturbance_nm": 400.0, "disturbance_rad_s": 1.0})
 """Stronger than the drives: nothing keeps the leg."""
 
-# Feedback gain, largest error of hip and knee after 5 s, rad: the reference case (docs/simulation.md).
-# Each to one digit more than the case prints where it prints fewer than four.
+# Feedback gain, largest error of hip and knee after 5 s, rad: the reference case
+# (docs/simulation.md). Each to one digit more than the case prints where it prints fewer than four.
 PUBLISHED = (
     (50, "0.104", "0.117"),
     (100, "0.020", "0.033"),
@@ -44,7 +44,12 @@ def test_the_gait_is_the_one_written_in_cosines():
     t = np.linspace(0, 4, 50)
     w = np.pi
     hip = 0.18 + 0.40 * np.cos(w * t - 0.2) - 0.06 * np.cos(2 * w * t + 0.6)
-    knee = -(0.46 + 0.28 * np.cos(w * t + 1.8) + 0.24 * np.cos(2 * w * t + 2.6) + 0.06 * np.cos(3 * w * t + 3.0))
+    knee = -(
+        0.46
+        + 0.28 * np.cos(w * t + 1.8)
+        + 0.24 * np.cos(2 * w * t + 2.6)
+        + 0.06 * np.cos(3 * w * t + 3.0)
+    )
     assert_allclose(gait().at(t)[0], np.column_stack([hip, knee]), atol=1e-14)
 
 
@@ -57,13 +62,17 @@ def test_the_error_falls_with_the_feedback_gain(light):
 def test_half_the_step_gives_the_same_error(table3):
     fine = SETTINGS.model_copy(update={"step_s": 0.0005})
     assert_allclose(
-        track(table3, fine, gait()).worst_error(5.0), track(table3, SETTINGS, gait()).worst_error(5.0), atol=2e-5
+        track(table3, fine, gait()).worst_error(5.0),
+        track(table3, SETTINGS, gait()).worst_error(5.0),
+        atol=2e-5,
     )
 
 
 def test_encoder_noise_repeats_with_its_seed(table3):
     def run(seed):
-        return track(table3, SETTINGS.model_copy(update={"encoder_noise_rad": 1e-4, "seed": seed}), gait())
+        return track(
+            table3, SETTINGS.model_copy(update={"encoder_noise_rad": 1e-4, "seed": seed}), gait()
+        )
 
     assert_array_equal(run(1).run.torque, run(1).run.torque)
     assert np.any(run(1).run.torque != run(2).run.torque)
@@ -80,7 +89,9 @@ def test_more_feedback_makes_more_torque_of_the_same_encoder_noise(table3):
 
 def test_a_loop_that_runs_away_says_which_joint_and_when(table3):
     loop = track(table3, OVERPOWERED, gait())
-    assert loop.ran_away == f"the simulated knee ran past one full turn at t = {loop.time[-1]:.3f} s"
+    assert (
+        loop.ran_away == f"the simulated knee ran past one full turn at t = {loop.time[-1]:.3f} s"
+    )
     assert np.all(np.isnan(loop.worst_error(5.0)))
     assert len(loop.frame()) == len(loop.time) < 10001
 

@@ -14,7 +14,9 @@ from tests.effects.catalogue import TERMS
 
 LIGHT = ((2.6, 0.63, 1.78, 5.7), (3.0, 4.0), (2.0, 3.0))
 IMPOSSIBLE = ((2.6, 0.63, 4.0, 5.7), (3.0, 4.0), (2.0, 3.0))
-CAUSES = {term.effect.name: term for term in TERMS if term.effect.name not in ("rigid_body", "friction")}
+CAUSES = {
+    term.effect.name: term for term in TERMS if term.effect.name not in ("rigid_body", "friction")
+}
 FIGURES = ("tracking", "error", "torque", "kv-sweep")
 
 
@@ -34,7 +36,9 @@ def quick(tmp_path):
 
     def write(*lines):
         path = tmp_path / "exoid.toml"
-        path.write_text("\n".join(["[simulate]", "figures = false", "sweep_nm_s_rad = [300.0]", *lines]))
+        path.write_text(
+            "\n".join(["[simulate]", "figures = false", "sweep_nm_s_rad = [300.0]", *lines])
+        )
         return path
 
     return write
@@ -46,7 +50,10 @@ def test_tracking_writes_the_loop_the_sweep_and_every_figure(exoid, parameters_f
     assert "hip" in out and "0.0103" in out and "0.0129" in out and "200.0" in out
     table = SIMULATION.read(tmp_path / "out" / "rbf.parquet")
     assert len(table.frame) == 10001
-    assert np.allclose(table.frame["hip_error_rad"], table.frame["hip_reference_rad"] - table.frame["hip_angle_rad"])
+    assert np.allclose(
+        table.frame["hip_error_rad"],
+        table.frame["hip_reference_rad"] - table.frame["hip_angle_rad"],
+    )
     about = table.metadata
     assert about["plant"]["effects"][0] == {
         "effect": "rigid_body", "X1": 10.3016, "X2": 3.0157, "X3": 2.2664, "X4": 5.5354
@@ -54,14 +61,20 @@ def test_tracking_writes_the_loop_the_sweep_and_every_figure(exoid, parameters_f
     assert about["controller"] == {"type": "rbf", "reference": "gait"}
     assert about["config"]["simulate"]["feedback_gain_nm_s_rad"] == 300.0 and about["seed"] == 0
     assert [made["name"] for made in about["inputs"]] == ["parameters.parquet"]
-    assert (tmp_path / "out" / "kv-sweep.csv").read_text().startswith("feedback_gain_nm_s_rad,hip_error_rad,")
+    assert (
+        (tmp_path / "out" / "kv-sweep.csv")
+        .read_text()
+        .startswith("feedback_gain_nm_s_rad,hip_error_rad,")
+    )
     for figure in FIGURES:
         assert (tmp_path / "out" / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
         assert (tmp_path / "out" / f"{figure}.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_tracking_can_be_read_by_a_program(exoid, parameters_file, quick, tmp_path):
-    code, out, _ = exoid("simulate", parameters_file(), "--config", quick(), "-o", tmp_path, "--json")
+    code, out, _ = exoid(
+        "simulate", parameters_file(), "--config", quick(), "-o", tmp_path, "--json"
+    )
     told = json.loads(out)
     assert code == 0 and told["largest_error_rad"]["hip"] == pytest.approx(0.010277, abs=1e-5)
     assert told["sweep"][0]["feedback_gain_nm_s_rad"] == 300.0
@@ -72,16 +85,32 @@ def test_a_reference_file_is_followed_instead_of_the_gait(exoid, parameters_file
         'unit = "rad"\nomega_rad_s = 3.0\ntheta0_rad = [0.2, -0.5]\na = [[0.2], [0.1]]\nb = [[0.0], [0.1]]\n'
     )
     reference = tmp_path / "wave.toml"
-    assert exoid("simulate", parameters_file(), "--config", quick(), "--reference", reference, "-o", tmp_path)[0] == 0
+    assert (
+        exoid(
+            "simulate",
+            parameters_file(),
+            "--config",
+            quick(),
+            "--reference",
+            reference,
+            "-o",
+            tmp_path,
+        )[0]
+        == 0
+    )
     table = SIMULATION.read(tmp_path / "rbf.parquet")
     assert table.metadata["controller"]["reference"] == "wave.toml"
     expected = 0.2 + 0.2 * np.sin(3.0 * table.frame["time_s"])
     assert np.allclose(table.frame["hip_reference_rad"], expected)
 
 
-def test_replay_of_the_true_model_stays_on_the_recording(exoid, parameters_file, recording_file, tmp_path):
+def test_replay_of_the_true_model_stays_on_the_recording(
+    exoid, parameters_file, recording_file, tmp_path
+):
     made = tmp_path / "replay.parquet"
-    code, out, err = exoid("simulate", parameters_file(LIGHT), "--replay", recording_file(), "-o", made, "--json")
+    code, out, err = exoid(
+        "simulate", parameters_file(LIGHT), "--replay", recording_file(), "-o", made, "--json"
+    )
     assert (code, err) == (0, "")
     told = json.loads(out)
     assert max(told["simulation_rmse_rad"].values()) < 1e-4
@@ -116,7 +145,9 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
 ):
     made, settings = tmp_path / "replay.parquet", quick()
     recording = recording_file(**changes)
-    code, _, err = exoid("simulate", parameters_file(LIGHT), "--config", settings, "--replay", recording, "-o", made)
+    code, _, err = exoid(
+        "simulate", parameters_file(LIGHT), "--config", settings, "--replay", recording, "-o", made
+    )
     assert (code, err) == (0, f"warning: no closed loop for {recording}: {told}")
     assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
 
@@ -125,14 +156,27 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
 def test_a_model_with_any_cause_is_simulated_and_replayed(
     exoid, parameters_file, recording_file, quick, tmp_path, cause
 ):
-    parameters, config = parameters_file(LIGHT, causes=[cause]), quick("duration_s = 2.0", "settled_after_s = 1.0")
+    parameters, config = (
+        parameters_file(LIGHT, causes=[cause]),
+        quick("duration_s = 2.0", "settled_after_s = 1.0"),
+    )
     assert exoid("simulate", parameters, "--config", config, "-o", tmp_path)[0] == 0
     tracked = SIMULATION.read(tmp_path / "rbf.parquet")
     assert cause.effect.label in [told["effect"] for told in tracked.metadata["plant"]["effects"]]
     # An angle sensor that is off lets the loop follow what it reads.
     assert tracked.frame.filter(like="_error_rad")[1000:].abs().to_numpy().max() < 0.1
     made = tmp_path / "replay.parquet"
-    code, out, _ = exoid("simulate", parameters, "--config", config, "--replay", recording_file(), "-o", made, "--json")
+    code, out, _ = exoid(
+        "simulate",
+        parameters,
+        "--config",
+        config,
+        "--replay",
+        recording_file(),
+        "-o",
+        made,
+        "--json",
+    )
     assert code == 0
     # The recorded leg has no such cause: in its drives' loop the model is off, and stays beside it.
     assert 1e-6 < max(json.loads(out)["closed_loop_rmse_nm"].values()) < 10.0
@@ -140,7 +184,11 @@ def test_a_model_with_any_cause_is_simulated_and_replayed(
 
 def told_of(label, *runs):
     """What a parameters/1 table tells of runs: (path of the recording, values)."""
-    return {label: [{"name": path.name, "sha256": sha256(path), "values": values} for path, values in runs]}
+    return {
+        label: [
+            {"name": path.name, "sha256": sha256(path), "values": values} for path, values in runs
+        ]
+    }
 
 
 ZEROED = Term(EncoderOffset("knee", each_run=True), np.array([0.1]))
@@ -148,7 +196,9 @@ ZEROED = Term(EncoderOffset("knee", each_run=True), np.array([0.1]))
 
 
 def replayed(exoid, parameters, config, recording, made):
-    code, out, err = exoid("simulate", parameters, "--config", config, "--replay", recording, "-o", made, "--json")
+    code, out, err = exoid(
+        "simulate", parameters, "--config", config, "--replay", recording, "-o", made, "--json"
+    )
     assert code == 0
     effects = {one.pop("effect"): one for one in SIMULATION.read(made).metadata["plant"]["effects"]}
     return json.loads(out)["simulation_rmse_rad"]["knee"], effects, err
@@ -161,13 +211,19 @@ def test_a_run_that_the_diagnosis_has_seen_is_replayed_with_its_own_values(
     other.write_bytes(b"another run")
     told = told_of("encoder_offset@knee", (other, {"offset": 0.1}), (recording, {"offset": 0.0}))
     parameters = parameters_file(LIGHT, causes=[ZEROED], each_run=told)
-    strayed, effects, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
+    strayed, effects, err = replayed(
+        exoid, parameters, quick(), recording, tmp_path / "replay.parquet"
+    )
     assert effects["encoder_offset@knee"] == {"offset": 0.0}
     assert (strayed < 1e-4, err) == (True, "")
     # Its motion is the same run, whatever it is called.
     motion = tmp_path / "renamed.parquet"
     assert exoid("filter", recording, "-o", motion)[0] == 0
-    assert replayed(exoid, parameters, quick(), motion, tmp_path / "again.parquet") == (strayed, effects, "")
+    assert replayed(exoid, parameters, quick(), motion, tmp_path / "again.parquet") == (
+        strayed,
+        effects,
+        "",
+    )
 
 
 def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_values_and_that_is_said(
@@ -180,7 +236,9 @@ def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_value
         LIGHT, causes=[ZEROED], each_run=told_of("encoder_offset@knee", (first, {"offset": 0.1}))
     )
     recording = recording_file()
-    strayed, effects, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
+    strayed, effects, err = replayed(
+        exoid, parameters, quick(), recording, tmp_path / "replay.parquet"
+    )
     assert effects["encoder_offset@knee"] == {"offset": 0.1} and strayed > 1e-3
     assert err == (
         f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none of {recording}; "
@@ -195,7 +253,11 @@ def test_what_never_came_in_a_run_is_not_there_when_it_is_replayed(
     recording, payload = recording_file(), CAUSES["payload_change"]
     told = told_of(payload.effect.label, (recording, {"time": None}))
     strayed, effects, err = replayed(
-        exoid, parameters_file(LIGHT, causes=[payload], each_run=told), quick(), recording, tmp_path / "replay.parquet"
+        exoid,
+        parameters_file(LIGHT, causes=[payload], each_run=told),
+        quick(),
+        recording,
+        tmp_path / "replay.parquet",
     )
     assert payload.effect.label not in effects
     assert (strayed < 1e-4, err) == (True, "")
@@ -204,7 +266,10 @@ def test_what_never_came_in_a_run_is_not_there_when_it_is_replayed(
 def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_that_is_said(
     exoid, parameters_file, recording_file, quick, tmp_path
 ):
-    parameters, recording = parameters_file(LIGHT, causes=[CAUSES["payload_change"]]), recording_file()
+    parameters, recording = (
+        parameters_file(LIGHT, causes=[CAUSES["payload_change"]]),
+        recording_file(),
+    )
     _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
     assert err.startswith(
         f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of {recording}; "
@@ -212,7 +277,9 @@ def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_t
     )
 
 
-def test_parameters_without_the_run_are_told_with_those_there_are(exoid, parameters_file, quick, tmp_path):
+def test_parameters_without_the_run_are_told_with_those_there_are(
+    exoid, parameters_file, quick, tmp_path
+):
     parameters = parameters_file(run="exo_alone")
     given = ("simulate", parameters, "--config", quick(), "-o", tmp_path / "out")
     code, _, err = exoid(*given, "--run", "with_human")
@@ -224,8 +291,12 @@ def test_parameters_without_the_run_are_told_with_those_there_are(exoid, paramet
     assert SIMULATION.read(tmp_path / "out" / "rbf.parquet").metadata["plant"]["run"] == "exo_alone"
 
 
-def test_parameters_of_no_real_leg_are_refused_with_the_reason(exoid, parameters_file, quick, tmp_path):
-    code, _, err = exoid("simulate", parameters_file(IMPOSSIBLE), "--config", quick(), "-o", tmp_path / "out")
+def test_parameters_of_no_real_leg_are_refused_with_the_reason(
+    exoid, parameters_file, quick, tmp_path
+):
+    code, _, err = exoid(
+        "simulate", parameters_file(IMPOSSIBLE), "--config", quick(), "-o", tmp_path / "out"
+    )
     assert (code, err) == (
         2,
         "exoid: the with_human parameters are no real leg: X2 (X1 - X2) = 1.241 is not above (L1 X3)² = 2.428 "
@@ -235,7 +306,9 @@ def test_parameters_of_no_real_leg_are_refused_with_the_reason(exoid, parameters
     assert not (tmp_path / "out").exists()
 
 
-def test_a_loop_that_runs_away_is_told_with_its_time_and_writes_nothing(exoid, parameters_file, quick, tmp_path):
+def test_a_loop_that_runs_away_is_told_with_its_time_and_writes_nothing(
+    exoid, parameters_file, quick, tmp_path
+):
     wild = quick("disturbance_nm = 400.0", "disturbance_rad_s = 1.0")
     code, _, err = exoid("simulate", parameters_file(), "--config", wild, "-o", tmp_path / "out")
     assert code == 2
@@ -258,7 +331,9 @@ def test_a_recording_in_place_of_parameters_is_told(exoid, recording_file, tmp_p
 
 def test_parameters_in_place_of_a_recording_are_told(exoid, parameters_file, tmp_path):
     parameters = parameters_file()
-    code, _, err = exoid("simulate", parameters, "--replay", parameters, "-o", tmp_path / "r.parquet")
+    code, _, err = exoid(
+        "simulate", parameters, "--replay", parameters, "-o", tmp_path / "r.parquet"
+    )
     assert code == 2
     assert err.startswith(f"exoid: {parameters}: holds parameters/1, expected motion/1")
 
@@ -266,7 +341,14 @@ def test_parameters_in_place_of_a_recording_are_told(exoid, parameters_file, tmp
 def test_reference_and_replay_exclude_each_other(exoid, parameters_file, recording_file, tmp_path):
     recording = recording_file()
     code, _, err = exoid(
-        "simulate", parameters_file(), "--replay", recording, "--reference", recording, "-o", tmp_path / "r.parquet"
+        "simulate",
+        parameters_file(),
+        "--replay",
+        recording,
+        "--reference",
+        recording,
+        "-o",
+        tmp_path / "r.parquet",
     )
     assert (code, err) == (
         2, "exoid: --reference and --replay exclude each other: a replay follows its recording; drop one"

@@ -1,4 +1,5 @@
-"""The paper's slips in the controller: the printed form fails, the mended one holds (docs/errata.md)."""
+"""The paper's slips in the controller: the printed form fails, the mended one holds
+(docs/errata.md)."""
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ LAMBDA = 10.0
 
 
 class Tracking:
-    """A moment of a leg under some torque: its reference, its state, and what eq. 13 makes of it."""
+    """A moment of a leg under some torque: its reference, its state, and what eq. 13 makes of
+    it."""
 
     def __init__(self, seed, geometry):
         draw = np.random.default_rng(seed)
@@ -61,11 +63,13 @@ def test_the_networks_inputs_are_the_wanted_angles_not_the_wanted_filtered_error
     nodes = np.linspace(-1.5, 1.5, 7)
 
     def activation(wanted):
-        inputs = np.concatenate([np.zeros((len(wanted), 2)), wanted], axis=1)  # on the reference e = de = 0
+        # On the reference e = de = 0.
+        inputs = np.concatenate([np.zeros((len(wanted), 2)), wanted], axis=1)
         return np.exp(-((inputs[:, np.newaxis] - nodes[:, np.newaxis]) ** 2).sum(axis=2) / 10.0**2)
 
     angles = np.stack(gait().at(np.linspace(0, 2, 50)), axis=1)[:, :, 0]
-    # What is wanted of q = de + Lambda e is zero at all times: such a network could only learn one constant.
+    # What is wanted of q = de + Lambda e is zero at all times: such a network could only learn one
+    # constant.
     assert np.ptp(activation(np.zeros_like(angles)), axis=0).max() == 0.0
     assert np.ptp(activation(angles), axis=0).max() > 0.1
 
@@ -73,7 +77,9 @@ def test_the_networks_inputs_are_the_wanted_angles_not_the_wanted_filtered_error
 def test_the_torque_is_network_plus_feedback_not_equal_to_it(table3):
     settings = SimulateSettings()
     with_network = track(table3, settings, gait()).worst_error(5.0)
-    without = track(table3, settings.model_copy(update={"adaptation_gain": 0.0}), gait()).worst_error(5.0)
+    without = track(
+        table3, settings.model_copy(update={"adaptation_gain": 0.0}), gait()
+    ).worst_error(5.0)
     assert np.all(with_network < without)
 
 
@@ -87,9 +93,12 @@ def test_the_robust_term_needs_the_bound_of_the_disturbance_and_the_1_norm():
         disturbance = draw.uniform(-disturbance_bound, disturbance_bound, 2)
         v = -(error_bound + disturbance_bound) * np.sign(r)
         assert r @ v == pytest.approx(-(error_bound + disturbance_bound) * np.abs(r).sum())
-        assert abs(r @ v) > (error_bound + disturbance_bound) * np.linalg.norm(r)  # so not the 2-norm
+        # So not the 2-norm.
+        assert abs(r @ v) > (error_bound + disturbance_bound) * np.linalg.norm(r)
         assert r @ (error + disturbance + v) <= 0
-        printed_feeds_energy |= r @ (error + disturbance - (error_bound + disturbance) * np.sign(r)) > 0
+        printed_feeds_energy |= (
+            r @ (error + disturbance - (error_bound + disturbance) * np.sign(r)) > 0
+        )
     assert printed_feeds_energy
 
 
@@ -108,20 +117,27 @@ def test_the_adaptive_law_is_that_of_the_estimate():
 
 
 def test_from_300_to_500_the_error_falls_by_less_than_a_hundredth(table3):
-    errors = sweep(table3, SimulateSettings(), gait(), (300.0, 500.0))[["hip_error_rad", "knee_error_rad"]].to_numpy()
+    errors = sweep(table3, SimulateSettings(), gait(), (300.0, 500.0))[
+        ["hip_error_rad", "knee_error_rad"]
+    ].to_numpy()
     assert np.all(errors[0] - errors[1] > 0) and np.all(errors[0] - errors[1] < 0.01)
 
 
 def test_the_loop_depends_on_time_so_that_lasalles_theorem_says_nothing_of_it(table3):
     def rate_at_rest_on_the_reference(t):
-        """M dr where e, de and all weights are zero: the same state of the loop, at different times."""
+        """M dr where e, de and all weights are zero: the same state of the loop, at different
+        times."""
         qd, dqd, ddqd = (x[0] for x in gait().at(t))
         g = table3.geometry
         return (
-            LEG.mass_matrix(qd, X, g) @ ddqd + LEG.coriolis_matrix(qd, dqd, X, g) @ dqd + LEG.gravity_torque(qd, X, g)
+            LEG.mass_matrix(qd, X, g) @ ddqd
+            + LEG.coriolis_matrix(qd, dqd, X, g) @ dqd
+            + LEG.gravity_torque(qd, X, g)
         )
 
-    assert np.abs(rate_at_rest_on_the_reference(0.0) - rate_at_rest_on_the_reference(0.7)).max() > 1.0
+    assert (
+        np.abs(rate_at_rest_on_the_reference(0.0) - rate_at_rest_on_the_reference(0.7)).max() > 1.0
+    )
 
 
 def test_the_limit_is_reached_where_the_proof_has_none(table3):

@@ -37,7 +37,9 @@ class Chain:
             step.target.write_text(json.dumps({"contract": "x/1", "provenance": told}))
 
     def states(self) -> dict[str, tuple[str, tuple[str, ...]]]:
-        return {one.step.stage: (one.state.value, one.why) for one in Judge(self.folder).all(self.steps)}
+        return {
+            one.step.stage: (one.state.value, one.why) for one in Judge(self.folder).all(self.steps)
+        }
 
 
 @pytest.fixture
@@ -54,7 +56,10 @@ def test_what_was_made_of_what_is_there_is_done_whatever_the_times(chain):
 
 def test_another_input_makes_stale_what_was_made_of_it_and_what_follows(chain):
     chain.source.write_text("2")
-    assert chain.states() == {"one": ("stale", ("source.json has changed",)), "two": ("stale", ("waits for one",))}
+    assert chain.states() == {
+        "one": ("stale", ("source.json has changed",)),
+        "two": ("stale", ("waits for one",)),
+    }
 
 
 def test_another_setting_is_named_with_both_values_and_changed_back_it_is_forgotten(chain):
@@ -138,7 +143,9 @@ def test_a_step_is_done_where_all_its_files_are_there(chain):
 
 def test_a_file_that_a_result_tells_of_as_made_with_it_must_be_there(chain):
     second = chain.steps[1]
-    second.target.write_text(json.dumps({"provenance": describe(second.inputs) | {"beside": ["loop.json"]}}))
+    second.target.write_text(
+        json.dumps({"provenance": describe(second.inputs) | {"beside": ["loop.json"]}})
+    )
     assert chain.states()["two"] == ("stale", ("loop.json is missing",))
     (chain.folder / "loop.json").touch()
     assert chain.states()["two"] == ("done", ())

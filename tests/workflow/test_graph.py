@@ -1,4 +1,5 @@
-"""The experiment's graph of files: what a change re-runs, with stand-ins for the commands that take minutes."""
+"""The experiment's graph of files: what a change re-runs, with stand-ins for the commands that take
+minutes."""
 
 import os
 import shutil
@@ -37,7 +38,8 @@ esac
 
 
 class Make:
-    """make in a new experiment's folder; each call returns the commands that ran, by their first word."""
+    """make in a new experiment's folder; each call returns the commands that ran, by their first
+    word."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -50,7 +52,12 @@ class Make:
         """Return the whole commands that ran."""
         self.log.write_text("")
         environment = {**os.environ, "LOG": str(self.log), "MAKEFLAGS": ""}
-        subprocess.run(["make", "-C", str(self.folder), *arguments], check=True, env=environment, capture_output=True)
+        subprocess.run(
+            ["make", "-C", str(self.folder), *arguments],
+            check=True,
+            env=environment,
+            capture_output=True,
+        )
         return self.log.read_text().splitlines()
 
     def change(self, old: str, new: str) -> None:
@@ -193,13 +200,21 @@ def test_a_run_with_an_excitation_of_its_own_heeds_it_alone(make):
 def test_without_a_run_to_validate_on_nothing_is_diagnosed(make):
     path = make.folder / "exoid.toml"
     path.write_text(path.read_text().replace('purpose = "validate"', 'purpose = "train"'))
-    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, "identify", "simulate", "report"])
+    assert sorted(make()) == sorted(
+        ["design", *["acquire", "filter"] * 4, "identify", "simulate", "report"]
+    )
 
 
 def test_clean_keeps_the_recordings(make):
     make()
     make("clean")
-    assert {path.name for path in make.folder.iterdir()} == {"Makefile", "exoid.toml", "log", "recordings", "rigs"}
+    assert {path.name for path in make.folder.iterdir()} == {
+        "Makefile",
+        "exoid.toml",
+        "log",
+        "recordings",
+        "rigs",
+    }
 
 
 def test_init_overwrites_nothing(make):

@@ -1,4 +1,5 @@
-"""A person moves the leg and presses the cuffs as told; the registers are watched. The drives are disabled."""
+"""A person moves the leg and presses the cuffs as told; the registers are watched. The drives are
+disabled."""
 
 import asyncio
 import time
@@ -31,10 +32,17 @@ CLEAR = 3.0
 """How much more than another one a channel moves that is meant."""
 HARDLY_RAD = 1e-4
 MOTIONS = {
-    "hip": ("keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it come back", 1.0),
-    "knee": ("hold the thigh still, bend the knee by 10 to 40 degrees and straighten it again", -1.0),
+    "hip": (
+        "keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it come back",
+        1.0,
+    ),
+    "knee": (
+        "hold the thigh still, bend the knee by 10 to 40 degrees and straighten it again",
+        -1.0,
+    ),
 }
-"""What is asked for of each joint, and the sign of the angle that it makes: see docs/contracts.md."""
+"""What is asked for of each joint, and the sign of the angle that it makes: see
+docs/contracts.md."""
 
 
 class Operator(Protocol):
@@ -57,7 +65,9 @@ async def by_hand(
         Samples a second, in lockstep.
     """
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
-    await operator.ready("Hold the leg: its drives are disabled now, and stay so. Nobody is in the machine.")
+    await operator.ready(
+        "Hold the leg: its drives are disabled now, and stay so. Nobody is in the machine."
+    )
     for probe in probes:
         await probe.read()
         if isinstance(probe.part, Drive):
@@ -75,7 +85,9 @@ async def by_hand(
             f"{probe.place}: press on the inside of this cuff, {inside}, as the leg would, and let go."
         )
         least = PUSH_SHARE * rig.safety.cuff_force_n
-        pressed = await _watch(sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives)
+        pressed = await _watch(
+            sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives
+        )
         findings += _judge_push(probe, -1.0 if front else 1.0, pressed, least)
     return findings
 
@@ -86,7 +98,8 @@ async def _watch(
     least: float,
     also: Sequence[Probe] = (),
 ) -> dict[Probe, Series]:
-    """Keep reading until something has moved by ``least`` and come back, or patience ends; return what was read.
+    """Keep reading until something has moved by ``least`` and come back, or patience ends; return
+    what was read.
 
     In lockstep all drives must go on for any device to do so: those of ``also`` do too.
     """
@@ -116,7 +129,9 @@ def _peak(values: NDArray) -> float:
     return float(away[np.argmax(np.abs(away))])
 
 
-def _judge_motion(asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None) -> Iterator[Finding]:
+def _judge_motion(
+    asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None
+) -> Iterator[Finding]:
     peaks = {probe: _peak(series.of("angle")) for probe, series in moved.items()}
     found = max(peaks, key=lambda probe: abs(peaks[probe]))
     peak, where, register = peaks[asked], f"{asked.map_path}.read", asked.block.registers["angle"]
@@ -151,7 +166,11 @@ def _judge_motion(asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz
             for unit in DIMENSION["angle"]
             if SWING_RAD[0] <= abs(peak) * UNITS[unit] / UNITS[register.unit] <= SWING_RAD[1]
         ]
-        mended = f'with unit = "{units[0]}" it would be plausible: correct' if units else "compare the manual with"
+        mended = (
+            f'with unit = "{units[0]}" it would be plausible: correct'
+            if units
+            else "compare the manual with"
+        )
         yield Finding(
             asked.name,
             f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected {SWING_RAD[0]:g} to "
@@ -162,19 +181,31 @@ def _judge_motion(asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz
     if velocity:
         series = moved[asked]
         fresh = series.fresh
-        t = np.arange(len(fresh)) / rate_hz if asked.in_lockstep and rate_hz else series.answered[fresh]
+        t = (
+            np.arange(len(fresh)) / rate_hz
+            if asked.in_lockstep and rate_hz
+            else series.answered[fresh]
+        )
         yield from check_velocity(
             asked.name, where, velocity, t, series.of("angle")[fresh], series.of("velocity")[fresh]
         )
 
 
 def _shared(asked: Probe, moved: dict[Probe, Series]) -> str:
-    others = [probe.name for probe in moved if probe is not asked and probe.map_path == asked.map_path]
+    others = [
+        probe.name for probe in moved if probe is not asked and probe.map_path == asked.map_path
+    ]
     return f" (in a map of its own where {others[0]} is right)" if others else ""
 
 
-def _judge_push(asked: Probe, sign: float, pressed: dict[Probe, Series], least: float) -> Iterator[Finding]:
-    peaks = {(probe, axis): _peak(series.of(axis)[series.fresh]) for probe, series in pressed.items() for axis in AXES}
+def _judge_push(
+    asked: Probe, sign: float, pressed: dict[Probe, Series], least: float
+) -> Iterator[Finding]:
+    peaks = {
+        (probe, axis): _peak(series.of(axis)[series.fresh])
+        for probe, series in pressed.items()
+        for axis in AXES
+    }
     (found, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
     where = f"{asked.map_path}.read"
     if abs(peak) < least:

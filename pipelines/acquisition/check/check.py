@@ -38,7 +38,8 @@ def check_rig(
     path : Path
         The rig's description. An embedded rig is started first.
     rate_hz : float, optional
-        Samples a second that an experiment asks for; else a virtual rig's own, and of a real one what it has.
+        Samples a second that an experiment asks for; else a virtual rig's own, and of a real one
+        what it has.
     run : str
         Whether somebody is in the machine: only an empty one shows its sensors' zeros.
     operator : Operator, optional
@@ -59,20 +60,24 @@ def check_rig(
     if rate_hz is None and rig.plant:
         rate_hz = rig.plant.sample_rate_hz
     if move and rate_hz is None and rig.sampling == "recorder":
-        raise SettingsError("--rate-hz: missing; of a rig that records by itself it is not known how often it is told")
+        raise SettingsError(
+            "--rate-hz: missing; of a rig that records by itself it is not known how often it is told"
+        )
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        # Who only asks loads the devices too, and would judge what another run makes of them. The movement holds the
-        # lines itself.
+        # Who only asks loads the devices too, and would judge what another run makes of them. The
+        # movement holds the lines itself.
         with alone(present):
             report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
         if move and not report.findings:
             try:
                 if not report.by_hand:
                     refuse_far_from_zero(start)
-                report.answers, report.findings = guided(present, start, rate_hz or _counted(report), run)
+                report.answers, report.findings = guided(
+                    present, start, rate_hz or _counted(report), run
+                )
             except InputError as error:  # what was found out before must not be lost with it
                 report.findings.append(Finding("rig", str(error)))
         return report
@@ -121,6 +126,8 @@ async def _check(
                 report.findings += await by_hand(probes_of(machine), rig, rate_hz, operator)
             except DeviceError as error:
                 report.findings.append(Finding("rig", str(error)))
-        return report, [] if report.findings else [(await drive.look()).angle for drive in machine.drives]
+        return report, [] if report.findings else [
+            (await drive.look()).angle for drive in machine.drives
+        ]
     finally:
         machine.close()

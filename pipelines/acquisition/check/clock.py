@@ -1,4 +1,5 @@
-"""Whether the sample counter counts, and the device's clock tells the time of its counter and of the host."""
+"""Whether the sample counter counts, and the device's clock tells the time of its counter and of
+the host."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +16,8 @@ from pipelines.settings.rig import DIMENSION, UNITS
 RATES_HZ = (0.5, 1e5)
 """Sample rates that a device may have, where none is known."""
 OFTEN = 3.0
-"""Answers for each step of the counter from which on a step of more than one is a step of the device's own."""
+"""Answers for each step of the counter from which on a step of more than one is a step of the
+device's own."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
     )
 
 
-def check_clock(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None) -> Iterator[Finding]:
+def check_clock(
+    probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
+) -> Iterator[Finding]:
     """Yield what is wrong with the counter, else what is wrong with the clock.
 
     Parameters
@@ -65,7 +69,9 @@ def check_clock(probe: Probe, series: Series, clock: Clock, seconds: float, rate
         yield from _time(probe, series, clock, seconds)
 
 
-def _counter(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None) -> Iterator[Finding]:
+def _counter(
+    probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
+) -> Iterator[Finding]:
     counter, where = series.counted("sequence"), f"{probe.map_path}.read.sequence"
     steps = np.diff(counter)
     if _counts(counter, seconds, rate_hz):
@@ -77,12 +83,20 @@ def _counter(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz
                 f"{where}.scale, or let the device count samples",
             )
         return
-    mended = remedy("sequence", "", where, series, lambda v: _counts(v, seconds, rate_hz), counts=True)
+    mended = remedy(
+        "sequence", "", where, series, lambda v: _counts(v, seconds, rate_hz), counts=True
+    )
     if mended:
-        yield Finding(probe.name, f"its counter reads {counter[0]:.6g}, then {counter[-1]:.6g}; {mended}")
+        yield Finding(
+            probe.name, f"its counter reads {counter[0]:.6g}, then {counter[-1]:.6g}; {mended}"
+        )
     elif not steps.any():
         others = np.delete(series.words, _places(series, "sequence"), axis=1)
-        alive = "though other registers change" if (others != others[0]).any() else "and nothing else changes either"
+        alive = (
+            "though other registers change"
+            if (others != others[0]).any()
+            else "and nothing else changes either"
+        )
         yield Finding(
             probe.name,
             f"its counter stands still at {counter[-1]:g} for {seconds:.2g} s, {alive}; is it sampling? "
@@ -95,7 +109,10 @@ def _counter(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz
             f"compare {where} with the device's manual",
         )
     else:
-        found, expected = (counter[-1] - counter[0]) / seconds, f"{rate_hz:g}" if rate_hz else "a sample rate"
+        found, expected = (
+            (counter[-1] - counter[0]) / seconds,
+            f"{rate_hz:g}" if rate_hz else "a sample rate",
+        )
         yield Finding(
             probe.name,
             f"its counter goes up by {found:.4g} a second, expected {expected}; set the device's rate or "
@@ -123,11 +140,14 @@ def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterato
     found = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
         if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
-            yield Finding(probe.name, f'{found}; with unit = "{unit}" the two agree: correct {where}')
+            yield Finding(
+                probe.name, f'{found}; with unit = "{unit}" the two agree: correct {where}'
+            )
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
     yield Finding(
-        probe.name, f"{found}; {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}"
+        probe.name,
+        f"{found}; {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
     )
 
 
@@ -139,11 +159,15 @@ def _keeps_time(time: NDArray, seconds: float) -> bool:
     if not np.isfinite(time).all() or (np.diff(time) < 0).any():
         return False
     # A sample more or less at either end.
-    return bool(abs(time[-1] - time[0] - seconds) <= RATE_TOLERANCE * seconds + 2.0 * np.diff(time).max(initial=0.0))
+    return bool(
+        abs(time[-1] - time[0] - seconds)
+        <= RATE_TOLERANCE * seconds + 2.0 * np.diff(time).max(initial=0.0)
+    )
 
 
 def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
-    """Yield a finding where registers change while the counter does not: they are not latched at one instant."""
+    """Yield a finding where registers change while the counter does not: they are not latched at
+    one instant."""
     if len(series.fresh) < 2:  # a counter that stands still says nothing of a latch
         return
     same = np.diff(series.words[:, _places(series, "sequence")], axis=0) == 0

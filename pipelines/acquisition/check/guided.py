@@ -1,4 +1,5 @@
-"""A small slow movement by the drives themselves, made and watched by the machinery that records every run."""
+"""A small slow movement by the drives themselves, made and watched by the machinery that records
+every run."""
 
 import json
 import shutil
@@ -27,7 +28,8 @@ ROOM_RAD = 0.1
 """How far beyond the movement an angle may go before it is stopped, within the rig's own limits."""
 SPEED_RAD_S = 1.0
 NEAR_ZERO_RAD = 0.1
-"""How far from zero a joint may stand: where a sign is wrong, its drive leaps by twice that when it is enabled."""
+"""How far from zero a joint may stand: where a sign is wrong, its drive leaps by twice that when it
+is enabled."""
 LONGEST_DELAY_S = 0.3
 GAIN = 0.25
 """How far the angle's answer to the set-point may be from one."""
@@ -53,7 +55,8 @@ class Answer:
 
 
 def refuse_far_from_zero(angles: Sequence[float]) -> None:
-    """Refuse to enable drives whose signs nobody has seen, where a wrong one would make them leap."""
+    """Refuse to enable drives whose signs nobody has seen, where a wrong one would make them
+    leap."""
     for joint, angle in zip(JOINTS, angles, strict=True):
         if abs(angle) > NEAR_ZERO_RAD:
             raise SettingsError(
@@ -62,7 +65,9 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
             )
 
 
-def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -> tuple[list[Answer], list[Finding]]:
+def guided(
+    rig: RigSettings, start: Sequence[float], rate_hz: float, run: str
+) -> tuple[list[Answer], list[Finding]]:
     """Move each joint a little to and fro about where it stands, and judge its answer.
 
     Parameters
@@ -78,18 +83,28 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
     seen: list[Progress] = []
     try:
         with _folder() as folder:
-            rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
+            rig_file, excitation, output = (
+                folder / "rig.toml",
+                folder / "excitation.toml",
+                folder / "guided.parquet",
+            )
             rig_file.write_text(_toml_file(_tight(rig, start)))
             excitation.write_text(_toml_file(_motion(start)))
             acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
             table = RECORDING.read(output)
     except DeviceError as error:
-        return [], [Finding("rig", f"the guided movement was stopped: {error}"), *_first_signs(rig, seen)]
+        return [], [
+            Finding("rig", f"the guided movement was stopped: {error}"),
+            *_first_signs(rig, seen),
+        ]
     frame, recorded_hz = table.frame, table.metadata["sample_rate_hz"]
     reference = _sent(np.asarray(frame["time_s"], float), start)
     answers, findings = [], list[Finding]()
     for j, drive in enumerate(rig.drive):
-        columns = {name: np.asarray(frame[f"{drive.joint}_{name}"], float) for name in ("angle_rad", "torque_nm")}
+        columns = {
+            name: np.asarray(frame[f"{drive.joint}_{name}"], float)
+            for name in ("angle_rad", "torque_nm")
+        }
         gains, delay = _answer(columns["angle_rad"], reference, recorded_hz)
         speed = np.gradient(reference[:, j]) * recorded_hz * np.sign(gains[j])
         torque = float(np.corrcoef(columns["torque_nm"], speed)[0, 1])
@@ -100,12 +115,14 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
 
 @contextmanager
 def _folder() -> Iterator[Path]:
-    """Make a folder for as long as a block lasts; it stays where somebody may want what is in it."""
+    """Make a folder for as long as a block lasts; it stays where somebody may want what is in
+    it."""
     folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
     try:
         yield folder
     except (ExoidError, KeyboardInterrupt) as error:
-        # Of what was refused nothing has moved; of what was stopped, the message names the samples, if there are any.
+        # Of what was refused nothing has moved; of what was stopped, the message names the samples,
+        # if there are any.
         if isinstance(error, InputError) or str(folder) not in str(error):
             shutil.rmtree(folder)
         raise
@@ -113,12 +130,16 @@ def _folder() -> Iterator[Path]:
 
 
 def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
-    """Return the rig's settings with limits about where the leg stands, within those with somebody in the machine."""
+    """Return the rig's settings with limits about where the leg stands, within those with somebody
+    in the machine."""
     room, careful = AMPLITUDE_RAD + ROOM_RAD, rig.in_force("with_human")
     drives = tuple(
         drive.model_copy(
             update={
-                "angle_rad": (max(drive.angle_rad[0], angle - room), min(drive.angle_rad[1], angle + room)),
+                "angle_rad": (
+                    max(drive.angle_rad[0], angle - room),
+                    min(drive.angle_rad[1], angle + room),
+                ),
                 "speed_rad_s": min(drive.speed_rad_s, SPEED_RAD_S),
             }
         )
@@ -142,7 +163,8 @@ def _motion(start: Sequence[float]) -> dict[str, Any]:
 
 
 def _sent(t: NDArray, start: Sequence[float]) -> NDArray:
-    """Return the set-points (n, J) at instants (n,) since the recording began, which is in phase with the motion.
+    """Return the set-points (n, J) at instants (n,) since the recording began, which is in phase
+    with the motion.
 
     Not those of the recording: they are the drive's own where it tells them, in a unit of its own.
     """
@@ -157,7 +179,9 @@ def _toml_file(settings: dict[str, Any]) -> str:
 def _toml(value: Any) -> str:
     """Write a value on one line; what is no table is written as JSON is."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(one)}" for key, one in value.items()) + "}"
+        return (
+            "{" + ", ".join(f"{json.dumps(key)} = {_toml(one)}" for key, one in value.items()) + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return json.dumps(value)
@@ -176,7 +200,12 @@ def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray
 
 def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator[Finding]:
     drive, other = rig.drive[j], rig.drive[1 - j]
-    name, where, gain, across = f"drive {drive.joint}", f"map.drive.{drive.map}", gains[j], gains[1 - j]
+    name, where, gain, across = (
+        f"drive {drive.joint}",
+        f"map.drive.{drive.map}",
+        gains[j],
+        gains[1 - j],
+    )
     if abs(gain) < GAIN and abs(across) > 1.0 - GAIN:
         yield Finding(
             name,
@@ -185,7 +214,10 @@ def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator
             "angle",
         )
     elif abs(gain) < GAIN:
-        yield Finding(name, f"its angle does not follow its set-point (it goes {gain:.2f} as far); is it enabled?")
+        yield Finding(
+            name,
+            f"its angle does not follow its set-point (it goes {gain:.2f} as far); is it enabled?",
+        )
     elif gain < 0:
         yield Finding(
             name,

@@ -1,4 +1,5 @@
-"""Other meanings of the same bits: what a value would be if its register were described another way."""
+"""Other meanings of the same bits: what a value would be if its register were described another
+way."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -36,7 +37,10 @@ def interpretations(name: str, block: Block) -> Iterator[Interpretation]:
 def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
     was = block.registers[name]
     taken = {
-        a for other, r in block.registers.items() if other != name for a in range(r.address, r.address + r.registers)
+        a
+        for other, r in block.registers.items()
+        if other != name
+        for a in range(r.address, r.address + r.registers)
     }
     for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
         end = was.address + REGISTERS[kind]
@@ -49,7 +53,11 @@ def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
             update["word_order"] = order
         if kind != was.type:
             update["type"] = kind
-        cost = 2 * swapped + sum(_COST.get(key, 2) for key in update) + (REGISTERS[kind] != REGISTERS[was.type])
+        cost = (
+            2 * swapped
+            + sum(_COST.get(key, 2) for key in update)
+            + (REGISTERS[kind] != REGISTERS[was.type])
+        )
         if kind.startswith("float") and not was.type.startswith("float") and was.scale != 1.0:
             update["scale"] = 1.0  # a float needs no counts: it comes in its unit
         yield was.model_copy(update=update), swapped, _written(update, swapped), cost
@@ -59,14 +67,24 @@ def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
 
 
 def _written(update: dict, swapped: bool) -> str:
-    keys = [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:g}" for key, value in update.items()]
+    keys = [
+        f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:g}"
+        for key, value in update.items()
+    ]
     return " and ".join(keys + ["the two bytes of each register swapped"] * swapped)
 
 
 def remedy(
-    name: str, unit: str, where: str, series: Series, plausible: Callable[[NDArray], bool], *, counts: bool = False
+    name: str,
+    unit: str,
+    where: str,
+    series: Series,
+    plausible: Callable[[NDArray], bool],
+    *,
+    counts: bool = False,
 ) -> str | None:
-    """Say which other description of a register would be plausible, and what to correct; None where none is.
+    """Say which other description of a register would be plausible, and what to correct; None where
+    none is.
 
     Parameters
     ----------
@@ -83,13 +101,17 @@ def remedy(
     for one in interpretations(name, series.block):
         if best and one.cost > best[0][0].cost:
             break
-        values = (series.counted if counts else series.of)(name, one.register, bytes_swapped=one.bytes_swapped)
+        values = (series.counted if counts else series.of)(
+            name, one.register, bytes_swapped=one.bytes_swapped
+        )
         # A row of zeros can always be true, and explains nothing.
         if values.any() and plausible(values):
             best.append((one, float(values[-1])))
     if not best:
         return None
-    named = ", or ".join(f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:MOST_NAMED])
+    named = ", or ".join(
+        f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:MOST_NAMED]
+    )
     if all(one.bytes_swapped for one, _ in best[:MOST_NAMED]):
         return f"{named}: Modbus sends the high byte first; set the device to that, then compare {where}"
     return f"{named}: correct {where}"

@@ -18,14 +18,22 @@ class Latency:
     p99: float
     most: float
     histogram: tuple[int, ...]
-    """How many fall into each of ``BINS`` equal steps from least to most, on a logarithmic scale."""
+    """How many fall into each of ``BINS`` equal steps from least to most, on a logarithmic
+    scale."""
 
     @classmethod
     def of(cls, durations: NDArray) -> "Latency":
         """Sum durations (n,) up."""
         least, median, p99, most = np.quantile(durations, [0.0, 0.5, 0.99, 1.0])
         counts, _ = np.histogram(np.log(durations), BINS, (np.log(least), np.log(most) + 1e-12))
-        return cls(len(durations), float(least), float(median), float(p99), float(most), tuple(counts.tolist()))
+        return cls(
+            len(durations),
+            float(least),
+            float(median),
+            float(p99),
+            float(most),
+            tuple(counts.tolist()),
+        )
 
     def as_json(self) -> dict:
         """Return the numbers in milliseconds."""

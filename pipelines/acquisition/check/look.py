@@ -78,7 +78,13 @@ class RigReport:
             "moved": [asdict(answer) for answer in self.answers],
             "devices": [device.as_json() for device in self.devices],
             **{
-                name: {"cycles_hz": rate.cycles_hz, "late": rate.late, "cycle": rate.cycle.as_json()} if rate else None
+                name: {
+                    "cycles_hz": rate.cycles_hz,
+                    "late": rate.late,
+                    "cycle": rate.cycle.as_json(),
+                }
+                if rate
+                else None
                 for name, rate in rates.items()
             },
             "findings": [asdict(finding) for finding in self.findings],
@@ -108,7 +114,9 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     probes = probes_of(machine)
     lost = await _connect(probes)
     for line, why in lost.items():
-        report.findings.append(_told_by(why, [probe for probe in probes if probe.part.device.line is line]))
+        report.findings.append(
+            _told_by(why, [probe for probe in probes if probe.part.device.line is line])
+        )
     for probe in probes:
         device = DeviceReport(probe.name, probe.part.device.label)
         report.devices.append(device)
@@ -128,7 +136,9 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     if len(present) == len(report.devices) or machine.rig.clock == "real_time":
         report.findings += await _ask_together(list(present), report)
     for probe, (device, still) in present.items():
-        report.findings += _judged(probe, device, still, probe.taken(), machine.rig, rate_hz, alone=alone)
+        report.findings += _judged(
+            probe, device, still, probe.taken(), machine.rig, rate_hz, alone=alone
+        )
     report.findings += _counters_differ([device for device, _ in present.values()])
     if machine.rig.sampling == "recorder" and not report.findings:
         report.findings += await check_rings(machine, list(present), rate_hz)
@@ -136,7 +146,8 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
 
 
 async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
-    """Open all lines at once, as each may take its time to fail; return why those are not there that are not."""
+    """Open all lines at once, as each may take its time to fail; return why those are not there
+    that are not."""
     lines = list({probe.part.device.line: None for probe in probes})
     ended = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
     lost = {}
@@ -196,9 +207,11 @@ def _judged(
     *,
     alone: bool,
 ) -> list[Finding]:
-    """Judge the answers of one device: those to itself alone, and those in cycles, sample after sample."""
+    """Judge the answers of one device: those to itself alone, and those in cycles, sample after
+    sample."""
     findings: list[Finding] = []
-    series = together if len(together.asked) > 1 else still  # of one answer alone no rate can be told
+    # Of one answer alone no rate can be told.
+    series = together if len(together.asked) > 1 else still
     assert report.latency
     seconds = float(series.answered[-1] - series.answered[0])
     if probe.in_lockstep and rate_hz:
@@ -214,7 +227,9 @@ def _judged(
         )
     if series is together:
         report.clock = measure_clock(probe, series, seconds)
-        counts_hz = rate_hz if rig.sampling == "cyclic" else rig.record_rate_hz if probe.is_drive else None
+        counts_hz = (
+            rate_hz if rig.sampling == "cyclic" else rig.record_rate_hz if probe.is_drive else None
+        )
         findings += check_clock(probe, series, report.clock, seconds, counts_hz)
     if not probe.in_lockstep:
         findings += check_latch(probe, series)
@@ -242,7 +257,9 @@ def _velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[F
 
 def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
     """Yield drives that do not sample as often as the first one: a run waits for all of them."""
-    drives = [(d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock]
+    drives = [
+        (d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock
+    ]
     for name, found in drives[1:]:
         first = drives[0][1]
         if first and found and abs(found / first - 1.0) > RATE_TOLERANCE:

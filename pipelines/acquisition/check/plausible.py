@@ -23,7 +23,13 @@ TURN_RAD = np.pi
 """An angle further from zero is not of a leg that stands outside its limits."""
 TINY, HUGE = 1e-20, 1e20
 """No device tells anything smaller or greater: such floats are misread words."""
-SI = {"angle": " rad", "reference": " rad", "velocity": " rad/s", "current": " A", "temperature": " °C"}
+SI = {
+    "angle": " rad",
+    "reference": " rad",
+    "velocity": " rad/s",
+    "current": " A",
+    "temperature": " °C",
+}
 
 
 @dataclass(frozen=True)
@@ -44,16 +50,24 @@ class Expectation:
         return natural(values) & (values >= self.low) & (values <= self.high)
 
     def leaps(self, values: NDArray, seconds: NDArray, period_s: float) -> bool:
-        """Tell whether values (n,) change faster than anything that moves, asked for at instants (n,) s.
+        """Tell whether values (n,) change faster than anything that moves, asked for at instants
+        (n,) s.
 
-        Two answers that come soon after each other may be of neighbouring samples, a ``period_s`` apart.
+        Two answers that come soon after each other may be of neighbouring samples, a ``period_s``
+        apart.
         """
         with np.errstate(invalid="ignore", over="ignore"):
-            return bool((np.abs(np.diff(values)) > self.fastest * (np.diff(seconds) + period_s) + STEP_RAD).any())
+            return bool(
+                (
+                    np.abs(np.diff(values))
+                    > self.fastest * (np.diff(seconds) + period_s) + STEP_RAD
+                ).any()
+            )
 
 
 def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
-    """Yield what cannot be true of any register but counter and clock; ``series`` holds at least one answer."""
+    """Yield what cannot be true of any register but counter and clock; ``series`` holds at least
+    one answer."""
     if isinstance(probe.part, Drive):
         yield from _faults(probe, probe.part, series)
         expected = _of_drive(probe.part.settings, probe.in_lockstep)
@@ -72,16 +86,22 @@ def natural(values: NDArray) -> NDArray:
 
 def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]:
     low, high = drive.angle_rad
-    speed, current = SPEED_AT_REST * drive.speed_rad_s, TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere
+    speed, current = (
+        SPEED_AT_REST * drive.speed_rad_s,
+        TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere,
+    )
     return {
         "angle": Expectation(
             low,
             high,
             f"outside its limits {low:g} to {high:g} rad",
             "move the leg within its limits, or correct the encoder's zero ({where}.offset)",
-            fastest=np.inf if in_lockstep else speed,  # the host's clock tells nothing of a leg in lockstep
+            # The host's clock tells nothing of a leg in lockstep.
+            fastest=np.inf if in_lockstep else speed,
         ),
-        "velocity": Expectation(-speed, speed, f"expected less than {speed:g} rad/s of a leg that nobody moves"),
+        "velocity": Expectation(
+            -speed, speed, f"expected less than {speed:g} rad/s of a leg that nobody moves"
+        ),
         "current": Expectation(
             -current,
             current,

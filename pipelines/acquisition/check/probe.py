@@ -25,8 +25,11 @@ class Series:
     words: NDArray
     """(n, registers of the block)."""
 
-    def of(self, name: str, register: Register | None = None, *, bytes_swapped: bool = False) -> NDArray:
-        """Return a quantity's values (n,) in SI units; read as another ``register`` would, where one is given."""
+    def of(
+        self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
+    ) -> NDArray:
+        """Return a quantity's values (n,) in SI units; read as another ``register`` would, where
+        one is given."""
         register = register or self.block.registers[name]
         one = Block({name: register})
         start = register.address - self.block.address
@@ -35,10 +38,14 @@ class Series:
             words = (words >> 8) | ((words & 0xFF) << 8)
         return np.array([one.decode(row)[name] for row in words.tolist()])
 
-    def counted(self, name: str, register: Register | None = None, *, bytes_swapped: bool = False) -> NDArray:
+    def counted(
+        self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
+    ) -> NDArray:
         """Return the values (n,) of a counter or clock, carried on where its register wraps."""
         on = Counter(Block({name: register or self.block.registers[name]}).span(name))
-        return np.array([on(value) for value in self.of(name, register, bytes_swapped=bytes_swapped)])
+        return np.array(
+            [on(value) for value in self.of(name, register, bytes_swapped=bytes_swapped)]
+        )
 
     @property
     def fresh(self) -> NDArray:
@@ -57,7 +64,11 @@ class Probe:
         self.is_drive = isinstance(part, Drive)
         self.in_lockstep = in_lockstep
         self.block = Block(registers_of(part.map.read))
-        kind, place = ("drive", part.settings.joint) if isinstance(part, Drive) else ("sensor", part.settings.cuff)
+        kind, place = (
+            ("drive", part.settings.joint)
+            if isinstance(part, Drive)
+            else ("sensor", part.settings.cuff)
+        )
         self.name = f"{kind} {place}"
         self.place: str = place
         self.map_path = f"map.{kind}.{part.settings.map}"
@@ -76,7 +87,8 @@ class Probe:
         self._keep(asked, await self.part.device.read(self.block.address, self.block.count))
 
     async def step(self) -> None:
-        """Let a drive in lockstep go on to its next sample, its torque away; read any other device."""
+        """Let a drive in lockstep go on to its next sample, its torque away; read any other
+        device."""
         if not (self.in_lockstep and isinstance(self.part, Drive)):
             return await self.read()
         asked = time.perf_counter()

@@ -25,10 +25,13 @@ class Rate:
     """Share of cycles longer than a sample; 0 where no rate is known."""
 
 
-async def cycles(probes: Sequence[Probe], seconds: float, rate_hz: float | None, fewest: int = 20) -> Rate:
+async def cycles(
+    probes: Sequence[Probe], seconds: float, rate_hz: float | None, fewest: int = 20
+) -> Rate:
     """Ask devices as a cycle of a run does, over and over; each probe keeps its answers.
 
-    In real time nothing is written. In lockstep each cycle lets the drives go on by a sample, their torque away.
+    In real time nothing is written. In lockstep each cycle lets the drives go on by a sample, their
+    torque away.
 
     Parameters
     ----------
@@ -60,11 +63,16 @@ async def cycles(probes: Sequence[Probe], seconds: float, rate_hz: float | None,
 
 
 def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
-    """Yield whether the line is too slow for the experiment, all devices asked or the drives alone."""
+    """Yield whether the line is too slow for the experiment, all devices asked or the drives
+    alone."""
     if rate.cycles_hz >= rate_hz and rate.late <= MOST_LATE:
         return
     enough = drives.cycles_hz >= rate_hz and drives.late <= MOST_LATE
-    remedy = "raise `every` of the sensors" if enough else "lower acquire.sample_rate_hz, or use several lines"
+    remedy = (
+        "raise `every` of the sensors"
+        if enough
+        else "lower acquire.sample_rate_hz, or use several lines"
+    )
     yield Finding(
         "rig",
         f"all devices can be asked {rate.cycles_hz:.0f} times a second and {rate.late:.0%} of the cycles take longer "

@@ -1,4 +1,5 @@
-"""Whether a drive's own record brings every sample, and tells of it what the block of registers does."""
+"""Whether a drive's own record brings every sample, and tells of it what the block of registers
+does."""
 
 import asyncio
 import time
@@ -17,8 +18,11 @@ DRAINS = 40
 """How often each record is drained, once a cycle."""
 
 
-async def check_rings(machine: Machine, probes: Sequence[Probe], rate_hz: float | None) -> list[Finding]:
-    """Drain every drive's record for a while, and judge it as a run does; in lockstep the drives go on by cycles.
+async def check_rings(
+    machine: Machine, probes: Sequence[Probe], rate_hz: float | None
+) -> list[Finding]:
+    """Drain every drive's record for a while, and judge it as a run does; in lockstep the drives go
+    on by cycles.
 
     Parameters
     ----------
@@ -34,7 +38,9 @@ async def check_rings(machine: Machine, probes: Sequence[Probe], rate_hz: float 
     assert cycle_hz  # a rig file that asks for recorders has one
     for j, drive in enumerate(machine.drives):
         try:
-            why = await _judged(machine, j, drive, [probe for probe in probes if probe.is_drive], cycle_hz)
+            why = await _judged(
+                machine, j, drive, [probe for probe in probes if probe.is_drive], cycle_hz
+            )
         except ExoidError as error:
             why = str(error).removeprefix(f"{drive.device.label}: ")
         if why:
@@ -42,7 +48,9 @@ async def check_rings(machine: Machine, probes: Sequence[Probe], rate_hz: float 
     return findings
 
 
-async def _judged(machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float) -> str | None:
+async def _judged(
+    machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float
+) -> str | None:
     """Return what is wrong with one drive's record."""
     told, begun = Told(), False
     stream = Stream(machine.rig, j, cycle_hz, told)

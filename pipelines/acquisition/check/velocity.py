@@ -43,7 +43,9 @@ def check_velocity(
             )
         return
     ratio = float(told @ angle / (angle @ angle))
-    correlation = float(told @ angle / np.sqrt((told @ told) * (angle @ angle))) if told.any() else 0.0
+    correlation = (
+        float(told @ angle / np.sqrt((told @ told) * (angle @ angle))) if told.any() else 0.0
+    )
     if abs(correlation) < CORRELATED:
         yield Finding(
             device,

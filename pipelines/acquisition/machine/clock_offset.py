@@ -1,9 +1,11 @@
-"""Clocks that drift: how far one drive's samples have run ahead of the first drive's, seen through the host's clock.
+"""Clocks that drift: how far one drive's samples have run ahead of the first drive's, seen through
+the host's clock.
 
-A reply tells which sample is a drive's newest, so that sample was latched before the reply came, and the next one after
-the request was sent. Each reply thus bounds from both sides when a drive took its samples; the narrowest bounds of a
-short time say it to a fraction of the line's latency, however late single replies are. Both drives' bounds lie on the
-host's clock, which drops out of their difference.
+A reply tells which sample is a drive's newest, so that sample was latched before the reply came,
+and the next one after the request was sent. Each reply thus bounds from both sides when a drive
+took its samples; the narrowest bounds of a short time say it to a fraction of the line's latency,
+however late single replies are. Both drives' bounds lie on the host's clock, which drops out of
+their difference.
 """
 
 from dataclasses import dataclass
@@ -13,7 +15,8 @@ import numpy as np
 BUCKET_S = 0.5
 """Time within which a drift may be neglected: 50 ppm are 25 us then."""
 FLOOR = 0.01
-"""Share of a sample below which bounds are not believed to be narrow: the way out and the way back differ."""
+"""Share of a sample below which bounds are not believed to be narrow: the way out and the way back
+differ."""
 MEMORY_S = 300.0
 """Time after which bounds count no longer for much: a quartz goes with its temperature."""
 USUAL = 200e-6
@@ -21,7 +24,8 @@ USUAL = 200e-6
 
 
 class Bounds:
-    """When a drive takes its samples, by the host's clock: sample n at ``origin`` + n periods, for a short while."""
+    """When a drive takes its samples, by the host's clock: sample n at ``origin`` + n periods, for
+    a short while."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -34,7 +38,8 @@ class Bounds:
         self._earliest = max(self._earliest, sent - (sequence + 1) * self._period_s)
 
     def close(self) -> tuple[float, float] | None:
-        """Return the origin and the width of its bounds (s), and begin anew; None where nothing was told."""
+        """Return the origin and the width of its bounds (s), and begin anew; None where nothing was
+        told."""
         if not np.isfinite(self._latest):
             return None
         self._last = self.now()
@@ -47,7 +52,8 @@ class Bounds:
         return (self._latest + self._earliest) / 2, max(self._latest - self._earliest, 0.0)
 
     def ahead(self, now: float) -> float | None:
-        """Return how long it is until the drive's next sample (s); None where that is not known yet."""
+        """Return how long it is until the drive's next sample (s); None where that is not known
+        yet."""
         if self._last is None:
             return None
         return (self._last[0] - now) % self._period_s
@@ -55,7 +61,8 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A drive's lead over the first one: at the first's sample n it is at its own n + ``lead`` + ``rate`` (n - at)."""
+    """A drive's lead over the first one: at the first's sample n it is at its own n + ``lead`` +
+    ``rate`` (n - at)."""
 
     lead: float
     """Samples."""
@@ -90,7 +97,8 @@ class Drift:
         width = np.hypot(first[1], other[1]) * self._rate_hz
         if self._origin is None:
             self._origin = sequence, lead
-        # The truth is evenly likely anywhere between bounds: their width is sqrt(12) standard deviations.
+        # The truth is evenly likely anywhere between bounds: their width is sqrt(12) standard
+        # deviations.
         weight = 12.0 / (width**2 + 12.0 * FLOOR**2)
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
         kept = np.exp(-BUCKET_S / MEMORY_S)
@@ -103,7 +111,8 @@ class Drift:
         assert self._origin is not None  # something was added
         covariance = np.linalg.inv(self._sums + self._prior)
         lead, slope = covariance @ self._moment
-        # Requests keep their phase for long, so that one bucket's error is much like the next one's.
+        # Requests keep their phase for long, so that one bucket's error is much like the next
+        # one's.
         alike = self._buckets * covariance
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
         return Estimate(

@@ -25,13 +25,15 @@ STATUS_PAUSE_S = 0.002
 """Before a drive is asked again whether it has taken a control word."""
 
 EMPTYING_S = 10.0
-"""How long it may take to let go what has gathered in a drive's queue: thousands of records, a few with each read."""
+"""How long it may take to let go what has gathered in a drive's queue: thousands of records, a few
+with each read."""
 
 RATE_S = 0.5
 """How long a drive's counter and clock are watched before a run."""
 
 WATCH_S = 0.5
-"""How long a drive is watched that may be enabled before the run: whoever drives it tells it something meanwhile."""
+"""How long a drive is watched that may be enabled before the run: whoever drives it tells it
+something meanwhile."""
 DRIVEN_RAD = 0.005
 """How far the angle of a drive goes in that time that somebody moves."""
 COUNTED_WITH = ("sequence", "time", "status", "velocity", "temperature", "reference")
@@ -65,7 +67,9 @@ class Reading(Condition):
 class Drive:
     """One drive: set-points out, readings in."""
 
-    def __init__(self, rig: RigSettings, settings: DriveSettings, line: Line, samples_per_cycle: int = 1) -> None:
+    def __init__(
+        self, rig: RigSettings, settings: DriveSettings, line: Line, samples_per_cycle: int = 1
+    ) -> None:
         self.settings = settings
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
@@ -74,7 +78,10 @@ class Drive:
         self.tell = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
         self._status = Block({"status": self.map.read.status or self.map.read.sequence})
-        self._beats, self._beats_span = 0, int(self.tell.span("heartbeat")) if self.map.write.heartbeat else 1
+        self._beats, self._beats_span = (
+            0,
+            int(self.tell.span("heartbeat")) if self.map.write.heartbeat else 1,
+        )
         self._control_s = rig.safety.control_s
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
@@ -89,9 +96,11 @@ class Drive:
         self.was_told = False
         """Whether any set-point was on its way to it; else it need not be disabled."""
         self.told_at = 0.0
-        """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
+        """When it answered the last one, host's clock, s: where others are on its line, that may be
+        late."""
         self.conditions: list[Condition] = []
-        """What it has told that nobody has heeded yet: whoever asked may not have come to hear it."""
+        """What it has told that nobody has heeded yet: whoever asked may not have come to hear
+        it."""
 
     def _its_ring(self, samples_per_cycle: int) -> Ring | Queue:
         settings = self.map.ring
@@ -105,33 +114,42 @@ class Drive:
         if self.ring is None or self.map.ring is None:
             return frozenset({"angle", "torque", "current", "reference", *self.told.names})
         ring = registers_of(self.map.ring.record)
-        return frozenset({"angle", "torque", "current", *ring, *({"temperature"} & set(self.told.names))})
+        return frozenset(
+            {"angle", "torque", "current", *ring, *({"temperature"} & set(self.told.names))}
+        )
 
     async def look(self, *, in_motion: bool = False) -> Reading:
         """Read without telling the drive anything."""
         sent = time.perf_counter()
-        return self._reading(await self.device.read(self.told.address, self.told.count, in_motion=in_motion), sent)
+        return self._reading(
+            await self.device.read(self.told.address, self.told.count, in_motion=in_motion), sent
+        )
 
     async def count(self) -> int:
         """Read the sample counter alone; without an answer it stands where it was."""
         sent = time.perf_counter()
         try:
-            words = await self.device.read(self._counter.address, self._counter.count, in_motion=True)
+            words = await self.device.read(
+                self._counter.address, self._counter.count, in_motion=True
+            )
         except Unanswered:
             return self._counted
         return self._newest(self._decoded(self._counter, words)["sequence"], sent)
 
     async def drain(self, newest: int) -> list[Reading]:
-        """Return samples of its ring not returned before, up to the ``newest`` known to be there, oldest first."""
+        """Return samples of its ring not returned before, up to the ``newest`` known to be there,
+        oldest first."""
         assert self.ring  # who drains has looked at the rig file
         return [self._of_ring(number, record) for number, record in await self.ring.drain(newest)]
 
     async def forget_records(self) -> bool:
-        """Let go what its record has kept so far, as far as one drain reaches; tell whether that was all."""
+        """Let go what its record has kept so far, as far as one drain reaches; tell whether that
+        was all."""
         return self.ring is None or await self.ring.forget()
 
     async def refuse_other_rate(self, rate_hz: float, setting: str) -> None:
-        """Refuse a drive that does not take so many samples a second, by this computer's clock or by its own.
+        """Refuse a drive that does not take so many samples a second, by this computer's clock or
+        by its own.
 
         Raises
         ------
@@ -180,7 +198,8 @@ class Drive:
                 )
 
     def _newest(self, sequence: float, sent: float | None) -> int:
-        """Return the number of the sample that a reply to a request of then tells, which may be its newest."""
+        """Return the number of the sample that a reply to a request of then tells, which may be its
+        newest."""
         number = int(self._sequence(sequence))
         if sent is not None:
             if self.bounds:
@@ -189,7 +208,8 @@ class Drive:
         return number
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
-        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
+        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is
+        to stand there."""
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
         self.was_told = True
@@ -203,13 +223,17 @@ class Drive:
         return reading
 
     async def disable(self, angle: float, *, in_motion: bool = False) -> None:
-        """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was sent."""
+        """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was
+        sent."""
         await self._tell_idle(self.map.disable, angle, in_motion=in_motion)
         if self.map.enabled_mask:
-            await self._until(lambda status: not self._is_enabled(status), "to disable", "see its manual")
+            await self._until(
+                lambda status: not self._is_enabled(status), "to disable", "see its manual"
+            )
 
     async def is_driven(self) -> bool:
-        """Tell whether somebody else drives it, by watching it for a while; one that says it is disabled nobody does.
+        """Tell whether somebody else drives it, by watching it for a while; one that says it is
+        disabled nobody does.
 
         Nothing is written: a torque that is taken away comes back with the other's next set-point.
         """
@@ -238,7 +262,8 @@ class Drive:
         return written, told["angle"]
 
     async def make_idle(self) -> bool:
-        """Disable the drive before a run, whatever it does; tell whether it said that it was enabled."""
+        """Disable the drive before a run, whatever it does; tell whether it said that it was
+        enabled."""
         told = await self._asked()
         was_enabled = bool(self.map.enabled_mask) and self._is_enabled(int(told["status"]))
         await self.disable(told["angle"])
@@ -264,7 +289,11 @@ class Drive:
             )
         try:
             await self._tell_idle(self.map.fault_reset, told["angle"])
-            await self._until(lambda status: not status & self.map.fault_mask, "to reset its fault", "see its manual")
+            await self._until(
+                lambda status: not status & self.map.fault_mask,
+                "to reset its fault",
+                "see its manual",
+            )
         except DeviceError:
             with suppress(DeviceError):  # the first one says what is wrong
                 await self._tell_idle(self.map.disable, told["angle"])
@@ -285,12 +314,14 @@ class Drive:
                 f"{self.device.label}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to "
                 f"{high:g} rad; it was not sent"
             )
-        # Within the limits once rounded, too: what is half a count from a limit may be rounded beyond it.
+        # Within the limits once rounded, too: what is half a count from a limit may be rounded
+        # beyond it.
         half = self.map.write.reference.step / 2.0
         return self._encoded(control, min(max(reference, low + half), high - half))
 
     async def idle_words(self, control: int, angle: float) -> list[int]:
-        """Return the registers that tell a control word to a drive that is not to follow, its leg at ``angle`` (rad).
+        """Return the registers that tell a control word to a drive that is not to follow, its leg
+        at ``angle`` (rad).
 
         Where that can be no set-point, the one that the drive holds already is told again.
         """
@@ -301,11 +332,15 @@ class Drive:
         return self._encoded(control, held["reference"])
 
     async def _tell_idle(self, control: int, angle: float, *, in_motion: bool = False) -> None:
-        await self.device.write(self.tell, await self.idle_words(control, angle), in_motion=in_motion)
+        await self.device.write(
+            self.tell, await self.idle_words(control, angle), in_motion=in_motion
+        )
 
     def _encoded(self, control: int, reference: float) -> list[int]:
         self._beats = (self._beats + 1) % self._beats_span
-        return self.tell.encode({"reference": reference, "control": control, "heartbeat": self._beats})
+        return self.tell.encode(
+            {"reference": reference, "control": control, "heartbeat": self._beats}
+        )
 
     def _is_enabled(self, status: int) -> bool:
         return status & self.map.enabled_mask == self.map.enabled_value
@@ -331,7 +366,8 @@ class Drive:
         return self._numbers(block.decode(words))
 
     def _numbers(self, told: Mapping[str, float]) -> Mapping[str, float]:
-        """Refuse what is no number where that is counted with, or would mean that the drive does not tell it."""
+        """Refuse what is no number where that is counted with, or would mean that the drive does
+        not tell it."""
         for name in COUNTED_WITH:
             if not isfinite(told.get(name, 0.0)):
                 raise DeviceError(
@@ -360,7 +396,11 @@ class Drive:
         """Return in words the fault that a status word tells; None where it tells none."""
         if not (bits := self.map.told_faults(status)):
             return None
-        reset = "" if self.map.fault_reset is None else ", with --reset-faults where the drive is to clear it"
+        reset = (
+            ""
+            if self.map.fault_reset is None
+            else ", with --reset-faults where the drive is to clear it"
+        )
         return (
             f"{self.device.label}: reports a fault (status bits {bits}); see the drive's manual, "
             f"clear the fault and start again{reset}"
@@ -372,9 +412,15 @@ class Drive:
         return self._sample(number, self._ring_time(told["time"]), told, np.nan, Condition())
 
     def _sample(
-        self, number: int, time_s: float, told: Mapping[str, float], sent: float, condition: Condition
+        self,
+        number: int,
+        time_s: float,
+        told: Mapping[str, float],
+        sent: float,
+        condition: Condition,
     ) -> Reading:
-        """Return what a drive tells as a sample; ``sent`` is its set-point (rad) where it tells none."""
+        """Return what a drive tells as a sample; ``sent`` is its set-point (rad) where it tells
+        none."""
         return Reading(
             sequence=number,
             time=time_s,

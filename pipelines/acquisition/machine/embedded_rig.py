@@ -27,8 +27,11 @@ _ON_ITS_OWN: dict[str, Any] = (
 
 
 @contextmanager
-def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float) -> Iterator[RigSettings]:
-    """Run the virtual rig of a file; yields the rig's settings with the places where its devices are."""
+def embedded(
+    rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float
+) -> Iterator[RigSettings]:
+    """Run the virtual rig of a file; yields the rig's settings with the places where its devices
+    are."""
     command = [
         sys.executable, "-m", "exoid_cli", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
         "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
@@ -36,7 +39,12 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
     with tempfile.TemporaryFile() as complaints:
         # It ends with its input, which the system closes even where this process is killed.
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, bufsize=0, **_ON_ITS_OWN
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            bufsize=0,
+            **_ON_ITS_OWN,
         )
         said = Said(process)
         try:
@@ -47,7 +55,8 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
 
 
 class Said:
-    """What a process says, line by line; a thread listens, for not every system can wait for a pipe."""
+    """What a process says, line by line; a thread listens, for not every system can wait for a
+    pipe."""
 
     def __init__(self, process: subprocess.Popen) -> None:
         self.process = process
@@ -81,7 +90,8 @@ class Said:
 
 
 def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
-    """Wait until the rig says where a line is; return its name, None for that of devices on none, and the place."""
+    """Wait until the rig says where a line is; return its name, None for that of devices on none,
+    and the place."""
     if line := said.line(START_S):
         name, _, place = line.rpartition(" ")
         return name or None, place
@@ -99,7 +109,9 @@ def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, s
 
 def _at(rig: RigSettings, places: dict[str | None, str]) -> RigSettings:
     """Return the rig with every device where it is found on this machine."""
-    update: dict[str, Any] = {"line": {name: line.at(places[name]) for name, line in rig.line.items()}}
+    update: dict[str, Any] = {
+        "line": {name: line.at(places[name]) for name, line in rig.line.items()}
+    }
     if None in places:
         alone = TcpLine().at(places[None]).model_dump(include={"host", "port"})
         for kind in ("drive", "sensor"):

@@ -41,7 +41,8 @@ class Sensor:
         return cycle % self.settings.every == self._turn
 
     async def look(self) -> tuple[float, float, float] | None:
-        """Return the force (N), or None where the sensor has no new sample or, for once, does not answer.
+        """Return the force (N), or None where the sensor has no new sample or, for once, does not
+        answer.
 
         Raises
         ------
@@ -50,7 +51,9 @@ class Sensor:
         """
         self._patience.waited(time.monotonic())
         try:
-            told = self.block.decode(await self.device.read(self.block.address, self.block.count, in_motion=True))
+            told = self.block.decode(
+                await self.device.read(self.block.address, self.block.count, in_motion=True)
+            )
         except Unanswered as error:
             if self._patience.is_over(time.monotonic()):
                 raise DeviceError(str(error)) from error
@@ -64,7 +67,8 @@ class Sensor:
         return told["force_x"], told["force_y"], told["force_z"]
 
     def _goes_on(self, count: float, now: float) -> bool:
-        """Tell whether a sample is a new one; raise DeviceError where its counter went back or leapt."""
+        """Tell whether a sample is a new one; raise DeviceError where its counter went back or
+        leapt."""
         if self._first is None or self._last is None:
             self._first = self._last = count, now
             return True
@@ -82,7 +86,8 @@ class Sensor:
         return True
 
     def _most(self, now: float) -> float:
-        """Return how many samples it may have taken since its last new one, by how fast it counted until then.
+        """Return how many samples it may have taken since its last new one, by how fast it counted
+        until then.
 
         In lockstep no time passes, and until it has counted for a while, nobody knows.
         """

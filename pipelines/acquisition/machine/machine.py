@@ -1,4 +1,5 @@
-"""The rig as acquisition sees it: drives and force sensors that together deliver one row a cycle."""
+"""The rig as acquisition sees it: drives and force sensors that together deliver one row a
+cycle."""
 
 import asyncio
 import time
@@ -38,8 +39,14 @@ class Machine:
         """Take the devices of a rig; drives take so many samples from one set-point to the next."""
         self.rig = rig
         line_of = lines_of(rig)
-        self.drives = [Drive(rig, settings, line_of(settings), samples_per_cycle) for settings in rig.drive]
-        self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor] if with_sensors else []
+        self.drives = [
+            Drive(rig, settings, line_of(settings), samples_per_cycle) for settings in rig.drive
+        ]
+        self.sensors = (
+            [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor]
+            if with_sensors
+            else []
+        )
         self.samples_per_cycle = samples_per_cycle
         self.latches = rig.sampling == "cyclic" and rig.clocks == "common"
         """Whether a cycle brings one sample that all drives latched at the same instant."""
@@ -61,7 +68,9 @@ class Machine:
     async def refuse_driven(self) -> None:
         """Refuse to write anything to a rig that somebody else drives."""
         driven = await all_answers(drive.is_driven() for drive in self.drives)
-        if found := [drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so]:
+        if found := [
+            drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so
+        ]:
             raise DeviceError(
                 f"{' and '.join(found)}: driven by somebody else, since angle or set-point change while exoid sends "
                 "nothing; end the other program, or hold the leg still; nothing was sent"
@@ -73,7 +82,8 @@ class Machine:
             await drive.reset_fault()
 
     async def make_idle(self) -> None:
-        """Disable every drive before a run; refuse to go on where one was enabled: nobody knows what moved the leg."""
+        """Disable every drive before a run; refuse to go on where one was enabled: nobody knows
+        what moved the leg."""
         found = [drive.device.label for drive in self.drives if await drive.make_idle()]
         if found:
             raise DeviceError(
@@ -82,19 +92,26 @@ class Machine:
             )
 
     async def refuse_other_rate(self, cycle_hz: float) -> None:
-        """Refuse drives that do not sample at the rate that is wanted; in lockstep each exchange is a sample."""
+        """Refuse drives that do not sample at the rate that is wanted; in lockstep each exchange is
+        a sample."""
         if self.rig.clock == "lockstep":
             return
-        setting = "acquire.sample_rate_hz" if self.rig.sampling == "cyclic" else "record_rate_hz in the rig file"
+        setting = (
+            "acquire.sample_rate_hz"
+            if self.rig.sampling == "cyclic"
+            else "record_rate_hz in the rig file"
+        )
         rate_hz = cycle_hz * self.samples_per_cycle
         await all_answers(drive.refuse_other_rate(rate_hz, setting) for drive in self.drives)
 
     async def empty_records(self) -> None:
-        """Let go what the drives' own records have kept so far: a queue that nobody read is full of what is past."""
+        """Let go what the drives' own records have kept so far: a queue that nobody read is full of
+        what is past."""
         await all_answers(drive.empty_record() for drive in self.drives)
 
     async def forget_records(self) -> None:
-        """Let go what has come to the drives' own records, without a pause for long; what is left waits."""
+        """Let go what has come to the drives' own records, without a pause for long; what is left
+        waits."""
         with suppress(Unanswered):
             await all_answers(drive.forget_records() for drive in self.drives)
 
@@ -112,22 +129,31 @@ class Machine:
             Where a drive reports a fault.
         """
         # Several looks: between two requests of one of them a drive may go on to its next sample.
-        looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
+        looks = [
+            await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)
+        ]
         for reading in looks[-1]:
             if reading.fault:
                 raise DeviceError(reading.fault)
-        ahead = np.array([[reading.sequence - look[0].sequence for reading in look] for look in looks])
+        ahead = np.array(
+            [[reading.sequence - look[0].sequence for reading in look] for look in looks]
+        )
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
-        if self.rig.sampling == "recorder" and self.rig.clock == "real_time" and self.rig.clocks == "common":
+        if (
+            self.rig.sampling == "recorder"
+            and self.rig.clock == "real_time"
+            and self.rig.clocks == "common"
+        ):
             await self._find_leads()
         self._counted = looks[-1][0].sequence
         return Row(tuple(looks[-1]), await self.felt(), self.samples_per_cycle)
 
     async def _find_leads(self) -> None:
-        """Find out how far the counters are apart though they go on while one drive after the other is asked.
+        """Find out how far the counters are apart though they go on while one drive after the other
+        is asked.
 
-        Replies bound it. Where the drives' clocks tell a distance within these bounds, they show the same time, and
-        it is that; else the bounds must be narrow enough to leave one.
+        Replies bound it. Where the drives' clocks tell a distance within these bounds, they show
+        the same time, and it is that; else the bounds must be narrow enough to leave one.
         """
         rate_hz = self.rig.record_rate_hz
         assert rate_hz  # a rig file that asks for recorders has it
@@ -140,7 +166,11 @@ class Machine:
                 (origin, width), *others = [its.now() for its in bounds]
                 leads = [
                     _lead(
-                        (origin - other[0]) * rate_hz, (width + other[1]) * rate_hz / 2, readings[0], reading, rate_hz
+                        (origin - other[0]) * rate_hz,
+                        (width + other[1]) * rate_hz / 2,
+                        readings[0],
+                        reading,
+                        rate_hz,
                     )
                     for other, reading in zip(others, readings[1:], strict=True)
                 ]
@@ -157,11 +187,12 @@ class Machine:
         return await self.drives[0].count() // self.samples_per_cycle
 
     async def cycle(self, number: int, tell: Tell) -> Answers:
-        """Tell all drives at once; return what came: the sample that all devices latched, or of each its newest.
+        """Tell all drives at once; return what came: the sample that all devices latched, or of
+        each its newest.
 
-        In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
-        tell when a new sample begins, so sensors are read after it. Nothing is sent twice, for a set-point that comes
-        late is no set-point.
+        In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time
+        the drives tell when a new sample begins, so sensors are read after it. Nothing is sent
+        twice, for a set-point that comes late is no set-point.
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
@@ -178,12 +209,15 @@ class Machine:
         return Answers(tuple(told), forces, row)
 
     async def felt(self, cycle: int | None = None) -> NDArray:
-        """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of all."""
+        """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of
+        all."""
         due = [sensor for sensor in self.sensors if cycle is None or sensor.is_due(cycle)]
         if not due:
             return self.no_force
         forces = self.no_force.copy()
-        for sensor, force in zip(due, await all_answers(sensor.look() for sensor in due), strict=True):
+        for sensor, force in zip(
+            due, await all_answers(sensor.look() for sensor in due), strict=True
+        ):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
@@ -195,7 +229,10 @@ class Machine:
         """
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
-            counts = [reading.sequence - ahead for reading, ahead in zip(readings, self.leads, strict=True)]
+            counts = [
+                reading.sequence - ahead
+                for reading, ahead in zip(readings, self.leads, strict=True)
+            ]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
             if not late:
                 self._counted = max(counts)
@@ -226,7 +263,8 @@ class Machine:
 
 
 async def answers_or_silence(asked: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
-    """Return each answer, or the error that says that there was none in time, once that is known of all.
+    """Return each answer, or the error that says that there was none in time, once that is known of
+    all.
 
     None shall be left for the next request to find. What is worse than silence is raised.
     """
@@ -249,9 +287,15 @@ async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
     return answers
 
 
-def _lead(bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float) -> int | None:
-    """Return how many samples a drive is ahead, by its replies ``bounded`` give or take ``margin``; None if unclear."""
+def _lead(
+    bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float
+) -> int | None:
+    """Return how many samples a drive is ahead, by its replies ``bounded`` give or take ``margin``;
+    None if unclear."""
     by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
-    if abs(by_clock - round(by_clock)) < SAME_TIME and abs(round(by_clock) - bounded) <= margin + 0.5:
+    if (
+        abs(by_clock - round(by_clock)) < SAME_TIME
+        and abs(round(by_clock) - bounded) <= margin + 0.5
+    ):
         return round(by_clock)
     return round(bounded) if margin <= 0.5 else None

@@ -1,4 +1,5 @@
-"""Samples of drives that sample by clocks of their own, brought to the first drive's instants as they come."""
+"""Samples of drives that sample by clocks of their own, brought to the first drive's instants as
+they come."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -9,7 +10,8 @@ from pipelines.acquisition.machine.drive import Reading
 from pipelines.signals.interpolation import cubic_weights
 
 Position = Callable[[int], float | None]
-"""From a sample of the first drive to where another drive is then in its own samples; None while that is not known."""
+"""From a sample of the first drive to where another drive is then in its own samples; None while
+that is not known."""
 
 CARRIED = tuple(f.name for f in fields(Reading) if f.type in (float, "float"))
 MOST_WAITING = 100_000
@@ -43,9 +45,11 @@ class Track:
         return self.newest is None or self.newest < needed
 
     def at(self, position: float) -> Reading | None:
-        """Return what the drive told at a place between its samples; None where a sample beside it is missing.
+        """Return what the drive told at a place between its samples; None where a sample beside it
+        is missing.
 
-        A cubic through the four samples around, a straight line where the outer two are not all there.
+        A cubic through the four samples around, a straight line where the outer two are not all
+        there.
         """
         base = floor(position)
         x = position - base
@@ -55,13 +59,19 @@ class Track:
         if near[1] is None or near[2] is None:
             return None
         weights = cubic_weights(x) if near[0] and near[3] else (0.0, 1.0 - x, x, 0.0)
-        parts = [(weight, reading) for weight, reading in zip(weights, near, strict=True) if reading]
-        values = {name: sum(weight * getattr(reading, name) for weight, reading in parts) for name in CARRIED}
+        parts = [
+            (weight, reading) for weight, reading in zip(weights, near, strict=True) if reading
+        ]
+        values = {
+            name: sum(weight * getattr(reading, name) for weight, reading in parts)
+            for name in CARRIED
+        }
         return replace(near[1], **values)
 
 
 class Alignment:
-    """Rows of all drives at the first drive's instants, each once the other drives' samples around it are there."""
+    """Rows of all drives at the first drive's instants, each once the other drives' samples around
+    it are there."""
 
     def __init__(self, positions: Sequence[Position]) -> None:
         """Take for each drive but the first where it is at a sample of the first."""

@@ -1,4 +1,5 @@
-"""Where the samples that are kept come from: the cycle itself, or the drives' own records and clocks beside it."""
+"""Where the samples that are kept come from: the cycle itself, or the drives' own records and
+clocks beside it."""
 
 import asyncio
 import time
@@ -17,14 +18,15 @@ from pipelines.acquisition.machine.row import Row
 from pipelines.errors import DeviceError, Unanswered
 
 Judge = Callable[[Row, Sequence[Sequence[Reading]], float], list[list[Reading]]]
-"""Given a cycle's row, samples of each drive and the host's clock (s), returns those that are new; raises DeviceError
-where one is reason to stop."""
+"""Given a cycle's row, samples of each drive and the host's clock (s), returns those that are new;
+raises DeviceError where one is reason to stop."""
 
 SECOND_LOOK = (0.3, 0.65)
-"""Shares of a sample after an exchange between which a drive with a clock of its own is looked at again: with both
-looks none of its samples passes unseen."""
+"""Shares of a sample after an exchange between which a drive with a clock of its own is looked at
+again: with both looks none of its samples passes unseen."""
 AIM = 0.1
-"""Share of a sample by which that look falls before or after the instant at which the drive's next one is expected."""
+"""Share of a sample by which that look falls before or after the instant at which the drive's next
+one is expected."""
 
 
 class Sampling(Protocol):
@@ -37,7 +39,8 @@ class Sampling(Protocol):
         """Ask the drives for nothing more beside the cycle."""
 
     def clocks(self, since_s: float) -> dict[str, dict]:
-        """Return what is known of the drives' clocks, by joint, ``since_s`` of the first one's time."""
+        """Return what is known of the drives' clocks, by joint, ``since_s`` of the first one's
+        time."""
 
 
 class Latched:
@@ -56,7 +59,8 @@ class Latched:
 
 
 class Beside:
-    """A request to a drive that goes on beside the cycle, which must not wait for it; one at a time."""
+    """A request to a drive that goes on beside the cycle, which must not wait for it; one at a
+    time."""
 
     def __init__(self) -> None:
         self._request: asyncio.Task[list[Reading] | DeviceError] | None = None
@@ -76,7 +80,8 @@ class Beside:
         self._request = asyncio.create_task(self._outcome(ask))
 
     async def brought(self) -> list[Reading]:
-        """Wait for what the request brings, and return it; nothing where there was none, or no answer."""
+        """Wait for what the request brings, and return it; nothing where there was none, or no
+        answer."""
         if self._request is None:
             return []
         found, self._request = await self._request, None
@@ -89,7 +94,9 @@ class Beside:
         if self._request:
             self._request.cancel()
 
-    async def _outcome(self, ask: Callable[[], Awaitable[list[Reading]]]) -> list[Reading] | DeviceError:
+    async def _outcome(
+        self, ask: Callable[[], Awaitable[list[Reading]]]
+    ) -> list[Reading] | DeviceError:
         try:
             return await ask()
         except Unanswered:
@@ -99,7 +106,8 @@ class Beside:
 
 
 class Cycled:
-    """Samples of one drive that the cycle brought, and a second look at each for a drive with a clock of its own."""
+    """Samples of one drive that the cycle brought, and a second look at each for a drive with a
+    clock of its own."""
 
     def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
         self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
@@ -107,17 +115,23 @@ class Cycled:
         self.beside = Beside()
 
     async def samples(self, reading: Reading) -> list[Reading]:
-        """Return what came since the last cycle: the second look at the last one, and this one's reading."""
+        """Return what came since the last cycle: the second look at the last one, and this one's
+        reading."""
         seen = await self.beside.brought()
         if self._looks_again:
             self.beside.begin(self._look_again)
         return [*seen, reading]
 
     async def _look_again(self) -> list[Reading]:
-        """Look at the drive when its next sample is due, or as near to that as is in reach: that tells most."""
+        """Look at the drive when its next sample is due, or as near to that as is in reach: that
+        tells most."""
         low, high = (share * self._period_s for share in SECOND_LOOK)
         due = self._drive.bounds.ahead(time.perf_counter()) if self._drive.bounds else None
-        aim = self._dither.uniform(low, high) if due is None else due + self._dither.normal(0.0, AIM) * self._period_s
+        aim = (
+            self._dither.uniform(low, high)
+            if due is None
+            else due + self._dither.normal(0.0, AIM) * self._period_s
+        )
         await asyncio.sleep(float(np.clip(aim, low, high)))
         return [await self._drive.look(in_motion=True)]
 
@@ -132,7 +146,8 @@ class Recorded:
         self.beside = Beside()
 
     async def samples(self, reading: Reading) -> list[Reading]:
-        """Return what was drained since the last cycle; mostly nothing, until a read is worth its while."""
+        """Return what was drained since the last cycle; mostly nothing, until a read is worth its
+        while."""
         found = await self.beside.brought() if self.beside.is_answered else []
         is_due = self._drained is None or reading.sequence >= self._drained + self._block
         if is_due and not self.beside.is_under_way:
@@ -142,7 +157,8 @@ class Recorded:
         return found
 
     async def _drain(self, newest: int) -> list[Reading]:
-        """Drain the ring; of what is not answered it keeps the samples, and the next drain brings them."""
+        """Drain the ring; of what is not answered it keeps the samples, and the next drain brings
+        them."""
         samples = await self._drive.drain(newest)
         self._drained = samples[-1].sequence if samples else newest
         return samples
@@ -167,7 +183,8 @@ class Streams:
         self._last: Row | None = None
 
     def _position(self, j: int) -> Callable[[int], float | None]:
-        """Return where the drive after the first ``j`` is in its own samples at one of the first drive's."""
+        """Return where the drive after the first ``j`` is in its own samples at one of the first
+        drive's."""
         if not self._own:
             lead = self._leads[j + 1]
             return lambda sequence: float(sequence + lead)
@@ -175,7 +192,8 @@ class Streams:
         return lambda sequence: drift.estimate.position(sequence) if drift.estimate else None
 
     async def rows(self, row: Row) -> list[Row]:
-        """Return rows that are whole now, at the first drive's instants; no sample has gone in that was not judged."""
+        """Return rows that are whole now, at the first drive's instants; no sample has gone in that
+        was not judged."""
         now = time.monotonic()
         self._bucket_ends = self._bucket_ends or now + BUCKET_S
         pairs = zip(self._sources, row.drives, strict=True)
@@ -206,7 +224,9 @@ class Streams:
         if self._bucket_ends is None or now < self._bucket_ends:
             return
         self._bucket_ends = now + BUCKET_S
-        first, *others = (drive.bounds.close() if drive.bounds else None for drive in self._machine.drives)
+        first, *others = (
+            drive.bounds.close() if drive.bounds else None for drive in self._machine.drives
+        )
         for drift, other in zip(self._drifts, others, strict=True):
             if first and other:
                 drift.add(row.drives[0].sequence, first, other)
@@ -233,7 +253,8 @@ class Streams:
 
 
 def sources_of(machine: Machine, cycle_hz: float) -> list[Recorded | Cycled]:
-    """Return where each drive's samples come from, where they are not kept as the cycle brings them; else nothing."""
+    """Return where each drive's samples come from, where they are not kept as the cycle brings
+    them; else nothing."""
     if machine.latches:
         return []
     if machine.rig.sampling == "recorder":

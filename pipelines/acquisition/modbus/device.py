@@ -41,7 +41,8 @@ class Wait(NamedTuple):
 
 
 class Device:
-    """One device on a line. Several may be asked side by side; those on one line are answered one after the other."""
+    """One device on a line. Several may be asked side by side; those on one line are answered one
+    after the other."""
 
     def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
         """Join a line; a rig's safety settings tell how long a reply is awaited."""
@@ -59,7 +60,8 @@ class Device:
         return self.line.awaited_s(self._unit)
 
     def turn(self) -> AbstractAsyncContextManager[None]:
-        """Wait until it is its turn on the line, and keep it for all that this task asks it within."""
+        """Wait until it is its turn on the line, and keep it for all that this task asks it
+        within."""
         return self.line.turn(self._unit)
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
@@ -88,7 +90,9 @@ class Device:
             Where what it holds are no whole records.
         """
         what = f"reading the queue at register {address}"
-        response = await self._request(what, self._in_motion, self._client.read_fifo_queue, address=address)
+        response = await self._request(
+            what, self._in_motion, self._client.read_fifo_queue, address=address
+        )
         found = list(getattr(response, "values", []))
         if len(found) % words:
             raise DeviceError(
@@ -126,7 +130,8 @@ class Device:
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
     ) -> list[int]:
-        """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
+        """Send a request and return the words of the answer, ``words`` of them where it is to bring
+        any."""
         response = await self._request(what, wait, request, **arguments)
         if words is not None and len(response.registers) != words:
             raise DeviceError(
@@ -138,7 +143,8 @@ class Device:
     async def _request(
         self, what: str, wait: Wait, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
     ) -> ModbusPDU:
-        """Send a request and return its answer; raise DeviceError where there is none, or a refusal."""
+        """Send a request and return its answer; raise DeviceError where there is none, or a
+        refusal."""
         try:
             response = await self.line.ask(self._unit, wait.seconds, request, **arguments)
         except (ModbusException, OSError) as error:
@@ -155,8 +161,12 @@ class Device:
         if response.isError():
             code = int(getattr(response, "exception_code", 0))
             meaning = f": {MEANING[code]}" if code in MEANING else ""
-            remedy = REMEDY.get(code, "compare the register map in the rig file with the device's manual")
-            raise Refused(f"{self.label}: answered {what} with Modbus exception {code}{meaning}; {remedy}")
+            remedy = REMEDY.get(
+                code, "compare the register map in the rig file with the device's manual"
+            )
+            raise Refused(
+                f"{self.label}: answered {what} with Modbus exception {code}{meaning}; {remedy}"
+            )
         return response
 
 

@@ -1,4 +1,5 @@
-"""The lines to a rig, each held by one exoid of this computer at a time while it may move or release a leg."""
+"""The lines to a rig, each held by one exoid of this computer at a time while it may move or
+release a leg."""
 
 import os
 import socket
@@ -35,7 +36,8 @@ def alone(rig: RigSettings) -> Iterator[None]:
 
 
 def _names(line: LineSettings) -> set[str]:
-    """Return what a line is called however a rig file writes it: a port's own path, a host's addresses."""
+    """Return what a line is called however a rig file writes it: a port's own path, a host's
+    addresses."""
     if isinstance(line, RtuLine):
         return {os.path.realpath(line.place)}
     with suppress(OSError):  # a host that nobody knows will not be reached either
@@ -85,7 +87,8 @@ def _opened(path: Path) -> int:
     """Return a descriptor of a file that every user may lock, made where there is none."""
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
     while True:
-        # Not made and opened at once: in a folder of everybody's, Linux refuses that with another user's file.
+        # Not made and opened at once: in a folder of everybody's, Linux refuses that with another
+        # user's file.
         with suppress(FileNotFoundError):
             return os.open(path, flags)
         with suppress(FileExistsError):

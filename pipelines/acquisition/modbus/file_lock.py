@@ -12,11 +12,13 @@ except ImportError:  # on Windows
     fcntl = None  # type: ignore[assignment]
 
 FAR = 1 << 40
-"""Place of the byte that Windows locks, where nothing ever stands: it keeps others from reading what is locked."""
+"""Place of the byte that Windows locks, where nothing ever stands: it keeps others from reading
+what is locked."""
 
 
 def take(file: IO[bytes], *, wait: bool) -> bool:
-    """Take the lock of an open file; return False where another process holds it, unless told to wait for it."""
+    """Take the lock of an open file; return False where another process holds it, unless told to
+    wait for it."""
     if fcntl is None:
         return _take_a_byte(file, wait=wait)
     try:

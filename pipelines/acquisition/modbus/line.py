@@ -1,4 +1,5 @@
-"""A line to devices: one connection, one request at a time however many devices are on it, and quiet in between."""
+"""A line to devices: one connection, one request at a time however many devices are on it, and
+quiet in between."""
 
 import asyncio
 import errno
@@ -20,7 +21,14 @@ from serial.tools import list_ports
 
 from pipelines.acquisition.modbus.reply import NoReply, check_replies
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine, refuse_passphrase
+from pipelines.settings.line import (
+    LineSettings,
+    NetworkLine,
+    RtuLine,
+    RtuOverTcpLine,
+    TlsLine,
+    refuse_passphrase,
+)
 from pipelines.settings.rig import DeviceSettings, RigSettings
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
@@ -35,7 +43,8 @@ CERTIFICATE_ADVICE = {
     9: "set the clocks of this computer and of the rig, or wait until it is valid",
     10: "renew it at the rig, or set this computer's clock if that is wrong",
 }
-"""What to do about a certificate that OpenSSL refuses by a code of its own, where it is no matter of whom to trust."""
+"""What to do about a certificate that OpenSSL refuses by a code of its own, where it is no matter
+of whom to trust."""
 
 
 class Owed:
@@ -60,7 +69,8 @@ class Line:
         # Once: files are read, and a lost connection is no time for that.
         self._tls = _tls_context(settings) if isinstance(settings, TlsLine) else None
         self.client = _client(settings, self._tls, timeout_s, self._told)
-        self.client.set_max_no_responses(sys.maxsize)  # the watchdog decides for how long silence is borne
+        # The watchdog decides for how long silence is borne.
+        self.client.set_max_no_responses(sys.maxsize)
         check_replies(self.client, self._hear)
         self.devices: list[str] = []
         """Who is on it."""
@@ -71,9 +81,11 @@ class Line:
         self._used = False
         """Whether anything was asked in it."""
         self._asking = self._failed = self._has_answered = False
-        """Whether a request is under way, whether the last one was not answered, and whether any ever was."""
+        """Whether a request is under way, whether the last one was not answered, and whether any
+        ever was."""
         self._asked: dict[int, float] = {}
-        """Units that have not answered yet, or are waiting for their turn, and since when; the event loop's time, s."""
+        """Units that have not answered yet, or are waiting for their turn, and since when; the
+        event loop's time, s."""
         self._owed: dict[int, Owed] = {}
         """What units may still answer that were not waited for any longer."""
         self._quiet_since = 0.0
@@ -116,9 +128,11 @@ class Line:
         self.client.close()
 
     async def renew(self) -> None:
-        """Open another connection where this one did not answer last, once whoever is asking has been answered.
+        """Open another connection where this one did not answer last, once whoever is asking has
+        been answered.
 
-        Nobody's turn comes in between: whoever else is on the line is asked on the old connection or the new one.
+        Nobody's turn comes in between: whoever else is on the line is asked on the old connection
+        or the new one.
         """
         async with self._turn:
             if not self._failed:
@@ -146,9 +160,14 @@ class Line:
             self._turn.release()
 
     async def ask(
-        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+        self,
+        unit: int,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        **arguments: Any,
     ) -> ModbusPDU:
-        """Send a unit a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
+        """Send a unit a request of the client's when it is its turn, and return the answer, awaited
+        for ``within_s``.
 
         Raises
         ------
@@ -163,17 +182,23 @@ class Line:
             return await self._ask(unit, within_s, request, arguments)
 
     async def _ask(
-        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], arguments: dict[str, Any]
+        self,
+        unit: int,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        arguments: dict[str, Any],
     ) -> ModbusPDU:
         self._used = True
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
             await self._quiet()
-            # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
+            # The one place where pymodbus looks for how long to wait, be it for a connection or for
+            # an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
             answer = await request(**arguments, device_id=unit)
-            # What answers another request is no silence; but who asks again is to do so on another connection.
+            # What answers another request is no silence; but who asks again is to do so on another
+            # connection.
             self._failed, self._has_answered = isinstance(answer, NoReply), True
             self._asked.pop(unit, None)
             return answer
@@ -196,9 +221,9 @@ class Line:
     async def _take_turn(self, unit: int) -> None:
         """Wait until a unit may be asked.
 
-        After one that did not answer come the others on the line, for as long as it was waited for: one that is dead
-        must not keep them from being told where to go. A serial line does not say which request a reply answers: a
-        late one has come by then.
+        After one that did not answer come the others on the line, for as long as it was waited for:
+        one that is dead must not keep them from being told where to go. A serial line does not say
+        which request a reply answers: a late one has come by then.
         """
         while True:
             if owed := self._owed.get(unit):
@@ -221,7 +246,8 @@ class Line:
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
 
     async def _quiet(self) -> None:
-        """Wait until nothing has been on the line for as long as its devices need to tell frames apart."""
+        """Wait until nothing has been on the line for as long as its devices need to tell frames
+        apart."""
         if self._settings.quiet_s:
             loop = asyncio.get_running_loop()
             await asyncio.sleep(max(0.0, self._quiet_since + self._settings.quiet_s - loop.time()))
@@ -247,11 +273,15 @@ class Line:
         """Return why there is no connection; the client tells its log alone."""
         try:
             if isinstance(self._settings, NetworkLine):
-                await asyncio.get_running_loop().getaddrinfo(self._settings.host, self._settings.port)
+                await asyncio.get_running_loop().getaddrinfo(
+                    self._settings.host, self._settings.port
+                )
             if isinstance(self._settings, RtuLine):
                 serial.Serial(self.place, exclusive=True).close()
             elif isinstance(self._settings, TlsLine):
-                opening = asyncio.open_connection(self._settings.host, self._settings.port, ssl=self._tls)
+                opening = asyncio.open_connection(
+                    self._settings.host, self._settings.port, ssl=self._tls
+                )
                 _, writer = await asyncio.wait_for(opening, self._timeout_s)
                 writer.close()
         except OSError as error:
@@ -260,18 +290,30 @@ class Line:
 
 
 def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
-    """Return what finds the line that a device of a rig is on, the same one for all devices that share it."""
+    """Return what finds the line that a device of a rig is on, the same one for all devices that
+    share it."""
     timeout_s = rig.safety.connect_s
     shared = {name: Line(settings, timeout_s, name) for name, settings in rig.line.items()}
-    return lambda device: shared[device.line] if device.line is not None else Line(rig.line_of(device), timeout_s)
+    return lambda device: (
+        shared[device.line] if device.line is not None else Line(rig.line_of(device), timeout_s)
+    )
 
 
 def _client(
-    settings: LineSettings, tls: ssl.SSLContext | None, timeout_s: float, told: Callable[[bool], None]
+    settings: LineSettings,
+    tls: ssl.SSLContext | None,
+    timeout_s: float,
+    told: Callable[[bool], None],
 ) -> ModbusBaseClient:
     """Return the client of a line, not yet connected."""
-    # Never a second try: a set-point that comes late is no set-point, and an exchange may move the leg.
-    common: Mapping[str, Any] = {"timeout": timeout_s, "retries": 0, "reconnect_delay": 0, "trace_connect": told}
+    # Never a second try: a set-point that comes late is no set-point, and an exchange may move the
+    # leg.
+    common: Mapping[str, Any] = {
+        "timeout": timeout_s,
+        "retries": 0,
+        "reconnect_delay": 0,
+        "trace_connect": told,
+    }
     if isinstance(settings, RtuLine):
         return AsyncModbusSerialClient(
             settings.serial_port, baudrate=settings.baud_rate, parity=settings.parity[0].upper(),
@@ -280,7 +322,8 @@ def _client(
     if isinstance(settings, TlsLine):
         assert tls  # such a line has one
         client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
-        # pymodbus takes each record for one whole frame, whatever length the frame tells; records do not promise that.
+        # pymodbus takes each record for one whole frame, whatever length the frame tells; records
+        # do not promise that.
         client.ctx.framer = FramerSocket(DecodePDU(False))
         return client
     framer = FramerType.RTU if isinstance(settings, RtuOverTcpLine) else FramerType.SOCKET
@@ -294,7 +337,9 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
         context = ssl.create_default_context(cafile=settings.ca)
         if settings.certificate:
             file = settings.certificate
-            context.load_cert_chain(settings.certificate, settings.key, refuse_passphrase(settings.key))
+            context.load_cert_chain(
+                settings.certificate, settings.key, refuse_passphrase(settings.key)
+            )
     except OSError as error:  # SSLError is one
         raise SettingsError(
             f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM files"
@@ -308,9 +353,12 @@ def _explained(error: OSError) -> str:
         return f"no such host ({error.strerror}); correct host in the rig file, or give its address"
     if isinstance(error, ssl.SSLCertVerificationError):
         advice = CERTIFICATE_ADVICE.get(
-            error.verify_code, "name in ca whoever signed it, and in host the name that it is made out to"
+            error.verify_code,
+            "name in ca whoever signed it, and in host the name that it is made out to",
         )
-        return f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); {advice}"
+        return (
+            f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); {advice}"
+        )
     if isinstance(error, TimeoutError):
         return "no TLS connection within safety.connect_s; check that the rig is on, and that the port speaks TLS"
     if isinstance(error, ssl.SSLError):
@@ -319,9 +367,7 @@ def _explained(error: OSError) -> str:
         there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
         return f"no such serial port; there is {there}; plug the adapter in, or correct serial_port in the rig file"
     if error.errno in (errno.EACCES, errno.EPERM):
-        return (
-            "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout $USER), log in anew"
-        )
+        return "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout $USER), log in anew"
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         return "the serial port is busy; end the other program that uses it"
     return f"no connection ({error}); check that the rig is on, and the line in the rig file"

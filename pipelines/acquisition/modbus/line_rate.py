@@ -1,4 +1,5 @@
-"""How often a line can carry what a cycle asks of it: a serial line takes its time for every character."""
+"""How often a line can carry what a cycle asks of it: a serial line takes its time for every
+character."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -31,15 +32,19 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
 def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
     """Return the most samples a second, Hz, and the line that a sample waits for longest.
 
-    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors that are due and, where
-    drives record themselves, drains each. Lines work side by side, devices on one line take turns. Infinity and None
-    where the speed of no line is known.
+    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors that
+    are due and, where drives record themselves, drains each. Lines work side by side, devices on
+    one line take turns. Infinity and None where the speed of no line is known.
     """
     first = rig.drive[0]
-    look = rig.line_of(first).exchange_s(read_characters(rig.map.drive[first.map].read.sequence.registers))
+    look = rig.line_of(first).exchange_s(
+        read_characters(rig.map.drive[first.map].read.sequence.registers)
+    )
     drives, drains, records = (defaultdict[str | None, float](float) for _ in range(3))
     for drive in rig.drive:
-        drives[drive.line] += rig.line_of(drive).exchange_s(exchange_characters(rig.map.drive[drive.map]))
+        drives[drive.line] += rig.line_of(drive).exchange_s(
+            exchange_characters(rig.map.drive[drive.map])
+        )
         if rig.sampling == "recorder":
             assert rig.record_rate_hz  # as its drives have rings
             took_s, brings = drain(rig.line_of(drive), rig.map.drive[drive.map])
@@ -51,17 +56,22 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
     longest = max(
         cycle + max(drains.values(), default=0.0),
         cycle / left if left > 0.0 else float("inf"),
-        look / SLOW,  # an answer later than this share of a sample is too old to build on: see PhaseLock
+        # An answer later than this share of a sample is too old to build on: see PhaseLock.
+        look / SLOW,
     )
-    busy = {name: sum(step.get(name, 0.0) for step in (drives, sensors, drains)) for name in rig.line}
+    busy = {
+        name: sum(step.get(name, 0.0) for step in (drives, sensors, drains)) for name in rig.line
+    }
     slowest = max(busy, key=lambda name: busy[name], default=None)
     return (1.0 / longest, slowest) if longest else (float("inf"), None)
 
 
 def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
-    """Return how long each line carries the sensors that are read in one cycle, s, where that is longest.
+    """Return how long each line carries the sensors that are read in one cycle, s, where that is
+    longest.
 
-    Sensors that are read equally seldom take turns; of those that are not, the longest turns come together some time.
+    Sensors that are read equally seldom take turns; of those that are not, the longest turns come
+    together some time.
     """
     turns = defaultdict[tuple[str | None, int], defaultdict[int, float]](lambda: defaultdict(float))
     for sensor in rig.sensor:
@@ -74,7 +84,8 @@ def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
 
 
 def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
-    """Return how long a line carries one full read of a drive's own record, s, and how many samples that brings."""
+    """Return how long a line carries one full read of a drive's own record, s, and how many samples
+    that brings."""
     ring = registers.ring
     assert ring  # a rig file that asks for recorders has one for every drive
     brings = ring.records_per_read
@@ -85,17 +96,20 @@ def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
 
 
 def exchange_characters(registers: DriveMap) -> int:
-    """Return how many characters an FC23 exchange takes as RTU frames, request and reply together."""
+    """Return how many characters an FC23 exchange takes as RTU frames, request and reply
+    together."""
     return 13 + 2 * Block(registers_of(registers.write)).count + 5 + 2 * _count(registers)
 
 
 def read_characters(registers: int) -> int:
-    """Return how many characters an FC03 reading takes as RTU frames, request and reply together."""
+    """Return how many characters an FC03 reading takes as RTU frames, request and reply
+    together."""
     return 8 + 5 + 2 * registers
 
 
 def queue_characters(registers: int) -> int:
-    """Return how many characters an FC24 reading takes as RTU frames, request and reply together."""
+    """Return how many characters an FC24 reading takes as RTU frames, request and reply
+    together."""
     return 6 + 8 + 2 * registers
 
 

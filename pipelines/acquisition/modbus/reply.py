@@ -1,7 +1,9 @@
-"""What counts as a reply: a whole frame, well formed, that answers what was asked. Everything else is none.
+"""What counts as a reply: a whole frame, well formed, that answers what was asked. Everything else
+is none.
 
-pymodbus is lenient: it takes transaction id 0 for any, a reply to another function, a byte count that does not fit the
-frame; and what it cannot decode it raises within asyncio, where nobody waits for it. Numbers move a leg here.
+pymodbus is lenient: it takes transaction id 0 for any, a reply to another function, a byte count
+that does not fit the frame; and what it cannot decode it raises within asyncio, where nobody waits
+for it. Numbers move a leg here.
 """
 
 from collections.abc import Callable
@@ -24,11 +26,13 @@ class NoReply(ModbusPDU):
 
 
 class FifoReply(ReadFifoQueueResponse):
-    """What FC24 brings; pymodbus 3.16 takes its frame on a serial line for two bytes shorter than it is."""
+    """What FC24 brings; pymodbus 3.16 takes its frame on a serial line for two bytes shorter than
+    it is."""
 
     @classmethod
     def calculateRtuFrameSize(cls, data: bytes) -> int:
-        """Return how long a frame is that begins like this: unit, function, two counts, what they count, CRC."""
+        """Return how long a frame is that begins like this: unit, function, two counts, what they
+        count, CRC."""
         return 6 + int.from_bytes(data[2:4], "big")
 
 
@@ -56,7 +60,11 @@ class ReplyDecoder(DecodePDU):
         if not whole:
             return NoReply(f"{len(frame)} bytes that do not fit function {function}")
         # Not by pymodbus's own: that writes every reply out for its log, wanted or not.
-        reply = ExceptionResponse(function & ~ERROR) if function > ERROR else self.pdu_table[function][self.pdu_inx]()
+        reply = (
+            ExceptionResponse(function & ~ERROR)
+            if function > ERROR
+            else self.pdu_table[function][self.pdu_inx]()
+        )
         reply.decode(frame[1:])
         return reply
 

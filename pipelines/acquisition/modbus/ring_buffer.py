@@ -1,8 +1,10 @@
-"""A drive's own record of its samples, drained in blocks: a ring of registers (FC03) or a queue (FC24).
+"""A drive's own record of its samples, drained in blocks: a ring of registers (FC03) or a queue
+(FC24).
 
-What was overwritten before it could be drained is missing from what a drain returns, and shows as a gap in the sequence
-numbers. It is never taken for something else: every record carries its number, and the newest number is read once more
-after the records, so that one which the drive may have overwritten meanwhile is known.
+What was overwritten before it could be drained is missing from what a drain returns, and shows as a
+gap in the sequence numbers. It is never taken for something else: every record carries its number,
+and the newest number is read once more after the records, so that one which the drive may have
+overwritten meanwhile is known.
 """
 
 import time
@@ -19,12 +21,13 @@ FEWEST_READS = 4
 
 Record = Mapping[str, float]
 Numbered = Callable[[float, float | None], int]
-"""From what a counter's register held to the sample's number, which goes on beyond the register's width; and, where it
-was the drive's newest sample, when it was asked for (host's clock, s)."""
+"""From what a counter's register held to the sample's number, which goes on beyond the register's
+width; and, where it was the drive's newest sample, when it was asked for (host's clock, s)."""
 
 
 def most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
-    """Return how many reads one drain may take; what is left waits for the next one, as set-points do not.
+    """Return how many reads one drain may take; what is left waits for the next one, as set-points
+    do not.
 
     Twice what a cycle brings: what had to wait is made up for.
     """
@@ -34,14 +37,21 @@ def most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
 class Ring:
     """The ring of one drive, which FC03 reads."""
 
-    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered, samples_per_cycle: int = 1) -> None:
-        assert settings.newest and settings.address is not None and settings.capacity  # a ring has all three
+    def __init__(
+        self, device: Device, settings: RingSettings, numbered: Numbered, samples_per_cycle: int = 1
+    ) -> None:
+        # A ring has all three.
+        assert settings.newest and settings.address is not None and settings.capacity
         self._device = device
         self._numbered = numbered
         self._newest = Block({"newest": settings.newest})
         self._record = Block(registers_of(settings.record))
         self._span = int(self._record.span("sequence"))
-        self._address, self._capacity, self._words = settings.address, settings.capacity, settings.words
+        self._address, self._capacity, self._words = (
+            settings.address,
+            settings.capacity,
+            settings.words,
+        )
         self.block = settings.records_per_read
         self._most = most_reads(settings, samples_per_cycle) * self.block
         """Records that one drain brings."""
@@ -54,7 +64,8 @@ class Ring:
         return True
 
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
-        """Return records not returned before, each with its sequence number, up to the ``newest`` known to be there.
+        """Return records not returned before, each with its sequence number, up to the ``newest``
+        known to be there.
 
         The first drain returns none: it says where to begin.
         """
@@ -69,13 +80,16 @@ class Ring:
             count = min(newest + 1 - first, self.block, self._capacity - first % self._capacity)
             place = self._address + first % self._capacity * self._words
             words = await self._device.read(place, count * self._words, in_motion=True)
-            read += [(first + k, words[k * self._words : (k + 1) * self._words]) for k in range(count)]
+            read += [
+                (first + k, words[k * self._words : (k + 1) * self._words]) for k in range(count)
+            ]
             first += count
         sent = time.perf_counter()
         words = await self._device.read(self._newest.address, self._newest.count, in_motion=True)
         found = self._newest.decode(words)["newest"]
         ends = int(carried(found, newest, self._span))
-        # So far from what the exchange told: all of it is overwritten, or the answer damaged. Nothing of it is sure.
+        # So far from what the exchange told: all of it is overwritten, or the answer damaged.
+        # Nothing of it is sure.
         if abs(ends - newest) > self._capacity:
             ends = newest + self._capacity
         else:
@@ -88,12 +102,14 @@ class Ring:
     def _trusted(self, read: Sequence[tuple[int, Sequence[int]]]) -> list[tuple[int, Record]]:
         """Return the records that hold the numbers they should.
 
-        A drive may count a record before it has written it whole, so one with another number is read once more;
-        if that does not help, it is left out.
+        A drive may count a record before it has written it whole, so one with another number is
+        read once more; if that does not help, it is left out.
         """
         records: list[tuple[int, Record]] = []
         for number, words in read:
-            record = self._record.decode(words[self._record.address : self._record.address + self._record.count])
+            record = self._record.decode(
+                words[self._record.address : self._record.address + self._record.count]
+            )
             if record["sequence"] == number % self._span:
                 records.append((number, record))
             elif self._doubted is None or number > self._doubted:
@@ -118,7 +134,8 @@ class Queue:
         """Records that nobody else has any more, until a drain returns them."""
 
     async def forget(self) -> bool:
-        """Let go what has gathered in it, as far as one drain reaches; tell whether that was all."""
+        """Let go what has gathered in it, as far as one drain reaches; tell whether that was
+        all."""
         self._began, self._fetched = None, []
         for _ in range(self._reads):
             if len(await self._read()) < self.block:
@@ -134,8 +151,12 @@ class Queue:
             self._began = newest
         for _ in range(self._reads):
             found = await self._read()
-            numbered = [(int(carried(record["sequence"], newest, self._span)), record) for record in found]
-            self._fetched += [(number, record) for number, record in numbered if number > self._began]
+            numbered = [
+                (int(carried(record["sequence"], newest, self._span)), record) for record in found
+            ]
+            self._fetched += [
+                (number, record) for number, record in numbered if number > self._began
+            ]
             if len(found) < self.block:
                 break
         records, self._fetched = self._fetched, []

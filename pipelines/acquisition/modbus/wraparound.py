@@ -1,4 +1,5 @@
-"""A device's counter and clock: carried on beyond the width of their registers, and held against each other."""
+"""A device's counter and clock: carried on beyond the width of their registers, and held against
+each other."""
 
 RATE_TOLERANCE = 0.05
 """How far a device's clock may be from the rate that was asked for, as a share of it."""
@@ -7,7 +8,8 @@ CLOCK_SAMPLES = 0.5
 
 
 def carried(value: float, near: float, span: float) -> float:
-    """Return what a register of a span held, with as many turns of it added as bring it near to a known count."""
+    """Return what a register of a span held, with as many turns of it added as bring it near to a
+    known count."""
     # What is less than half a span away is a turn; anything else is a step of the device's own.
     return value + span * round((near - value) / span) if span else value
 

@@ -1,4 +1,5 @@
-"""How long a lost reply leaves a drive without a set-point, against how long its own watchdog waits for one."""
+"""How long a lost reply leaves a drive without a set-point, against how long its own watchdog waits
+for one."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import DriveSettings, RigSettings
@@ -30,9 +31,13 @@ def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sens
 def replies_waited_for(rig: RigSettings, drive: DriveSettings, *, with_sensors: bool) -> int:
     """Return how many replies' time goes by until a drive is told again whose reply was lost.
 
-    Where others are on its line, or its reply could be taken for another's, it is left alone for as long as it was
-    waited for: see ``Line``.
+    Where others are on its line, or its reply could be taken for another's, it is left alone for as
+    long as it was waited for: see ``Line``.
     """
-    on_line = [other for other in (*rig.drive, *(rig.sensor if with_sensors else ())) if other.line == drive.line]
+    on_line = [
+        other
+        for other in (*rig.drive, *(rig.sensor if with_sensors else ()))
+        if other.line == drive.line
+    ]
     shared = drive.line is not None and len(on_line) > 1
     return 2 if shared or not rig.line_of(drive).tells_replies_apart else 1

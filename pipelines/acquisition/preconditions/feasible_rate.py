@@ -10,7 +10,8 @@ from pipelines.settings.rig import RigSettings
 
 
 def refusals(*, with_sensors: bool) -> tuple[Callable[[RigSettings, float], None], ...]:
-    """Return what refuses a rig at a sample rate, Hz, each by a SettingsError that tells the key."""
+    """Return what refuses a rig at a sample rate, Hz, each by a SettingsError that tells the
+    key."""
     return (
         refuse_short_watchdog,
         partial(refuse_slow_lines, with_sensors=with_sensors),

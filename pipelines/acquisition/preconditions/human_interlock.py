@@ -1,4 +1,5 @@
-"""What a rig must have before somebody is moved by it: limits of their own, and cuff forces that are watched."""
+"""What a rig must have before somebody is moved by it: limits of their own, and cuff forces that
+are watched."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
@@ -8,7 +9,11 @@ LIMITS = ("speed_rad_s", "torque_nm")
 
 def unnoticed(rig: RigSettings) -> list[str]:
     """Return in words what nobody would notice on a rig while it moves somebody."""
-    missing = [] if rig.sensor else ["the rig file has no [[sensor]]: nobody watches how hard the cuffs press"]
+    missing = (
+        []
+        if rig.sensor
+        else ["the rig file has no [[sensor]]: nobody watches how hard the cuffs press"]
+    )
     blind = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].enabled_mask]
     if blind:
         missing.append(
@@ -26,7 +31,8 @@ def unnoticed(rig: RigSettings) -> list[str]:
 
 
 def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse to move somebody by a rig as its file describes it, whose limits would be those of an empty machine.
+    """Refuse to move somebody by a rig as its file describes it, whose limits would be those of an
+    empty machine.
 
     Nobody is in a virtual one.
 

@@ -1,7 +1,8 @@
-"""Whether the cycles of a run to come follow one another fast enough, tried with every device, telling none anything.
+"""Whether the cycles of a run to come follow one another fast enough, tried with every device,
+telling none anything.
 
-How long answers take is known of neither a device nor a computer before it was tried, and a set-point that is left out
-jerks a leg. So it is tried while the drives are disabled still.
+How long answers take is known of neither a device nor a computer before it was tried, and a
+set-point that is left out jerks a leg. So it is tried while the drives are disabled still.
 """
 
 from math import ceil
@@ -15,11 +16,13 @@ from pipelines.errors import DeviceError
 REHEARSED_S, FEWEST = 0.5, 20
 """How long it is tried, and the fewest cycles that takes."""
 MOST_LATE = 0.1
-"""Share of late cycles beyond which no run is begun: a computer may be busy with something else for a moment."""
+"""Share of late cycles beyond which no run is begun: a computer may be busy with something else for
+a moment."""
 
 
 async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
-    """Refuse set-points more often than cycles can follow one another, after ``machine.look``; nothing is written.
+    """Refuse set-points more often than cycles can follow one another, after ``machine.look``;
+    nothing is written.
 
     Raises
     ------
@@ -40,9 +43,11 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
 
 
 async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) -> tuple[int, int]:
-    """Make cycles as a run in real time does, until more than allowed let a sample go by; return those, and all.
+    """Make cycles as a run in real time does, until more than allowed let a sample go by; return
+    those, and all.
 
-    Where answers take longer than a cycle, none may come before its time is up: all of them would take minutes.
+    Where answers take longer than a cycle, none may come before its time is up: all of them would
+    take minutes.
     """
     pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
     sources = sources_of(machine, cycle_hz)
@@ -54,7 +59,9 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
         row = (await machine.cycle(made, _look)).row
         made += 1
         if row and sources:
-            await all_answers(source.samples(reading) for source, reading in zip(sources, row.drives, strict=True))
+            await all_answers(
+                source.samples(reading) for source, reading in zip(sources, row.drives, strict=True)
+            )
     for source in sources:
         await source.beside.brought()
     return late, made

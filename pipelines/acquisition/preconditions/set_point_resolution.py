@@ -4,11 +4,13 @@ from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
 FINEST_SHARE = 4
-"""Counts of a set-point's register in the longest step at least; rounding lengthens a step by one of them at most."""
+"""Counts of a set-point's register in the longest step at least; rounding lengthens a step by one
+of them at most."""
 
 
 def refuse_coarse_set_points(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse a drive whose set-points are rounded so coarsely that they leap though the motion is smooth.
+    """Refuse a drive whose set-points are rounded so coarsely that they leap though the motion is
+    smooth.
 
     Raises
     ------

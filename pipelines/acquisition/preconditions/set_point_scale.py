@@ -1,4 +1,5 @@
-"""Whether a drive is told angles as it tells them: where not, it leaps as it is enabled where the leg stands."""
+"""Whether a drive is told angles as it tells them: where not, it leaps as it is enabled where the
+leg stands."""
 
 from collections.abc import Iterator
 
@@ -22,7 +23,8 @@ def refuse_misplaced_set_points(rig: RigSettings) -> None:
 
 
 def misplaced_set_points(rig: RigSettings) -> Iterator[str]:
-    """Yield of each make of drives whose set-point's register contradicts its angle's what is wrong, and what to do."""
+    """Yield of each make of drives whose set-point's register contradicts its angle's what is
+    wrong, and what to do."""
     for name in sorted({drive.map for drive in rig.drive}):
         if what := _contradiction(rig.map.drive[name]):
             yield f"map.drive.{name}.write.reference.{what}"
@@ -47,7 +49,8 @@ def _contradiction(map_: DriveMap) -> str | None:
 
 
 def _apart(told: Register, tells: Register) -> tuple[str, str, str] | None:
-    """Return in which key two registers differ by which one angle is another count, with both values, if in any."""
+    """Return in which key two registers differ by which one angle is another count, with both
+    values, if in any."""
     for key in ("type", "word_order", "byte_order"):
         one, other = getattr(told, key), getattr(tells, key)
         if one != other and not (key == "word_order" and told.registers == 1):

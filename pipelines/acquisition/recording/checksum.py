@@ -1,7 +1,9 @@
-"""The checksum of a journal's batch, by which one that a disk has damaged is known from one that was written so.
+"""The checksum of a journal's batch, by which one that a disk has damaged is known from one that
+was written so.
 
-It stands as text in the batch's own metadata, where other readers of Arrow pass over it, and covers every byte of the
-batch, the text's own digits taken as zeros, and the journal's head, without which no column has a name.
+It stands as text in the batch's own metadata, where other readers of Arrow pass over it, and covers
+every byte of the batch, the text's own digits taken as zeros, and the journal's head, without which
+no column has a name.
 """
 
 import re

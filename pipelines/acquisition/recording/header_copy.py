@@ -1,7 +1,8 @@
-"""The head of a journal, with columns and metadata, kept more than once: without it no sample can be read.
+"""The head of a journal, with columns and metadata, kept more than once: without it no sample can
+be read.
 
-An Arrow stream has one head, at its beginning. Each copy is text among the metadata of a batch without rows, where
-other readers of Arrow pass over it.
+An Arrow stream has one head, at its beginning. Each copy is text among the metadata of a batch
+without rows, where other readers of Arrow pass over it.
 """
 
 import re
@@ -18,12 +19,14 @@ _TOLD = re.compile(rb"exoid-head:([0-9a-f]{8}):([A-Za-z0-9+/]+=*)")
 
 
 def copy_of(head: bytes) -> str:
-    """Return a head as text with a checksum, by which it is known in a file that is damaged anywhere else."""
+    """Return a head as text with a checksum, by which it is known in a file that is damaged
+    anywhere else."""
     return f"exoid-head:{crc32(head):08x}:{b64encode(head).decode()}"
 
 
 def ends_of(file: BinaryIO) -> Iterator[bytes]:
-    """Yield the beginning and the end of a journal, as far as it is searched for what tells how to read it."""
+    """Yield the beginning and the end of a journal, as far as it is searched for what tells how to
+    read it."""
     length = file.seek(0, 2)
     for place in (0, max(length - SEARCHED, 0)):
         file.seek(place)

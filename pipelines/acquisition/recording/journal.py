@@ -1,7 +1,8 @@
-"""Every sample on disk as it comes: an Arrow stream beside the recording, readable wherever it was cut off or damaged.
+"""Every sample on disk as it comes: an Arrow stream beside the recording, readable wherever it was
+cut off or damaged.
 
-Whoever writes a journal holds a lock on it, which the system takes away whatever becomes of the process: so a run
-that goes on can be told from one that was killed.
+Whoever writes a journal holds a lock on it, which the system takes away whatever becomes of the
+process: so a run that goes on can be told from one that was killed.
 """
 
 import errno
@@ -31,19 +32,22 @@ FLUSH_S = 0.2
 MOST_WAITING = 20_000
 """Samples that wait for a disk that takes none; then the run stops. 20 s at 1 kHz."""
 ABORT = b"abort"
-"""Key under which a journal's last words say why the run was stopped early; empty where it was not."""
+"""Key under which a journal's last words say why the run was stopped early; empty where it was
+not."""
 FOUND = b"found"
 """Key under which they hold what the run found out for its metadata."""
 ROWS = b"rows"
 """Key under which they tell how many samples there must be."""
 MARK = re.compile(rb"\xff{4}(?!\xff)")
-"""With these bytes every part of an Arrow stream begins; a length comes next, a multiple of eight, and no fifth."""
+"""With these bytes every part of an Arrow stream begins; a length comes next, a multiple of eight,
+and no fifth."""
 END = b"\xff\xff\xff\xff\0\0\0\0"
 """With this a stream ends that was closed."""
 SCANNED = 65536
 """Bytes that are looked through at once for the next mark."""
 NO_SAMPLE = 512
-"""So short a file holds no sample: the head of a run alone, with its columns and metadata, is longer."""
+"""So short a file holds no sample: the head of a run alone, with its columns and metadata, is
+longer."""
 
 
 def field_of(name: str) -> pa.Field:
@@ -52,12 +56,15 @@ def field_of(name: str) -> pa.Field:
 
 
 class Journal:
-    """Rows on their way to disk, which a thread of its own brings there: a disk that hangs must not hold up a leg."""
+    """Rows on their way to disk, which a thread of its own brings there: a disk that hangs must not
+    hold up a leg."""
 
     def __init__(self, path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> None:
         self.path = path
         self.rows = 0
-        self._schema = pa.schema(map(field_of, columns), metadata={KEY: to_json(metadata, str(path)).encode()})
+        self._schema = pa.schema(
+            map(field_of, columns), metadata={KEY: to_json(metadata, str(path)).encode()}
+        )
         self._head = self._schema.serialize().to_pybytes()
         self._copy = {COPY: copy_of(self._head).encode()}
         self._waiting: deque[Sequence[float]] = deque()
@@ -111,16 +118,20 @@ class Journal:
                 self._failure = error
 
     def _refuse_elsewhere(self) -> None:
-        """Refuse to write on to a file that was removed or moved: an open one takes all, and nobody finds it again."""
+        """Refuse to write on to a file that was removed or moved: an open one takes all, and nobody
+        finds it again."""
         try:
             is_there = os.path.samestat(os.stat(self.path), self._identity)
         except FileNotFoundError:
             is_there = False
         if not is_there:
-            raise FileNotFoundError(errno.ENOENT, "it was removed or moved while the run went on", str(self.path))
+            raise FileNotFoundError(
+                errno.ENOENT, "it was removed or moved while the run went on", str(self.path)
+            )
 
     def end(self, abort: str | None, found: Mapping[str, Any] | None = None) -> None:
-        """Say how the run ended: why it was stopped early, None if it was not. Only a killed run never says.
+        """Say how the run ended: why it was stopped early, None if it was not. Only a killed run
+        never says.
 
         ``found`` is what else its metadata shall tell that was not known before the run.
         """
@@ -133,14 +144,23 @@ class Journal:
         self._writer.join()
         with self._file:  # closed even where the disk is full
             self.flush()
-            # The copy once more: what damages the beginning of a file may reach further than its head.
-            words = b"" if self._last_words is None else self._batch([], self._last_words | self._copy)
+            # The copy once more: what damages the beginning of a file may reach further than its
+            # head.
+            words = (
+                b"" if self._last_words is None else self._batch([], self._last_words | self._copy)
+            )
             self._hand_over(words + END)
 
-    def _batch(self, rows: Sequence[Sequence[float]], more: Mapping[bytes, bytes] | None = None) -> bytes:
-        """Return rows as a part of an Arrow stream, with ``more`` and a checksum as the metadata of its own."""
+    def _batch(
+        self, rows: Sequence[Sequence[float]], more: Mapping[bytes, bytes] | None = None
+    ) -> bytes:
+        """Return rows as a part of an Arrow stream, with ``more`` and a checksum as the metadata of
+        its own."""
         columns = zip(*rows, strict=True) if rows else ((),) * len(self._schema)
-        arrays = [pa.array(column, type=field.type) for column, field in zip(columns, self._schema, strict=True)]
+        arrays = [
+            pa.array(column, type=field.type)
+            for column, field in zip(columns, self._schema, strict=True)
+        ]
         stream = io.BytesIO()
         with pa.ipc.new_stream(stream, self._schema) as made:
             metadata = {**(more or {}), checksum.KEY: checksum.BLANK}
@@ -188,10 +208,14 @@ class JournalFile:
             try:
                 copy = head_in(file)
                 self.checked = any(map(checksum.has_any, ends_of(file)))
-                """Whether its batches have checksums: those of an older exoid have none, and are believed."""
-                # The copy has a checksum, the head itself none: where they differ, that one is right.
+                """Whether its batches have checksums: those of an older exoid have none, and are
+                believed."""
+                # The copy has a checksum, the head itself none: where they differ, that one is
+                # right.
                 self._head = copy or _part_at(file, 0)
-                self._lost = 0 if self._head == _between(file, 0, len(self._head)) else len(self._head)
+                self._lost = (
+                    0 if self._head == _between(file, 0, len(self._head)) else len(self._head)
+                )
                 self.schema = pa.ipc.open_stream(self._head).schema
                 metadata = json.loads(self.schema.metadata[KEY])
             except OSError as error:
@@ -207,7 +231,8 @@ class JournalFile:
         self.metadata: dict[str, Any] = metadata
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batch after batch; one that was cut off or is damaged is left out, and what comes after it looked for.
+        """Yield batch after batch; one that was cut off or is damaged is left out, and what comes
+        after it looked for.
 
         Raises
         ------
@@ -231,12 +256,15 @@ class JournalFile:
                 self.damaged += rest
 
     def _batch_at(self, file: BinaryIO, place: int) -> Batch | None:
-        """Return the batch that begins at a place of the file, and leave the file at its end; None where none does."""
+        """Return the batch that begins at a place of the file, and leave the file at its end; None
+        where none does."""
         try:
             part = _part_at(file, place)
             if self.checked and not checksum.fits(part, self._head):
                 return None
-            rows, words = pa.ipc.open_stream(self._head + part).read_next_batch_with_custom_metadata()
+            rows, words = pa.ipc.open_stream(
+                self._head + part
+            ).read_next_batch_with_custom_metadata()
             rows.validate()
         except OSError as error:
             _raise_if_the_disk_s(self.path, error)
@@ -264,7 +292,9 @@ def _why_no_journal(path: Path) -> str:
         return f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run left"
     size = path.stat().st_size
     if size <= NO_SAMPLE:
-        return "is no journal of a run, or not even its head was written and so no sample; delete it"
+        return (
+            "is no journal of a run, or not even its head was written and so no sample; delete it"
+        )
     return (
         f"the head of its {size} bytes, which names the columns, is damaged or cut off, and no whole copy of it is "
         "there; nothing was changed; keep it, samples may be in it; check the disk, and move it away to record here"
@@ -277,7 +307,8 @@ def _short(value: object) -> str:
 
 
 class _Within:
-    """A file of which no more is read than there is: Arrow asks for as many bytes as damaged bytes tell."""
+    """A file of which no more is read than there is: Arrow asks for as many bytes as damaged bytes
+    tell."""
 
     closed = False
 
@@ -290,7 +321,8 @@ class _Within:
 
 
 def _part_at(file: BinaryIO, place: int) -> bytes:
-    """Return the part of a stream that begins at a place of the file, and leave the file at its end."""
+    """Return the part of a stream that begins at a place of the file, and leave the file at its
+    end."""
     file.seek(place)
     pa.ipc.read_message(pa.PythonFile(_Within(file), mode="r"))
     return _between(file, place, file.tell())
@@ -329,7 +361,9 @@ def refuse_leftover(path: Path) -> None:
         return
     with locked(path) as lock:
         if not lock.free:
-            raise InputError(f"{path}: another run is recording there now; choose another output or wait for its end")
+            raise InputError(
+                f"{path}: another run is recording there now; choose another output or wait for its end"
+            )
     journal = JournalFile(path)
     rows = sum(batch.rows.num_rows for batch in journal.batches())
     raise InputError(

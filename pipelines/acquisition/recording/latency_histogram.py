@@ -1,4 +1,5 @@
-"""How long the answers of a cycle take while the leg moves; counted, so that memory does not grow with a run."""
+"""How long the answers of a cycle take while the leg moves; counted, so that memory does not grow
+with a run."""
 
 from itertools import accumulate
 from math import log

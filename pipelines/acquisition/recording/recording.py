@@ -1,4 +1,5 @@
-"""A recording made of a journal, whether its run has ended, was stopped or was killed; an hour takes no more memory."""
+"""A recording made of a journal, whether its run has ended, was stopped or was killed; an hour
+takes no more memory."""
 
 import json
 from dataclasses import dataclass, field
@@ -8,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.recording.journal import ABORT, FOUND, ROWS, JournalFile, field_of, in_pieces
+from pipelines.acquisition.recording.journal import (
+    ABORT,
+    FOUND,
+    ROWS,
+    JournalFile,
+    field_of,
+    in_pieces,
+)
 from pipelines.acquisition.recording.valid_rows import sound_batches
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import aborted_of
@@ -65,7 +73,10 @@ def account_of(journal: JournalFile) -> Account:
         if offset is None:
             offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
         index = sequence + offset
-        found, samples = _gaps(np.concatenate([[reached - 1], index]), rate_hz), samples + len(index)
+        found, samples = (
+            _gaps(np.concatenate([[reached - 1], index]), rate_hz),
+            samples + len(index),
+        )
         gaps, reached = gaps + found, int(index[-1]) + 1
     said = None if last_words is None else _said(last_words)
     if said is None:
@@ -73,7 +84,9 @@ def account_of(journal: JournalFile) -> Account:
         why = f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its disk was full"
         damaged = journal.damaged > 0 or last_words is not None
         why += ", or its last words are damaged" if damaged else ""
-        return Account(samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked)
+        return Account(
+            samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked
+        )
     abort, found_out, rows = said
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
@@ -82,7 +95,8 @@ def account_of(journal: JournalFile) -> Account:
 
 
 def _said(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
-    """Return why a run stopped early, what else it found out, and its number of samples; None where that is damaged."""
+    """Return why a run stopped early, what else it found out, and its number of samples; None where
+    that is damaged."""
     try:
         found = json.loads(last_words[FOUND])
         said = last_words[ABORT].decode() or None, found, int(last_words[ROWS])

@@ -5,7 +5,12 @@ from pathlib import Path
 
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.recording.journal import JournalFile
-from pipelines.acquisition.recording.recording import Account, account_of, place_for, write_recording
+from pipelines.acquisition.recording.recording import (
+    Account,
+    account_of,
+    place_for,
+    write_recording,
+)
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import JOURNAL
 from pipelines.errors import InputError
@@ -33,30 +38,37 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
     path : Path
         The journal.
     output : Path, optional
-        The recording; else what `exoid acquire` would have called it, ``<run>.aborted.parquet`` for a run that was
-        killed. A file that is there is never overwritten.
+        The recording; else what `exoid acquire` would have called it, ``<run>.aborted.parquet`` for
+        a run that was killed. A file that is there is never overwritten.
 
     Raises
     ------
     InputError
-        Where it is none, is still written to, or holds no sample, and where the output is there already.
+        Where it is none, is still written to, or holds no sample, and where the output is there
+        already.
     """
     if not path.exists():
         raise InputError(
             f"{path}: no such file; {similar_file(path) or '`exoid recover` takes the journal that a killed run left'}"
         )
     if not path.is_file():  # a pipe would be waited for
-        raise InputError(f"{path}: is no file, expected the journal that a killed run left; name another")
+        raise InputError(
+            f"{path}: is no file, expected the journal that a killed run left; name another"
+        )
     with locked(path) as lock:
         if not lock.free:
-            raise InputError(f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C")
+            raise InputError(
+                f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C"
+            )
         journal = JournalFile(path)
         account = account_of(journal)
         if not account.samples:
             raise InputError(f"{path}: {_why_no_sample(account)}")
         output = output or place_for(path.with_name(path.name.removesuffix(JOURNAL)), account.abort)
         if output.exists():
-            raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
+            raise InputError(
+                f"{output}: is there already and is not overwritten; name another file with -o"
+            )
         RECORDING.refuse_place(output)
         write_recording(journal, output, account, recovered=True)
         if not account.damaged:

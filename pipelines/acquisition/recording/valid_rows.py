@@ -1,4 +1,5 @@
-"""Rows of a journal that can stand in a recording; what cannot is left out, so that it never costs the others."""
+"""Rows of a journal that can stand in a recording; what cannot is left out, so that it never costs
+the others."""
 
 from collections.abc import Iterator
 
@@ -15,10 +16,11 @@ MEASURED = ("_angle_rad", "_torque_nm")
 
 
 def sound_batches(journal: JournalFile) -> Iterator[Batch]:
-    """Yield a journal's batches without rows whose values are none, or whose counter and clock part.
+    """Yield a journal's batches without rows whose values are none, or whose counter and clock
+    part.
 
-    Each row is held against the last one that was sound: a single row that is damaged is left out, and the next one
-    goes on.
+    Each row is held against the last one that was sound: a single row that is damaged is left out,
+    and the next one goes on.
     """
     rate_hz, last = journal.metadata["sample_rate_hz"], None
     for batch in journal.batches():
@@ -32,7 +34,11 @@ def _are_numbers(rows: pa.RecordBatch) -> NDArray:
     fine = np.ones(rows.num_rows, bool)
     for name, column in zip(rows.schema.names, rows.columns, strict=True):
         values = column.to_numpy(zero_copy_only=False)
-        fine &= np.isfinite(values) if name.endswith(MEASURED) or name == "time_s" else ~np.isinf(values)
+        fine &= (
+            np.isfinite(values)
+            if name.endswith(MEASURED) or name == "time_s"
+            else ~np.isinf(values)
+        )
         if name.endswith("_rad"):
             fine &= ~(np.abs(values) > LARGEST_ANGLE_RAD)
     return fine
@@ -41,7 +47,8 @@ def _are_numbers(rows: pa.RecordBatch) -> NDArray:
 def _in_time(
     rows: pa.RecordBatch, fine: NDArray, rate_hz: float, last: tuple[int, float] | None
 ) -> tuple[NDArray, tuple[int, float] | None]:
-    """Mark those of the ``fine`` rows (n,) that go on from the last one; return the new last one too."""
+    """Mark those of the ``fine`` rows (n,) that go on from the last one; return the new last one
+    too."""
     kept = fine.copy()
     sequence, time = (rows.column(name).to_numpy() for name in ("sequence", "time_s"))
     for k in np.flatnonzero(fine):

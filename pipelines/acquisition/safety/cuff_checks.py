@@ -1,4 +1,5 @@
-"""Whether what cuff sensors tell can be true: forces that a sensor can resolve, and that change while the leg moves."""
+"""Whether what cuff sensors tell can be true: forces that a sensor can resolve, and that change
+while the leg moves."""
 
 from collections.abc import Sequence
 from math import isnan
@@ -20,7 +21,8 @@ class Cuffs:
         self._held = {name: Held() for name in CUFFS}
 
     def doubt(self, forces: NDArray, cycle: int, travel: float) -> str | None:
-        """Return why forces (4, 3) N cannot be true, None if they can; ``travel`` is how far joints were told to go."""
+        """Return why forces (4, 3) N cannot be true, None if they can; ``travel`` is how far joints
+        were told to go."""
         for force, name in zip(forces.tolist(), CUFFS, strict=True):
             if any(map(isnan, force)):
                 continue  # a sensor that was not read

@@ -19,7 +19,9 @@ HOLD_SAMPLES = 20
 class Limits:
     """The limits of a rig, checked at every sample."""
 
-    def __init__(self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()) -> None:
+    def __init__(
+        self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()
+    ) -> None:
         """Watch drives, and those cuff sensors that are read."""
         self._rig = rig
         self._rate = sample_rate_hz
@@ -41,10 +43,13 @@ class Limits:
         return self.cuff_violation(told)
 
     def cuff_violation(self, told: Row | Answers) -> str | None:
-        """Return which cuff's force is above its limit, or could be unseen: its sensor tells nothing any more."""
+        """Return which cuff's force is above its limit, or could be unseen: its sensor tells
+        nothing any more."""
         first = told.drives[0]
         cycle = first.sequence // self._samples_per_cycle if isinstance(first, Reading) else None
-        return self.force_violation(told.forces) or (None if cycle is None else self._silence(told.forces, cycle))
+        return self.force_violation(told.forces) or (
+            None if cycle is None else self._silence(told.forces, cycle)
+        )
 
     def straying(self, told: Row | Answers, in_force: NDArray, late: int = 0) -> str | None:
         """Return which joint is too far from its set-point, (J,) rad, None if none is.
@@ -65,7 +70,8 @@ class Limits:
         return None
 
     def _silence(self, forces: NDArray, cycle: int) -> str | None:
-        """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
+        """Return which cuff sensor has told nothing for too long: its limit would be watched by
+        nobody."""
         for cuff, sensor in self._sensors.items():
             if all(map(isfinite, forces[cuff].tolist())):
                 self._felt[cuff] = cycle
@@ -78,7 +84,8 @@ class Limits:
         return None
 
     def force_violation(self, forces: NDArray) -> str | None:
-        """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new sample."""
+        """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new
+        sample."""
         most = self._rig.safety.cuff_force_n
         for cuff, force in zip(CUFFS, forces.tolist(), strict=True):
             if all(map(isnan, force)):
@@ -89,7 +96,9 @@ class Limits:
         return None
 
 
-def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samples_hz: float) -> str | None:
+def sample_violation(
+    drive: DriveSettings, before: Reading, found: Reading, samples_hz: float
+) -> str | None:
     """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
     low, high = drive.angle_rad
     if not low <= found.angle <= high:
@@ -107,10 +116,11 @@ def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samp
 
 
 def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: float) -> None:
-    """Stand between the plan and the wire: refuse a set-point (rad) that no planned motion may ask for.
+    """Stand between the plan and the wire: refuse a set-point (rad) that no planned motion may ask
+    for.
 
-    Whatever went wrong before, it is a number, within its joint's limits, and no further from the ``last`` one than
-    its speed limit leads in the time that it is allowed, s.
+    Whatever went wrong before, it is a number, within its joint's limits, and no further from the
+    ``last`` one than its speed limit leads in the time that it is allowed, s.
     """
     low, high = drive.angle_rad
     if not low <= reference <= high:
@@ -127,10 +137,13 @@ def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: 
 
 def clamped(value: float, low: float, high: float) -> float:
     """Return what is nearest to a value within bounds; NaN stays NaN."""
-    return min(max(value, low), high)  # in this order: what a NaN is compared with does not take its place
+    # In this order: what a NaN is compared with does not take its place.
+    return min(max(value, low), high)
 
 
-def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:
+def slowed(
+    reference: float, speed: float, deceleration: float, time_s: float
+) -> tuple[float, float]:
     """Return set-point (rad) and speed (rad/s) a while later of one that slows down to rest."""
     moving_s = min(time_s, abs(speed) / deceleration)
     path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)

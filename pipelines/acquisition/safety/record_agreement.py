@@ -1,7 +1,8 @@
-"""One drive's two accounts of its samples: what exchanges bring, and what its own record holds, number by number.
+"""One drive's two accounts of its samples: what exchanges bring, and what its own record holds,
+number by number.
 
-Each has registers of its own in the rig file. Where their scales, signs or zeros differ, one of them is wrong, and
-which of them nobody can tell from the numbers.
+Each has registers of its own in the rig file. Where their scales, signs or zeros differ, one of
+them is wrong, and which of them nobody can tell from the numbers.
 """
 
 from collections import OrderedDict
@@ -12,7 +13,8 @@ from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
 MOST_HELD = 1000
-"""Exchanges that wait for the record of their sample; a run that falls further behind is stopped."""
+"""Exchanges that wait for the record of their sample; a run that falls further behind is
+stopped."""
 COMPARED = 50
 """Samples of both accounts after which the torques' ratio is looked at."""
 RATIO = 0.25
@@ -20,7 +22,8 @@ RATIO = 0.25
 LITTLE_NM = 1.0
 """rms of the torque below which its noise may be all there is, on an exoskeleton."""
 NEAR_RAD = 1e-3
-"""How far the angles of one sample may be apart, besides what the joint travels in a sample and a half."""
+"""How far the angles of one sample may be apart, besides what the joint travels in a sample and a
+half."""
 
 
 class Agreement:
@@ -29,7 +32,11 @@ class Agreement:
     def __init__(self, rig: RigSettings, joint: int, rate_hz: float) -> None:
         """Judge the record of a joint's drive, which holds samples at a rate."""
         drive = rig.drive[joint]
-        self._label, self._where, self._rate_hz = rig.label_of(drive), f"map.drive.{drive.map}", rate_hz
+        self._label, self._where, self._rate_hz = (
+            rig.label_of(drive),
+            f"map.drive.{drive.map}",
+            rate_hz,
+        )
         self._exchanged: OrderedDict[int, Reading] = OrderedDict()
         self._compared, self._xx, self._xy, self._yy = 0, 0.0, 0.0, 0.0
 
@@ -40,13 +47,19 @@ class Agreement:
             self._exchanged.popitem(last=False)
 
     def judge(self, recorded: Reading) -> None:
-        """Raise DeviceError where a recorded sample cannot be the one that an exchange brought under its number."""
+        """Raise DeviceError where a recorded sample cannot be the one that an exchange brought
+        under its number."""
         exchanged = self._exchanged.pop(recorded.sequence, None)
         if exchanged is None:
             return
         apart = abs(recorded.angle - exchanged.angle)
-        if apart > NEAR_RAD + 1.5 * abs(exchanged.velocity) / self._rate_hz:  # NaN: nothing is known
-            raise DeviceError(self._contradiction("angle", exchanged.angle, recorded.angle, "rad", recorded.sequence))
+        # NaN: nothing is known.
+        if apart > NEAR_RAD + 1.5 * abs(exchanged.velocity) / self._rate_hz:
+            raise DeviceError(
+                self._contradiction(
+                    "angle", exchanged.angle, recorded.angle, "rad", recorded.sequence
+                )
+            )
         if not isfinite(exchanged.torque * recorded.torque):  # one of them does not tell it
             return
         self._compared += 1
@@ -59,7 +72,9 @@ class Agreement:
                 what = exchanged.torque, recorded.torque
                 raise DeviceError(self._contradiction("torque", *what, "N·m", recorded.sequence))
 
-    def _contradiction(self, what: str, exchanged: float, recorded: float, unit: str, sequence: int) -> str:
+    def _contradiction(
+        self, what: str, exchanged: float, recorded: float, unit: str, sequence: int
+    ) -> str:
         name = "current" if what == "torque" else what
         return (
             f"{self._label}: tells {what} {exchanged:.4g} {unit} of sample {sequence}, while its own record holds "

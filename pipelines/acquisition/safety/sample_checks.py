@@ -1,9 +1,11 @@
-"""One drive's samples, one after the other: whether they keep coming, and whether each can be true after the last.
+"""One drive's samples, one after the other: whether they keep coming, and whether each can be true
+after the last.
 
-What exchanges bring is one stream, what the drive recorded itself another; both are judged alike. No checksum guards
-what a device, a gateway or a register map got wrong, so contradictions are looked for: with the limits, between a
-counter and its clock, between an angle and its speed, between a value and the motion that was asked for. What
-contradicts nothing passes; docs/faults.md says how large it can be.
+What exchanges bring is one stream, what the drive recorded itself another; both are judged alike.
+No checksum guards what a device, a gateway or a register map got wrong, so contradictions are
+looked for: with the limits, between a counter and its clock, between an angle and its speed,
+between a value and the motion that was asked for. What contradicts nothing passes; docs/faults.md
+says how large it can be.
 """
 
 from math import ceil, inf
@@ -11,23 +13,33 @@ from math import ceil, inf
 from pipelines.acquisition.machine.drive import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
 from pipelines.acquisition.safety.limits import sample_violation
-from pipelines.acquisition.safety.stuck_register import ANSWER_CYCLES, FROZEN_CYCLES, FROZEN_RAD, Held, Told
+from pipelines.acquisition.safety.stuck_register import (
+    ANSWER_CYCLES,
+    FROZEN_CYCLES,
+    FROZEN_RAD,
+    Held,
+    Told,
+)
 from pipelines.acquisition.safety.watchdog import Patience
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import MOST_REGISTERS, RigSettings
 
 SETTLED_CYCLES = 50
-"""Cycles after which a clock's rate is looked at; a step of it can then be told from a wrong unit."""
+"""Cycles after which a clock's rate is looked at; a step of it can then be told from a wrong
+unit."""
 SPEED_SHARE = 0.25
-"""How far a drive's speed may be from what its angle does in one sample, as a share of the speed limit."""
+"""How far a drive's speed may be from what its angle does in one sample, as a share of the speed
+limit."""
 ECHO_CYCLES = 8
-"""Within how many cycles at the speed limit a drive's set-point must be of the one that was sent."""
+"""Within how many cycles at the speed limit a drive's set-point must be of the one that was
+sent."""
 CHANGING = {"angle": "rad", "velocity": "rad/s", "current": "A"}
 """What a drive tells that changes while its joint moves."""
 
 
 class Stream:
-    """What one drive told so far, against which its next sample is held; instants ``now`` are the host's, s."""
+    """What one drive told so far, against which its next sample is held; instants ``now`` are the
+    host's, s."""
 
     def __init__(self, rig: RigSettings, joint: int, sample_rate_hz: float, told: Told) -> None:
         """Judge the samples of a joint's drive, which is ``told`` set-points at a rate."""
@@ -42,7 +54,8 @@ class Stream:
         self._gone = 0.0
         self._settle_s = rig.safety.settle_s
         self._untold: tuple[int, int] | None = None
-        """Between which samples the drive was told nothing last, for samples were missed or set-points left out."""
+        """Between which samples the drive was told nothing last, for samples were missed or
+        set-points left out."""
         self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
@@ -70,7 +83,8 @@ class Stream:
         )
 
     def refuse_to_fall_behind(self, newest: int) -> None:
-        """Refuse to go on where the drive's own record does not keep up with its counter, which is at ``newest``."""
+        """Refuse to go on where the drive's own record does not keep up with its counter, which is
+        at ``newest``."""
         if self._newest_at_first is None:
             self._newest_at_first = newest
         last = self._newest_at_first if self._last is None else self._last.sequence
@@ -88,7 +102,9 @@ class Stream:
             return
         last = self._last.sequence
         if count < last:
-            raise DeviceError(f"{self._label}: its sample counter went back from {last} to {count}; was it restarted?")
+            raise DeviceError(
+                f"{self._label}: its sample counter went back from {last} to {count}; was it restarted?"
+            )
         if count > last + self._most:
             raise DeviceError(
                 f"{self._label}: its sample counter leapt from {last} to {count}, expected at most {self._most} "
@@ -104,7 +120,8 @@ class Stream:
             self.begin(found, now)
         elif found.sequence == before.sequence:
             return False
-        if found.sequence - before.sequence >= 2 * self._cycle:  # one more or less than a cycle is the host's doing
+        # One more or less than a cycle is the host's doing.
+        if found.sequence - before.sequence >= 2 * self._cycle:
             self.leave_out(before.sequence, found.sequence)
         why = (
             self._clock(before, found)
@@ -127,7 +144,8 @@ class Stream:
         return samples if samples >= SETTLED_CYCLES * self._cycle else 0
 
     def _clock(self, before: Reading, found: Reading) -> str | None:
-        """Return what is wrong with a clock that does not go on, or not at the rate: its unit may be another."""
+        """Return what is wrong with a clock that does not go on, or not at the rate: its unit may
+        be another."""
         if found is not before and not found.time > before.time:
             return (
                 f"{self._label}: its clock went from {before.time:.6f} to {found.time:.6f} s while its counter went "
@@ -155,7 +173,8 @@ class Stream:
         )
 
     def _leap(self, before: Reading, found: Reading) -> str | None:
-        """Hold an angle against the one before it, the speed limit, and the speed that the drive tells."""
+        """Hold an angle against the one before it, the speed limit, and the speed that the drive
+        tells."""
         samples = found.sequence - before.sequence
         if samples <= 0:
             return None
@@ -182,7 +201,8 @@ class Stream:
         self._untold = since, until
 
     def after_jerk(self, why: str, found: Reading | None = None) -> str:
-        """Return why to stop, with what may have jerked the leg shortly before the sample that was found."""
+        """Return why to stop, with what may have jerked the leg shortly before the sample that was
+        found."""
         jerked = self._jerked(found or self._last)
         return f"{why}; {jerked}" if jerked else why
 
@@ -195,7 +215,8 @@ class Stream:
         return f"{jerked}; else " if jerked else ""
 
     def _jerked(self, found: Reading | None) -> str:
-        """Return in words that the leg may have jerked, where its drive was told nothing shortly before; or nothing."""
+        """Return in words that the leg may have jerked, where its drive was told nothing shortly
+        before; or nothing."""
         if self._untold is None or found is None or found.sequence < self._untold[0]:
             return ""
         seconds = max(found.sequence - self._untold[1], 0) / self._rate
@@ -220,7 +241,8 @@ class Stream:
         )
 
     def _frozen(self, before: Reading, found: Reading) -> str | None:
-        """Tell which register stands still while the joint is told to move, and moves by what else is known of it."""
+        """Tell which register stands still while the joint is told to move, and moves by what else
+        is known of it."""
         travel = self._told.at(found.sequence - ANSWER_CYCLES * self._cycle).travel
         self._gone += found.velocity * (found.sequence - before.sequence) / self._rate
         for name, unit in CHANGING.items():
@@ -230,7 +252,8 @@ class Stream:
             if samples < FROZEN_CYCLES * self._cycle or went <= FROZEN_RAD:
                 continue
             seconds = samples / self._rate
-            if not self._contradicted(name, held, found, seconds) <= FROZEN_RAD:  # NaN: nothing else is known
+            # NaN: nothing else is known.
+            if not self._contradicted(name, held, found, seconds) <= FROZEN_RAD:
                 return (
                     f"{self._label}: tells {name} {held.value:.6g} {unit} for {seconds:.3f} s, while it was told to go "
                     f"{went:.3f} rad; its register is frozen, or the joint is blocked"
@@ -238,7 +261,8 @@ class Stream:
         return None
 
     def _contradicted(self, name: str, held: Held, found: Reading, seconds: float) -> float:
-        """Return by how much angle or speed contradict a value that stood still, rad; of a current nothing is known."""
+        """Return by how much angle or speed contradict a value that stood still, rad; of a current
+        nothing is known."""
         if name == "angle":
             return abs(self._gone - held.gone)
         if name == "velocity" and found.angle == held.angle and found.velocity != 0.0:

@@ -4,7 +4,8 @@ from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
 FEWEST_SAMPLES = 3
-"""That the watchdog waits for: one that is late and one that is lost are no reason to stop a leg."""
+"""That the watchdog waits for: one that is late and one that is lost are no reason to stop a
+leg."""
 
 
 def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:

@@ -8,7 +8,8 @@ from pipelines.effects import VoluntaryTorque
 def auxiliary_evidence(prepared: Prepared) -> dict[str, float]:
     """Return the log likelihood ratio of each label besides what it does to the mean torque.
 
-    Of a wearer's pushes it is what cuffs and drives share; a rhythm that is fitted explains some of it too.
+    Of a wearer's pushes it is what cuffs and drives share; a rhythm that is fitted explains some of
+    it too.
     """
     ratios = cuff_coherence(prepared.runs, prepared.residuals)
     return {

@@ -15,14 +15,15 @@ from pipelines.effects import EFFECTS, Effect, Parameter
 from pipelines.model import BASELINE, Term, TermColumns
 
 WORN = ("mass_off_axis", "payload_change")
-"""Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
+"""Effects of the structure that the person may carry instead: then in their runs only, and felt by
+the cuffs."""
 NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
 WAVES = 1.5
-"""Fewest waves of a ripple within the angles that are swept: with fewer it does not repeat, and together with a spring
-it fits any function of the angle."""
+"""Fewest waves of a ripple within the angles that are swept: with fewer it does not repeat, and
+together with a spring it fits any function of the angle."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,11 @@ class Candidate:
     shapes: tuple[tuple[float, ...], ...]
     """One for each run; they differ in parameters that each run has for itself."""
     directions: tuple[tuple[float, ...], ...] = ()
-    """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
+    """Shapes that have a column each, where the effect is in proportion to them; empty where it has
+    one shape."""
     bodies: tuple[float, ...] = ()
-    """Baseline values (b,) with whose rigid bodies the library simulates a transmission; empty: the baseline's own."""
+    """Baseline values (b,) with whose rigid bodies the library simulates a transmission; empty: the
+    baseline's own."""
 
     @property
     def label(self) -> str:
@@ -47,21 +50,31 @@ class Candidate:
         return Term.of(self.effect, self.shapes[run])
 
     def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in all."""
-        return self.with_own(i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)])
+        """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in
+        all."""
+        return self.with_own(
+            i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)]
+        )
 
     def with_own(self, i: int, values: Sequence[float]) -> "Candidate":
         """Return the candidate with a value of shape parameter ``i`` for each run."""
         shapes = zip(self.shapes, values, strict=True)
-        return replace(self, shapes=tuple((*shape[:i], float(value), *shape[i + 1 :]) for shape, value in shapes))
+        return replace(
+            self,
+            shapes=tuple((*shape[:i], float(value), *shape[i + 1 :]) for shape, value in shapes),
+        )
 
     def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with another value of shape parameter ``i``, in some runs or in all."""
-        return self.with_own(i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)])
+        """Return the candidate with another value of shape parameter ``i``, in some runs or in
+        all."""
+        return self.with_own(
+            i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)]
+        )
 
     @property
     def bends(self) -> bool:
-        """Whether the effect changes kinematics or readings rather than adding torque of its own."""
+        """Whether the effect changes kinematics or readings rather than adding torque of its
+        own."""
         return bends_motion(self.effect)
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
@@ -71,9 +84,11 @@ class Candidate:
         return TermColumns.of(self.effect, kinds, per_run, start)
 
     def typical(self, kinds: Sequence[str]) -> NDArray:
-        """Return how large the amplitude of each column is where the effect is as large as on other machines, (k,).
+        """Return how large the amplitude of each column is where the effect is as large as on other
+        machines, (k,).
 
-        Where the effect transforms the motion a column has its shape, or is in proportion to its direction.
+        Where the effect transforms the motion a column has its shape, or is in proportion to its
+        direction.
         """
         if self.directions:
             sizes = [_largest(self.effect, direction) for direction in self.directions]
@@ -85,19 +100,32 @@ class Candidate:
 
     @property
     def log_prior(self) -> float:
-        """Log prior density of its shape over that of a uniform one in the typical range; forms are equally likely.
+        """Log prior density of its shape over that of a uniform one in the typical range; forms are
+        equally likely.
 
-        A free shape has Student's distribution about the middle of its typical range, with a quarter of the range as
-        its scale. Where a joint's way decides the range, or each run has a value, the density is the uniform one.
+        A free shape has Student's distribution about the middle of its typical range, with a
+        quarter of the range as its scale. Where a joint's way decides the range, or each run has a
+        value, the density is the uniform one.
         """
         forms = prod(max(len(parameter.forms), 1) for parameter in self.effect.shape)
-        free = [i for i, p in enumerate(self.effect.shape) if self.is_free(i) and not (p.swept or p.per_run)]
-        offs = [self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions]
-        # Off the middle in halves of the range, with a scale of a quarter; a range is four scales long.
-        return float(np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), CRITERIA.shape_freedom)) - np.log(forms))
+        free = [
+            i
+            for i, p in enumerate(self.effect.shape)
+            if self.is_free(i) and not (p.swept or p.per_run)
+        ]
+        offs = [
+            self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions
+        ]
+        # Off the middle in halves of the range, with a scale of a quarter; a range is four scales
+        # long.
+        return float(
+            np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), CRITERIA.shape_freedom))
+            - np.log(forms)
+        )
 
     def is_free(self, i: int) -> bool:
-        """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
+        """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one
+        of its forms."""
         parameter = self.effect.shape[i]
         spanned = any(shape[i] != 0.0 for shape in self.directions)
         return not parameter.forms and (parameter.default is None or spanned)
@@ -110,15 +138,19 @@ class Candidate:
 
     @property
     def onset(self) -> int | None:
-        """Which shape parameter is the instant at which the effect begins in each run, None where it has none."""
+        """Which shape parameter is the instant at which the effect begins in each run, None where
+        it has none."""
         own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
         return next(own, None)
 
 
 def bends_motion(effect: Effect) -> bool:
-    """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
+    """Tell whether an effect changes kinematics or readings rather than adding torque of its
+    own."""
     shaped = any(p.default is None for p in effect.shape)
-    return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
+    return type(effect).corrected is not Effect.corrected or (
+        effect.torque_reading is not None and shaped
+    )
 
 
 def _largest(effect: Effect, direction: Sequence[float]) -> float:
@@ -137,7 +169,8 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
 
 
 def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place of a machine where it can be, in the kinds of each run at hand.
+    """Yield every effect at every place of a machine where it can be, in the kinds of each run at
+    hand.
 
     What is in the baseline already is none.
     """

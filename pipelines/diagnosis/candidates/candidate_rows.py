@@ -27,14 +27,19 @@ RIDGE = 1e-10
 class CandidateRows:
     """Computes weighted rows (N, k) of candidates, nothing projected out."""
 
-    def __init__(self, runs: Sequence[Run], baseline: Baseline, regression: DecisionRegression) -> None:
+    def __init__(
+        self, runs: Sequence[Run], baseline: Baseline, regression: DecisionRegression
+    ) -> None:
         """Prepare the runs at both rates."""
         self._baseline, self._regression = baseline, regression
         self._runs, self._slow = list(runs), [at_block_rate(run) for run in runs]
         self._plain = [columns_under((), run, baseline) for run in self._slow]
         self._plain_rows = regression.rows([columns for columns, _ in self._plain])
         names = runs[0].motion.joints
-        steps = np.max([np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs], axis=0)
+        steps = np.max(
+            [np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs],
+            axis=0,
+        )
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
         self._last_laden: tuple[tuple[float, ...], list[Run]] = (), self._slow
@@ -60,8 +65,11 @@ class CandidateRows:
             rows = self._transformed(candidate, beside)
         return rows if np.isfinite(rows).all() else None
 
-    def with_refitted_bodies(self, candidate: Candidate, beside: NDArray | None = None) -> Candidate:
-        """Return a transmission with the rigid bodies of a fit of baseline and transmission together.
+    def with_refitted_bodies(
+        self, candidate: Candidate, beside: NDArray | None = None
+    ) -> Candidate:
+        """Return a transmission with the rigid bodies of a fit of baseline and transmission
+        together.
 
         A fit of the baseline alone is biased by the missing transmission.
 
@@ -80,7 +88,10 @@ class CandidateRows:
             return self._slow
         if self._last_laden[0] != candidate.bodies:  # most often they are those of the call before
             values = np.array(candidate.bodies)
-            self._last_laden = candidate.bodies, [with_load(run, self._baseline, values) for run in self._slow]
+            self._last_laden = (
+                candidate.bodies,
+                [with_load(run, self._baseline, values) for run in self._slow],
+            )
         return self._last_laden[1]
 
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
@@ -88,7 +99,9 @@ class CandidateRows:
         joint, shapes = candidate.effect.joint, candidate.effect.shape
         if joint is None or not any(parameter.unit in TURNS for parameter in shapes):
             return False
-        cycles = max(value for p, value in zip(shapes, candidate.shapes[0], strict=True) if p.unit in TURNS)
+        cycles = max(
+            value for p, value in zip(shapes, candidate.shapes[0], strict=True) if p.unit in TURNS
+        )
         return cycles * self._steps[joint] > LONGEST_STEP
 
     def _expanded(self, candidate: Candidate, parts: Sequence[NDArray]) -> list[NDArray]:
@@ -107,13 +120,17 @@ class CandidateRows:
         return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
 
     def _change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
-        """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its values then, (b,)."""
+        """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its
+        values then, (b,)."""
         last = self._last_change
-        if last is None or last[0] != candidate or last[1] is not beside:  # its rows are asked for, then its bodies
+        # Its rows are asked for, then its bodies.
+        if last is None or last[0] != candidate or last[1] is not beside:
             last = self._last_change = candidate, beside, self._compute_change(candidate, beside)
         return last[2]
 
-    def _compute_change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
+    def _compute_change(
+        self, candidate: Candidate, beside: NDArray | None
+    ) -> tuple[NDArray, NDArray]:
         regression, runs = self._regression, self._laden(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         made = [
@@ -121,7 +138,9 @@ class CandidateRows:
             for r, (run, acts) in enumerate(zip(runs, acting, strict=True))
         ]
         columns = regression.rows([c for c, _ in made])
-        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)])
+        change = regression.rows(
+            [(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)]
+        )
         target = regression.torque_rows + change[:, 0]
         wide = columns if beside is None else np.hstack([columns, beside])
         values = _least_squares(wide, target)[: columns.shape[1]]

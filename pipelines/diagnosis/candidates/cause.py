@@ -28,11 +28,13 @@ class Cause:
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
     variance: NDArray
-    """(k,) prior variance of each coefficient over their sum: larger where typical amplitudes make more of it."""
+    """(k,) prior variance of each coefficient over their sum: larger where typical amplitudes make
+    more of it."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
     imitation: NDArray
-    """(b, k + d): values of the baseline that imitate columns and derivatives best, before it is projected out."""
+    """(b, k + d): values of the baseline that imitate columns and derivatives best, before it is
+    projected out."""
     first: bool
     """Whether it is the best shape of its effect."""
     context: int = -1
@@ -57,17 +59,22 @@ class Cause:
             Number of the set with whose other causes it was refined; -1 where it was refined alone.
         """
         typical = fitted.candidate.typical(regression.kinds)
-        _, size, turned = np.linalg.svd(regression.shares(fitted.columns) * typical, full_matrices=False)
+        _, size, turned = np.linalg.svd(
+            regression.shares(fitted.columns) * typical, full_matrices=False
+        )
         kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)
         if not kept.any():
             return None
         amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
         rows = fitted.columns @ amplitudes
         imitation = regression.baseline_values(np.hstack([rows, slopes]))
-        # Typical amplitudes are known roughly: were they exact, variances would be as the squares of sizes.
+        # Typical amplitudes are known roughly: were they exact, variances would be as the squares
+        # of sizes.
         variance = size[kept] / size[kept].sum()
         columns, derivative = regression.project(rows), regression.project(slopes)
-        return cls(fitted.candidate, columns, amplitudes, variance, derivative, imitation, first, context)
+        return cls(
+            fitted.candidate, columns, amplitudes, variance, derivative, imitation, first, context
+        )
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:

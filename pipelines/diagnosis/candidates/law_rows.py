@@ -34,7 +34,9 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
         laws, values = smooth_laws(run, spans, (columns @ prepared.values)[:, :joints])
         drives.append(values * spans.torque[:, np.newaxis])
     zero = [np.zeros_like(x) for x in drives]
-    worn = [x * (run.motion.run == "with_human") for x, run in zip(drives, prepared.runs, strict=True)]
+    worn = [
+        x * (run.motion.run == "with_human") for x, run in zip(drives, prepared.runs, strict=True)
+    ]
     felt = bool(np.isfinite(prepared.noise.density[joints:]).any())
     kinds = {run.motion.run for run in prepared.runs}
     parts = [(list(laws), _both(drives, zero))]
@@ -64,21 +66,30 @@ def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], li
         yield [LawColumn(HUM, j, "all", 1.0)] * (width * count), columns
 
 
-def _coarse_steps(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
+def _coarse_steps(
+    prepared: Prepared, joints: int
+) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the column of each joint whose torque may be reported in coarse steps."""
     runs = prepared.runs
     predicted = [run.slow(x) for run, x in zip(runs, prepared.predicted, strict=True)]
-    residual = [run.slow(np.nan_to_num(run.motion.torque)) - x for run, x in zip(runs, predicted, strict=True)]
+    residual = [
+        run.slow(np.nan_to_num(run.motion.torque)) - x
+        for run, x in zip(runs, predicted, strict=True)
+    ]
     usable = [run.motion.valid[:, np.newaxis] & away_from_reversals(run.motion) for run in runs]
     for j in range(joints):
         rms = float(prepared.torque[j])
-        torque, left = ([x[u[:, j], j] for x, u in zip(one, usable, strict=True)] for one in (predicted, residual))
+        torque, left = (
+            [x[u[:, j], j] for x, u in zip(one, usable, strict=True)]
+            for one in (predicted, residual)
+        )
         step = coarse_step(torque, left, rms)
         if step is None:
             continue
         columns = [np.zeros((*run.measured.shape, 1)) for run in runs]
         for column, run, x in zip(columns, runs, predicted, strict=True):
-            # Rounding has an rms of the step over the root of twelve, the column one of the joint's torque.
+            # Rounding has an rms of the step over the root of twelve, the column one of the joint's
+            # torque.
             column[:, j, 0] = run.average(rounding(x[:, j], step)) * np.sqrt(12.0) / step * rms
         yield [LawColumn(QUANTISATION, j, "all", 1.0)], columns
 
@@ -93,7 +104,8 @@ def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list
     told, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)
-        # Noise of a density adds twice that over the duration to the square of a cosine's amplitude.
+        # Noise of a density adds twice that over the duration to the square of a cosine's
+        # amplitude.
         duration = max(float(run.time[-1] - run.time[0]), LENGTH_S)
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
         noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration

@@ -62,7 +62,8 @@ class Library:
     curve_columns: NDArray
     """(N, t)."""
     left_out: tuple[str, ...] = ()
-    """Labels of effects whose columns at every shape are not finite or add nothing to the baseline."""
+    """Labels of effects whose columns at every shape are not finite or add nothing to the
+    baseline."""
     contexts: tuple[Context, ...] = ()
     """Sets whose causes were refined beside one another."""
     screened: tuple[tuple[Fitted, ...], ...] = ()
@@ -83,7 +84,11 @@ class Library:
         grown, main = self, self.causes[number]
         beside = np.hstack([main.columns, main.derivative])
         alone = ShapeRefinement(self.rows, self.regression, beside)
-        found = [alone.best_of(fits) for fits in self.screened if fits[0].candidate.label != main.candidate.label]
+        found = [
+            alone.best_of(fits)
+            for fits in self.screened
+            if fits[0].candidate.label != main.candidate.label
+        ]
         fits = sorted((f for f in found if f is not None), key=lambda f: -f.worth)
         for fitted in fits[:most]:
             none = np.zeros((len(beside), 0))
@@ -110,7 +115,9 @@ class Library:
         rows = [self._law(label) for label in laws]
         for _ in range(SWEEPS):
             for n in shaped:
-                others = [np.hstack([c.columns, c.derivative]) for k, c in enumerate(made) if k != n]
+                others = [
+                    np.hstack([c.columns, c.derivative]) for k, c in enumerate(made) if k != n
+                ]
                 beside = np.hstack([*rows, *others])
                 alone = ShapeRefinement(self.rows, regression, beside)
                 start = alone.fit(made[n].candidate)
@@ -135,7 +142,9 @@ class Library:
 def build_library(prepared: Prepared, report: Report = silent) -> Library:
     """Compute every cause's and every law's columns."""
     misfit = CRITERIA.form_misfit * prepared.slow_rms
-    regression = DecisionRegression.of(prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit)
+    regression = DecisionRegression.of(
+        prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit
+    )
     rows = CandidateRows(prepared.runs, prepared.baseline, regression)
     alone = ShapeRefinement(rows, regression)
     causes: list[Cause] = []
@@ -166,7 +175,9 @@ def _effects(prepared: Prepared) -> list[Effect]:
     return [effect for effect in listed if effect.shows_in(motions)]
 
 
-def _ripples(prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression) -> list[Cause]:
+def _ripples(
+    prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression
+) -> list[Cause]:
     """Return each joint's ripple as order tracking has it, at the full sampling rate."""
     found, machine = [], prepared.baseline.machine
     for joint in prepared.baseline.joints:
@@ -185,13 +196,16 @@ def orders_of(joint: str, prepared: Prepared) -> tuple[float, ...]:
     return tuple(line.cycles for line in lines.of_kind(Kind.ANGLE))
 
 
-def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: DecisionRegression) -> list[Cause]:
+def _shapes(
+    fits: Sequence[Fitted], alone: ShapeRefinement, regression: DecisionRegression
+) -> list[Cause]:
     """Return an effect at its best shape, refined, and at the next best of the coarse search."""
     if not fits:
         return []
     swings = fits[0].candidate.effect.swings
     best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
-    # A refinement may go far from its start; of a transmission it is not known which start was the best.
+    # A refinement may go far from its start; of a transmission it is not known which start was the
+    # best.
     others = others_of(fits, best if swings else fits[0], ALTERNATIVES)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
@@ -201,10 +215,12 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
 
 
 def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
-    """Return a transmission at its best shape, refined from several starts, and its slopes there, (N, d).
+    """Return a transmission at its best shape, refined from several starts, and its slopes there,
+    (N, d).
 
-    Where a load swings the likelihood has several maxima, and which is the highest shows only with refitted bodies:
-    the shape that is best with the baseline's bodies and the one that is best with refitted bodies are both refined.
+    Where a load swings the likelihood has several maxima, and which is the highest shows only with
+    refitted bodies: the shape that is best with the baseline's bodies and the one that is best with
+    refitted bodies are both refined.
     """
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]

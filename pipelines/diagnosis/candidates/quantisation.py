@@ -1,9 +1,11 @@
-"""A torque that is reported in coarse steps: the step that a residual shows, and what rounding to it adds.
+"""A torque that is reported in coarse steps: the step that a residual shows, and what rounding to
+it adds.
 
-Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x, whose first harmonic is
+Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x, whose
+first harmonic is
 -(h / pi) sin(2 pi x / h) (Widrow and Kollar, 2008, Quantization Noise, chapter 4). So a step is a line of known phase
-in the spectrum of the residual over the torque. It is found also where noise came after the rounding, so that no value
-in the file lies on a grid.
+in the spectrum of the residual over the torque. It is found also where noise came after the
+rounding, so that no value in the file lies on a grid.
 """
 
 from collections.abc import Sequence
@@ -12,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FINEST, COARSEST = 0.1, 2.0
-"""Steps that are sought, in units of the joint's rms torque. A finer one adds less than three percent of it."""
+"""Steps that are sought, in units of the joint's rms torque. A finer one adds less than three
+percent of it."""
 REACH = 3.0
 """Torque on either side of its median in which the step is sought, in the same unit."""
 BINS = 1024
@@ -29,7 +32,8 @@ def rounding(torque: NDArray, step: float) -> NDArray:
 
 
 def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: float) -> float | None:
-    """Return the step whose rounding error correlates most with the residual, N·m; None where none does.
+    """Return the step whose rounding error correlates most with the residual, N·m; None where none
+    does.
 
     Parameters
     ----------

@@ -35,7 +35,9 @@ def screened(
     elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
         starts = [_from_the_begin(effect, len(runs))]
     else:
-        starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
+        starts = [
+            Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)
+        ]
     if effect.swings:
         fits = [fitted for start in starts for fitted in alone.fits_of_transmission(start)]
     else:
@@ -76,7 +78,9 @@ def _differ(effect: Effect, one: Candidate, other: Candidate) -> bool:
     return False
 
 
-def _grid(effect: Effect, runs: Sequence[Run], regression: DecisionRegression) -> Iterator[tuple[float, ...]]:
+def _grid(
+    effect: Effect, runs: Sequence[Run], regression: DecisionRegression
+) -> Iterator[tuple[float, ...]]:
     """Yield the shapes to try."""
     if [p.unit for p in effect.shape] == ["Hz"]:
         yield from ((f,) for f in _rhythms(effect, runs, regression))
@@ -94,7 +98,8 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
-    """Return the values of an effect's shape parameter that are tried on some runs, (count,), in its unit."""
+    """Return the values of an effect's shape parameter that are tried on some runs, (count,), in
+    its unit."""
     if not parameter.swept or effect.joint is None:
         return values_of(parameter, count)
     j = runs[0].motion.joint_index(effect.joint)
@@ -136,6 +141,7 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
 
 
 def _from_the_begin(effect: Effect, runs: int) -> Candidate:
-    """Return an effect that begins at an instant, from the begin on: its instants are sought later."""
+    """Return an effect that begins at an instant, from the begin on: its instants are sought
+    later."""
     defaults = [ALWAYS if p.per_run else p.default or 0.0 for p in effect.shape]
     return Candidate(effect, (tuple(defaults),) * runs)

@@ -60,7 +60,8 @@ class Fitted:
     def worth(self) -> float:
         """The gain by which shapes are compared.
 
-        Of what swings, as it is: an amplitude would scale the twist, which the load does not follow.
+        Of what swings, as it is: an amplitude would scale the twist, which the load does not
+        follow.
         """
         return self.gain_as_is if self.candidate.effect.swings else self.gain
 
@@ -91,7 +92,8 @@ class ShapeRefinement:
         self._measured = measured - basis @ (basis.T @ measured)
 
     def _project(self, rows: NDArray) -> NDArray:
-        """Return rows (N, k) less what is fitted beside; nought where nothing but rounding is left."""
+        """Return rows (N, k) less what is fitted beside; nought where nothing but rounding is
+        left."""
         plain = self._regression.project(rows)
         plain -= self._basis @ (self._basis.T @ plain)
         size = np.linalg.norm(rows, axis=0)
@@ -116,13 +118,15 @@ class ShapeRefinement:
         """Return that one of an effect's fits made elsewhere which explains most here."""
         if fits[0].candidate.onset is not None:
             return self._with_onsets(fits[0].candidate)
-        return max((self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.worth)
+        return max(
+            (self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.worth
+        )
 
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d).
 
-        A transmission's rigid bodies and shapes are fitted in turn. Either may come first, for there are several
-        maxima. A refit of the bodies that does not explain more is left out.
+        A transmission's rigid bodies and shapes are fitted in turn. Either may come first, for
+        there are several maxima. A refit of the bodies that does not explain more is left out.
         """
         if not start.candidate.effect.swings:
             return self._refined(start)
@@ -138,7 +142,8 @@ class ShapeRefinement:
         return best, slopes
 
     def _refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return the candidate at its best shape with the rigid bodies it has, and its derivative columns, (N, d)."""
+        """Return the candidate at its best shape with the rigid bodies it has, and its derivative
+        columns, (N, d)."""
         if start.candidate.directions:
             # Linear in its shapes: the amplitudes are the shape.
             return _shaped(start), np.zeros((len(self._measured), 0))
@@ -159,7 +164,8 @@ class ShapeRefinement:
         return best, slopes
 
     def fits_of_transmission(self, candidate: Candidate) -> list[Fitted]:
-        """Fit a transmission with the baseline's rigid bodies and with refitted ones, where its rows are finite."""
+        """Fit a transmission with the baseline's rigid bodies and with refitted ones, where its
+        rows are finite."""
         fits = [self.fit(candidate), self.fit(self._with_own_bodies(candidate))]
         return [fitted for fitted in fits if fitted is not None]
 
@@ -186,9 +192,17 @@ class ShapeRefinement:
         for sweep in range(SWEEPS):
             for r, t in times.items():
                 fine = sweep > 0 and onsets[r] != NEVER
-                ends = (onsets[r] - steps[r], onsets[r] + steps[r]) if fine else (t.min(), t.max() - steps[r])
+                ends = (
+                    (onsets[r] - steps[r], onsets[r] + steps[r])
+                    if fine
+                    else (t.min(), t.max() - steps[r])
+                )
                 instants = np.linspace(*ends, ONSETS + int(fine))
-                others = np.sum([own[k] for k in times if k != r], axis=0) if len(times) > 1 else np.zeros_like(own[r])
+                others = (
+                    np.sum([own[k] for k in times if k != r], axis=0)
+                    if len(times) > 1
+                    else np.zeros_like(own[r])
+                )
                 begun = whole[r][:, np.newaxis] * (self._regression.time[:, np.newaxis] >= instants)
                 columns = self._project(begun)
                 gains = self._gains(others[:, np.newaxis] + columns)
@@ -207,12 +221,14 @@ class ShapeRefinement:
         return np.zeros(len(self._measured)) if rows is None else rows[:, 0]
 
     def _gains(self, plain: NDArray) -> NDArray:
-        """Return the log likelihood that each of some projected columns (N, k) gains alone, (k,)."""
+        """Return the log likelihood that each of some projected columns (N, k) gains alone,
+        (k,)."""
         square = np.sum(plain**2, axis=0)
         return 0.5 * (plain.T @ self._measured) ** 2 / np.where(square > 0.0, square, np.inf)
 
     def _scaled(self, start: Fitted) -> Fitted:
-        """Return a candidate that transforms the motion at the shape that its amplitude asks for."""
+        """Return a candidate that transforms the motion at the shape that its amplitude asks
+        for."""
         effect, (amplitude, *others) = start.candidate.effect, start.amplitudes
         if not start.candidate.bends or others or amplitude <= 0.0:
             return start
@@ -221,12 +237,18 @@ class ShapeRefinement:
             value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
-        ahead = self.fit(self._following(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter))))))
+        ahead = self.fit(
+            self._following(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter)))))
+        )
         return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
 
     def _following(self, candidate: Candidate) -> Candidate:
         """Return a candidate at a new shape; a transmission with rigid bodies that follow it."""
-        return self._rows.with_refitted_bodies(candidate, self._beside) if candidate.bodies else candidate
+        return (
+            self._rows.with_refitted_bodies(candidate, self._beside)
+            if candidate.bodies
+            else candidate
+        )
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
         """Return what each free shape does per unit of change, (N, d)."""
@@ -238,7 +260,9 @@ class ShapeRefinement:
                 slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / DIFFERENCE
         return slopes
 
-    def _step(self, fitted: Fitted, slopes: NDArray, units: list[tuple[int, float]]) -> Fitted | None:
+    def _step(
+        self, fitted: Fitted, slopes: NDArray, units: list[tuple[int, float]]
+    ) -> Fitted | None:
         """Return the fit after one step along all free shapes; None where no step gains."""
         transforms = fitted.candidate.bends
         parts = [slopes] if transforms else [fitted.columns, slopes]
@@ -298,7 +322,8 @@ def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
 
 
 def _unit_of(parameter: Parameter) -> float:
-    """Return a shape's unit of change: its grain, its range, or zero where it changes by factors."""
+    """Return a shape's unit of change: its grain, its range, or zero where it changes by
+    factors."""
     low, high = parameter.typical
     if parameter.unit in TURNS:
         return parameter.grain
@@ -308,7 +333,8 @@ def _unit_of(parameter: Parameter) -> float:
 
 
 def log_searched(candidate: Candidate) -> float:
-    """Return the log number of independent values among which its waves, tones and onsets were sought."""
+    """Return the log number of independent values among which its waves, tones and onsets were
+    sought."""
     effect, count = candidate.effect, 0.0
     for i, parameter in enumerate(effect.shape):
         if i == candidate.onset:
@@ -323,7 +349,9 @@ def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
     return unit if unit else abs(candidate.shapes[run][i])
 
 
-def changed(candidate: Candidate, i: int, unit: float, step: float, runs: Sequence[int] | None = None) -> Candidate:
+def changed(
+    candidate: Candidate, i: int, unit: float, step: float, runs: Sequence[int] | None = None
+) -> Candidate:
     """Return the candidate after a step in units of change, within reach of its typical range."""
     parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
     step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))

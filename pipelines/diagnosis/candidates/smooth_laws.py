@@ -1,8 +1,9 @@
 """Smooth laws that nobody listed: torque as a free function of the angle, the speed, the load ...
 
-They compete with the catalogue's causes as rivals, stand behind each cause for how its true form may
-differ from ours, and at a small size are the background that even a good rig shows. Every column is
-dimensionless and of order one, so that its coefficient is a share of the joint's rms torque.
+They compete with the catalogue's causes as rivals, stand behind each cause for how its true form
+may differ from ours, and at a small size are the background that even a good rig shows. Every
+column is dimensionless and of order one, so that its coefficient is a share of the joint's rms
+torque.
 """
 
 from collections.abc import Iterator, Sequence
@@ -84,7 +85,8 @@ class Spans:
         low = np.min([run.state[0].min(axis=0) for run in runs], axis=0)
         high = np.max([run.state[0].max(axis=0) for run in runs], axis=0)
         speed, acceleration = (
-            np.sqrt(np.mean(np.concatenate([run.state[k] for run in runs]) ** 2, axis=0)) for k in (1, 2)
+            np.sqrt(np.mean(np.concatenate([run.state[k] for run in runs]) ** 2, axis=0))
+            for k in (1, 2)
         )
         tiny = np.finfo(float).tiny
         return cls(
@@ -127,8 +129,9 @@ def _scaled_angle(run: Run, spans: Spans) -> NDArray:
 def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     """Yield degree and torque (m, 2) of each part of an elastic energy of both angles.
 
-    The torques at both joints are the slopes of one energy. Its parts are products of Legendre polynomials of the
-    scaled angles ``x`` (m, 2), those of one angle alone among them; the larger torque of each is of order one.
+    The torques at both joints are the slopes of one energy. Its parts are products of Legendre
+    polynomials of the scaled angles ``x`` (m, 2), those of one angle alone among them; the larger
+    torque of each is of order one.
     """
     every = np.eye(ACROSS_DEGREE + 1)
     value, slope = legval(x, every), legval(x, legder(every))
@@ -138,7 +141,10 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     units = spans.half_range * spans.torque
     for a, b in product(degree, degree):
         if 2 <= a + b <= ACROSS_DEGREE:
-            pulls = np.column_stack([slope[a, :, 0] * value[b, :, 1], value[a, :, 0] * slope[b, :, 1]]) / units
+            pulls = (
+                np.column_stack([slope[a, :, 0] * value[b, :, 1], value[a, :, 0] * slope[b, :, 1]])
+                / units
+            )
             largest = max(steep[a] * rms[b] / units[0], rms[a] * steep[b] / units[1])
             yield int(a + b - 1), pulls / largest
 
@@ -185,7 +191,9 @@ def _polynomials(kind: str, x: NDArray, degrees: range) -> Iterator[tuple[str, i
     yield from _scaled(kind, x, degrees, np.ones_like(x))
 
 
-def _scaled(kind: str, x: NDArray, degrees: range, factor: NDArray) -> Iterator[tuple[str, int, NDArray]]:
+def _scaled(
+    kind: str, x: NDArray, degrees: range, factor: NDArray
+) -> Iterator[tuple[str, int, NDArray]]:
     """Yield Legendre polynomials of ``x`` times a factor."""
     values = legvander(x, degrees[-1])
     for degree in degrees:

@@ -1,8 +1,9 @@
-"""Data faults: what went wrong between a sound leg and its file, found before any physics is blamed.
+"""Data faults: what went wrong between a sound leg and its file, found before any physics is
+blamed.
 
-Time first, then single channels, then how channels are wired, then their units; each looks only at samples that
-those before it left. Slow or small changes that physics can make (a drift, a gain of a few tens of percent, an
-offset) are no faults.
+Time first, then single channels, then how channels are wired, then their units; each looks only at
+samples that those before it left. Slow or small changes that physics can make (a drift, a gain of a
+few tens of percent, an offset) are no faults.
 """
 
 from collections.abc import Container, Iterable, Sequence
@@ -21,7 +22,8 @@ from pipelines.diagnosis.data_faults.wiring import angle_faults, cuff_faults, wi
 from pipelines.mechanics.motion import Motion
 
 LEAST_S, LEAST_SHARE = 5.0, 0.5
-"""Of an exoskeleton's run that faults must leave, or it is not worth its place; of a short one, this share of it."""
+"""Of an exoskeleton's run that faults must leave, or it is not worth its place; of a short one,
+this share of it."""
 
 __all__ = ["Fault", "excluding", "find_faults"]
 
@@ -34,7 +36,9 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     motions : sequence of Motion
         All runs of one leg, made from recordings, so that the measured angles are there.
     """
-    found = [fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))]
+    found = [
+        fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
+    ]
     found = _hopeless(motions, found)
     rightly_wired = []
     for motion in excluding(motions, found):
@@ -54,9 +58,11 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
 
 
 def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
-    """Return the faults, those of runs of which too little is left without them as such that masking does not help.
+    """Return the faults, those of runs of which too little is left without them as such that
+    masking does not help.
 
-    Where other runs of its kind suffice such a run is left out instead, whole: it spoils nothing but itself.
+    Where other runs of its kind suffice such a run is left out instead, whole: it spoils nothing
+    but itself.
     """
     sound = excluding(motions, faults)
     hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
@@ -68,24 +74,34 @@ def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]
         elif fault.samples is None or not _others_suffice(run, motions, hopeless):
             told.append(replace(fault, samples=None))
         else:
-            told.append(replace(fault, what=f"{fault.what}; this run is left out", samples=np.ones(len(run), bool)))
+            told.append(
+                replace(
+                    fault,
+                    what=f"{fault.what}; this run is left out",
+                    samples=np.ones(len(run), bool),
+                )
+            )
     return told
 
 
 def _too_little(whole: Motion, sound: Motion) -> bool:
-    least = min(sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum())
+    least = min(
+        sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum()
+    )
     return bool(sound.valid.sum() < least)
 
 
 def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[str]) -> bool:
-    """Tell whether half of what was recorded of a run's kind and for its purpose is in runs that are usable."""
+    """Tell whether half of what was recorded of a run's kind and for its purpose is in runs that
+    are usable."""
     alike = [m for m in motions if (m.run, m.purpose) == (run.run, run.purpose)]
     usable = sum(len(m) for m in alike if m.file not in hopeless)
     return usable >= LEAST_SHARE * sum(map(len, alike))
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
-    """Return the motions with the faults' samples marked as not valid, and without cuffs that never say anything."""
+    """Return the motions with the faults' samples marked as not valid, and without cuffs that never
+    say anything."""
     bad: dict[str, np.ndarray] = {}
     for fault in faults:
         if fault.samples is not None:

@@ -32,8 +32,8 @@ STUCK_ANGLE_S = 0.25
 JUMP = 3.0
 """Times the largest step of the moving joint: no joint catches up like that."""
 HELD_S, HELD_RAD = 1.0, 0.1
-"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by friction. At a
-prismatic joint the way is in proportion to the joint's."""
+"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by
+friction. At a prismatic joint the way is in proportion to the joint's."""
 ALONE_S, ALONE = 2.0, 3.0
 """Without a set-point: this long, and so many times the longest other standstill."""
 OUTLASTS = 3.0
@@ -43,10 +43,11 @@ STUCK_TORQUE_S = 0.15
 STUCK_FORCE_S = 1.0
 """Least length of a stretch of one and the same cuff force that is stuck, s."""
 FLAT_TOP, SATURATED = 3, 10
-"""Samples in a row at the extreme, and samples in such rows: noise never returns to the same number."""
+"""Samples in a row at the extreme, and samples in such rows: noise never returns to the same
+number."""
 IN_STEPS = 0.5
-"""Share of samples that repeat the one before, from which a torque is taken as rounded to coarse steps. A fine one is
-hardly ever the same twice."""
+"""Share of samples that repeat the one before, from which a torque is taken as rounded to coarse
+steps. A fine one is hardly ever the same twice."""
 
 
 def channel_faults(motion: Motion) -> Iterator[Fault]:
@@ -61,7 +62,8 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _repeated(motion: Motion) -> Iterator[Fault]:
-    """Report drives that hand out old values: angle and torque are the last sample's while the joint moves.
+    """Report drives that hand out old values: angle and torque are the last sample's while the
+    joint moves.
 
     A torque rounded to coarse steps is often the last sample's, and tells nothing of that.
     """
@@ -80,7 +82,9 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
     if not stale:
         return
-    together = len(stale) > 1 and bool((same[:, stale].all(axis=1) == same[:, stale].any(axis=1)).mean() > 0.999)
+    together = len(stale) > 1 and bool(
+        (same[:, stale].all(axis=1) == same[:, stale].any(axis=1)).mean() > 0.999
+    )
     for j in stale[:1] if together else stale:
         samples = same[:, j]
         share, found = samples.mean(), stretches(samples)
@@ -97,7 +101,10 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
 def _copied(motion: Motion) -> Iterator[Fault]:
     """Report joints with identical torque: independent measurements differ at least by noise."""
     for i, j in combinations(range(len(motion.joints)), 2):
-        if np.array_equal(motion.torque[:, i], motion.torque[:, j]) and np.ptp(motion.torque[:, i]) > 0.0:
+        if (
+            np.array_equal(motion.torque[:, i], motion.torque[:, j])
+            and np.ptp(motion.torque[:, i]) > 0.0
+        ):
             one, other = (column(motion, k, "torque") for k in (i, j))
             yield Fault(
                 motion.file, other,
@@ -117,13 +124,16 @@ def _count_of(angle: NDArray) -> float:
 
 
 def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
-    """Report an angle that stands while the leg goes on; friction holds a joint too, but lets it go where it stood."""
+    """Report an angle that stands while the leg goes on; friction holds a joint too, but lets it go
+    where it stood."""
     if motion.measured_angle is None:
         return
     angle = motion.measured_angle[:, joint]
     still = constant_stretches(angle, round(STUCK_ANGLE_S * motion.sample_rate_hz))
     lasting = still[:, 1] - still[:, 0]
-    found = still[[_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]]
+    found = still[
+        [_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]
+    ]
     if len(found):
         samples = mask_of(found, len(angle))
         # The filter carries the standstill on into its neighbourhood.
@@ -138,7 +148,9 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
         )
 
 
-def _impossible(motion: Motion, joint: int, angle: NDArray, stretch: NDArray, others: NDArray) -> bool:
+def _impossible(
+    motion: Motion, joint: int, angle: NDArray, stretch: NDArray, others: NDArray
+) -> bool:
     start, stop = stretch
     # Steps across a gap are larger, but not faster.
     steps = np.abs(np.diff(angle)) / np.maximum(np.diff(motion.time) * motion.sample_rate_hz, 1.0)
@@ -149,7 +161,9 @@ def _impossible(motion: Motion, joint: int, angle: NDArray, stretch: NDArray, ot
         return True
     seconds = (stop - start) / motion.sample_rate_hz
     if motion.reference is not None and np.isfinite(motion.reference[start:stop, joint]).all():
-        return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > _held(motion, joint)
+        return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > _held(
+            motion, joint
+        )
     rest = [j for j in range(motion.q.shape[1]) if j != joint]
     moved = max((np.ptp(motion.q[start:stop, j]) / _held(motion, j) for j in rest), default=0.0)
     longest = others.max(initial=0) / motion.sample_rate_hz
@@ -164,14 +178,17 @@ def _held(motion: Motion, joint: int) -> float:
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
     """Report torque that stands still: at its extreme it is saturated, elsewhere stuck.
 
-    A torque rounded to coarse steps also stays constant. Saturation cannot be told there, and only an exceptionally
-    long stretch counts as stuck.
+    A torque rounded to coarse steps also stays constant. Saturation cannot be told there, and only
+    an exceptionally long stretch counts as stuck.
     """
     torque = motion.torque[:, joint]
     flat = constant_stretches(torque, FLAT_TOP)
     at_top = (torque[flat[:, 0]] == torque.max()) | (torque[flat[:, 0]] == torque.min())
     lasts = flat[:, 1] - flat[:, 0] >= STUCK_TORQUE_S * motion.sample_rate_hz
-    moving = np.array([np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat], bool)
+    moving = np.array(
+        [np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat],
+        bool,
+    )
     if _is_in_steps(torque, flat[at_top | lasts]):
         at_top = np.zeros_like(at_top)
         lasts &= _outlasts(flat)
@@ -210,13 +227,15 @@ def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
 
 
 def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
-    """Tell whether a torque (n,) mostly repeats its last value outside the stretches ``apart`` (runs, 2)."""
+    """Tell whether a torque (n,) mostly repeats its last value outside the stretches ``apart``
+    (runs, 2)."""
     rest = ~mask_of(apart, len(torque))[1:]
     return bool(rest.any()) and float(np.mean(torque[1:][rest] == torque[:-1][rest])) > IN_STEPS
 
 
 def _outlasts(found: NDArray) -> NDArray:
-    """Tell which of the stretches (runs, 2) lasts ``OUTLASTS`` times as long as any other, (runs,) bool."""
+    """Tell which of the stretches (runs, 2) lasts ``OUTLASTS`` times as long as any other, (runs,)
+    bool."""
     lasting = found[:, 1] - found[:, 0]
     second = np.partition(lasting, -2)[-2] if len(lasting) > 1 else 0
     return np.asarray(lasting > OUTLASTS * second, dtype=bool)
@@ -231,7 +250,8 @@ def has_silent_cuffs(motion: Motion) -> bool:
 
 
 def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
-    """Report cuff force channels that are dead all along, or stand still for a second while others go on."""
+    """Report cuff force channels that are dead all along, or stand still for a second while others
+    go on."""
     if has_silent_cuffs(motion):
         yield Fault(
             motion.file,

@@ -25,7 +25,8 @@ class Fault:
 
     @property
     def spoils(self) -> bool:
-        """Whether it spoils the whole recording: physics would be blamed for what acquisition did."""
+        """Whether it spoils the whole recording: physics would be blamed for what acquisition
+        did."""
         return self.samples is None
 
 
@@ -35,13 +36,15 @@ def column(motion: Motion, joint: int, quantity: str) -> str:
 
 
 def stretches(marked: NDArray) -> NDArray:
-    """Return first and one past the last sample of each run of true samples in (n,) bool, (runs, 2)."""
+    """Return first and one past the last sample of each run of true samples in (n,) bool, (runs,
+    2)."""
     edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
 
 
 def constant_stretches(x: NDArray, least: int) -> NDArray:
-    """Return first and one past the last of each run of at least ``least`` equal values in (n,), (runs, 2)."""
+    """Return first and one past the last of each run of at least ``least`` equal values in (n,),
+    (runs, 2)."""
     found = stretches(x[1:] == x[:-1])
     found[:, 1] += 1
     return found[found[:, 1] - found[:, 0] >= least]

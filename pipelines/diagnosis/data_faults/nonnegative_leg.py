@@ -1,8 +1,9 @@
-"""What a leg can do: torque against its rigid body and friction, each parameter with the sign that nature gives it.
+"""What a leg can do: torque against its rigid body and friction, each parameter with the sign that
+nature gives it.
 
-Inertia, weight that hangs below its joint, and friction are never negative. A leg whose channels are exchanged
-or reversed needs negative ones, so a fit that forbids them tells how channels are wired. Each joint is fitted by
-itself, so that its unit does not matter.
+Inertia, weight that hangs below its joint, and friction are never negative. A leg whose channels
+are exchanged or reversed needs negative ones, so a fit that forbids them tells how channels are
+wired. Each joint is fitted by itself, so that its unit does not matter.
 """
 
 from dataclasses import dataclass
@@ -16,12 +17,17 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
 BLOCK_S = 0.1
-"""Length of the averages, s: long, so that noise of the angles does not pass for accelerations without torque."""
+"""Length of the averages, s: long, so that noise of the angles does not pass for accelerations
+without torque."""
 LEAST_BLOCKS = 50
 """Fewest averages, five seconds of motion, that separate gravity from inertia."""
 FROM_POSITIVE = np.array([[1.0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 """X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
-AS_RECORDED, KNEE_REVERSED, EXCHANGED = ((0, 1), (1.0, 1.0)), ((0, 1), (1.0, -1.0)), ((1, 0), (1.0, 1.0))
+AS_RECORDED, KNEE_REVERSED, EXCHANGED = (
+    ((0, 1), (1.0, 1.0)),
+    ((0, 1), (1.0, -1.0)),
+    ((1, 0), (1.0, 1.0)),
+)
 Reading = tuple[tuple[int, int], tuple[float, float]]
 """Which columns are hip and knee, and the sign of each."""
 
@@ -47,16 +53,21 @@ class Averages:
         return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
-        """Columns of one joint, (m, k): its share of the rigid body, Coulomb, viscous, and an offset of either sign."""
+        """Columns of one joint, (m, k): its share of the rigid body, Coulomb, viscous, and an
+        offset of either sign."""
         order, sign = reading
         body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
-        friction = np.column_stack([self.direction[:, order[joint]], self.dq[:, order[joint]]]) * sign[joint]
+        friction = (
+            np.column_stack([self.direction[:, order[joint]], self.dq[:, order[joint]]])
+            * sign[joint]
+        )
         one = np.ones((len(body), 1))
         return np.hstack([body, friction, one, -one])
 
 
 def averages(motion: Motion) -> Averages | None:
-    """Average over blocks that can be trusted; None where the machine has no second joint, or too few are left."""
+    """Average over blocks that can be trusted; None where the machine has no second joint, or too
+    few are left."""
     if motion.machine.mechanism is not LEG:
         return None
     block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
@@ -65,7 +76,8 @@ def averages(motion: Motion) -> Averages | None:
     if len(starts) < LEAST_BLOCKS:
         return None
     q, dq, ddq, direction, torque = (
-        block.mean(x, starts) for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
+        block.mean(x, starts)
+        for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
     )
     cuffs = None
     if (forces := motion.on_segments) is not None and motion.geometry.has_cuffs:
@@ -76,13 +88,14 @@ def averages(motion: Motion) -> Averages | None:
 def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple[float, NDArray]:
     """Fit torque (m,) by nonnegative multiples of columns (m, p).
 
-    Returns the share of the torque's power that is left, and the multiples (p,). ``free`` are further columns (m, f)
-    whose multiples may have any sign.
+    Returns the share of the torque's power that is left, and the multiples (p,). ``free`` are
+    further columns (m, f) whose multiples may have any sign.
     """
     if free is not None:
         basis = np.linalg.qr(free)[0]
         columns, torque = columns - basis @ (basis.T @ columns), torque - basis @ (basis.T @ torque)
-    # A root of the Gram matrix has the same inner products as the columns, and a hundredth of their rows.
+    # A root of the Gram matrix has the same inner products as the columns, and a hundredth of their
+    # rows.
     everything = np.column_stack([columns, torque])
     scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
     power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
@@ -92,15 +105,20 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
 
 
 def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
-    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros are free."""
+    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros
+    are free."""
     g = run.motion.geometry
     felt = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
     wide = [np.broadcast_to(unit, (len(felt), 2, 3)) for unit in ZEROS]
     zeros = np.stack([cuff_torque(unit[:, 0], unit[:, 1], run.q, g) for unit in wide], -1)
     weight = 1.0 / np.maximum(felt.std(axis=0), 1e-12)
-    stacked = [np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)]
+    stacked = [
+        np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)
+    ]
     return fit(stacked[0], stacked[1], stacked[2])[0]
 
 
-ZEROS = np.array([[[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0], [0, 0, 0]]], dtype=float)
+ZEROS = np.array(
+    [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0], [0, 0, 0]]], dtype=float
+)
 """Zeros of the sensors that show in the torque: shank along, shank across, thigh across."""

@@ -1,7 +1,7 @@
 """Instants: samples taken at other times than their even stamps say.
 
-An instant that is off by d shifts every angle by its speed times d: the third differences of two joints then
-correlate as their speeds do, which no vibration, count or friction of one joint does.
+An instant that is off by d shifts every angle by its speed times d: the third differences of two
+joints then correlate as their speeds do, which no vibration, count or friction of one joint does.
 """
 
 from collections.abc import Iterator
@@ -52,7 +52,8 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _undisturbed(motion: Motion) -> NDArray:
-    """Tell which third differences lie on even stamps and samples not known to be bad, (n - 3,) bool."""
+    """Tell which third differences lie on even stamps and samples not known to be bad, (n - 3,)
+    bool."""
     even = np.abs(np.diff(motion.time) * motion.sample_rate_hz - 1.0) < EVEN
     good = motion.valid[1:] & motion.valid[:-1] & even
     return np.asarray(np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1))

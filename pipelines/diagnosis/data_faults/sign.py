@@ -1,7 +1,9 @@
-"""The sign of a joint alone: a torque that only a body of negative inertia, whose friction drives it, would ask for.
+"""The sign of a joint alone: a torque that only a body of negative inertia, whose friction drives
+it, would ask for.
 
-A stiff spring or a late torque can make an inertia look negative, and hardly anything but a wrong sign makes friction
-give energy beside it; so both must be plain. Which of torque and angle has the wrong sign no equation tells.
+A stiff spring or a late torque can make an inertia look negative, and hardly anything but a wrong
+sign makes friction give energy beside it; so both must be plain. Which of torque and angle has the
+wrong sign no equation tells.
 """
 
 from collections.abc import Iterator
@@ -25,7 +27,8 @@ LEAST_BLOCKS = 50
 
 
 def sign_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield a torque of a machine of one joint whose sign is reversed; with a person in it, who may drive it, none."""
+    """Yield a torque of a machine of one joint whose sign is reversed; with a person in it, who may
+    drive it, none."""
     if motion.machine.mechanism.name != PENDULUM.name or motion.run == "with_human":
         return
     run = observe(motion)
@@ -49,13 +52,18 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
-    """Return inertia (kg·m² or kg) and mean loss in friction (W) of one joint's fit, and half of their intervals, (2,).
+    """Return inertia (kg·m² or kg) and mean loss in friction (W) of one joint's fit, and half of
+    their intervals, (2,).
 
-    What else may hold the joint, with a constant torque or as a spring does, is fitted beside and counts for neither.
+    What else may hold the joint, with a constant torque or as a spring does, is fitted beside and
+    counts for neither.
     """
     motion, usable = run.motion, run.usable[:, :1]
     beside = np.stack([np.ones_like(motion.q), motion.q], axis=2)
-    columns = np.concatenate([columns_under((), run, model)[0][:, 0], run.average(beside)[:, 0]], axis=1) * usable
+    columns = (
+        np.concatenate([columns_under((), run, model)[0][:, 0], run.average(beside)[:, 0]], axis=1)
+        * usable
+    )
     told = np.zeros((2, columns.shape[1]))
     told[0, 0] = 1.0
     friction = model.layout.terms[1].slice

@@ -1,4 +1,5 @@
-"""Time as stamped: samples that are missing, stamps that jitter, clocks at another rate, counters that jump."""
+"""Time as stamped: samples that are missing, stamps that jitter, clocks at another rate, counters
+that jump."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,16 +16,18 @@ HORIZON = 50
 SINGLE = 3
 """Up to so many samples in a row count as dropped; more are a gap."""
 JITTER = 0.04
-"""Of a sample period, rms: steps that stray more are irregular. Moving at 1 rad/s, 4 % of 5 ms is 0.2 mrad, an
-encoder count."""
+"""Of a sample period, rms: steps that stray more are irregular. Moving at 1 rad/s, 4 % of 5 ms is
+0.2 mrad, an encoder count."""
 HALF, SURE = 0.5, 3.0
 """Share of the stamps' straying that angles follow, between none and all; standard errors."""
 BELOW = 0.5
-"""Of the angles' own noise: what wrong stamps do to the angles and is less adds an eighth to that noise at most."""
+"""Of the angles' own noise: what wrong stamps do to the angles and is less adds an eighth to that
+noise at most."""
 BLOCK = 20
 """Samples whose sums are nearly independent."""
 RATE = 0.01
-"""Relative error of a clock that is worth a sentence: velocity is off by as much, acceleration by twice."""
+"""Relative error of a clock that is worth a sentence: velocity is off by as much, acceleration by
+twice."""
 
 
 def timing_faults(motion: Motion) -> Iterator[Fault]:
@@ -43,8 +46,8 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
 def missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
-    The counter knows. Without one: a missing sample leaves all that follow late, a late stamp only itself, so
-    the step is looked for in the lower envelope of the lateness.
+    The counter knows. Without one: a missing sample leaves all that follow late, a late stamp only
+    itself, so the step is looked for in the lower envelope of the lateness.
 
     Parameters
     ----------
@@ -58,7 +61,8 @@ def missing_samples(motion: Motion, late: NDArray) -> NDArray:
 
 
 def _counted(sequence: NDArray) -> NDArray:
-    """Return by how many samples the counter advances, (n - 1,): who keeps each tenth row leaves a counter by tens."""
+    """Return by how many samples the counter advances, (n - 1,): who keeps each tenth row leaves a
+    counter by tens."""
     step = np.diff(sequence)
     usual = max(int(np.median(step)), 1) if len(step) else 1
     return np.asarray(np.rint(step / usual).astype(np.int64))
@@ -106,7 +110,11 @@ def _counter(motion: Motion) -> Iterator[Fault]:
     for bad, what, remedy in (
         (back, "goes back", "the device restarted: split the file there"),
         (stands, "stands still", "samples were duplicated: drop the repeated rows"),
-        (disagrees, "and time_s disagree by more than 3 samples", "find out which of the two clocks jumped"),
+        (
+            disagrees,
+            "and time_s disagree by more than 3 samples",
+            "find out which of the two clocks jumped",
+        ),
     ):
         if bad.any():
             first = motion.time[1:][np.argmax(bad)]
@@ -118,10 +126,12 @@ def _counter(motion: Motion) -> Iterator[Fault]:
 
 
 def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
-    """Report uneven steps: they spoil a run where the angles contradict the stamps, or there are none to ask.
+    """Report uneven steps: they spoil a run where the angles contradict the stamps, or there are
+    none to ask.
 
-    Samples that were taken unevenly are as good as any where the stamps say when. Where the angles are too coarse to
-    tell, what a wrong stamp does to them is too small to be seen as well; where they do tell, it may still be.
+    Samples that were taken unevenly are as good as any where the stamps say when. Where the angles
+    are too coarse to tell, what a wrong stamp does to them is too small to be seen as well; where
+    they do tell, it may still be.
     """
     if motion.measured_angle is None:
         explained, spoils = "take time from the device's clock, not from the host's", True
@@ -141,16 +151,18 @@ class _Asked:
     """What angles say of uneven stamps."""
 
     followed: float
-    """1 where the samples were taken when the stamps say: an angle at uneven instants is rough, d angle = speed d t;
-    0 where they were taken evenly."""
+    """1 where the samples were taken when the stamps say: an angle at uneven instants is rough, d
+    angle = speed d t; 0 where they were taken evenly."""
     error: float
     """Standard error of ``followed``."""
     share: float
-    """What the stamps' straying would do to an angle, over the angle's own noise; the largest of the joints."""
+    """What the stamps' straying would do to an angle, over the angle's own noise; the largest of
+    the joints."""
 
     @classmethod
     def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Asked":
-        """Compare the roughness of angles (n, J) with what stamps (n,), in sample periods off their grid, would make.
+        """Compare the roughness of angles (n, J) with what stamps (n,), in sample periods off their
+        grid, would make.
 
         Third differences hold what a smooth motion does not: noise of angles and of stamps.
         """
@@ -171,7 +183,10 @@ class _Asked:
 def _judged(asked: _Asked) -> tuple[str, bool]:
     """Say what uneven stamps mean, and whether they spoil the run."""
     if asked.followed - SURE * asked.error > HALF:
-        return "the angles follow the stamps: the samples were taken then, and nothing is lost", False
+        return (
+            "the angles follow the stamps: the samples were taken then, and nothing is lost",
+            False,
+        )
     if asked.followed + SURE * asked.error >= HALF:
         return (
             "the angles are too coarse to tell whether the stamps are right, and so to suffer where they are not: "
@@ -179,7 +194,10 @@ def _judged(asked: _Asked) -> tuple[str, bool]:
         ), False
     told = "the angles are smooth against the sample count, so only the stamps are wrong: "
     if asked.share < BELOW:
-        return f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing is lost", False
+        return (
+            f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing is lost",
+            False,
+        )
     return f"{told}rebuild time_s from the device's counter and sample rate", True
 
 

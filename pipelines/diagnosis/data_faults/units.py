@@ -1,4 +1,5 @@
-"""Units: a channel that is a factor away from what set-point, drive, the other joint or other runs say.
+"""Units: a channel that is a factor away from what set-point, drive, the other joint or other runs
+say.
 
 A factor near one is a gain, and physics: here only factors that no calibration error makes.
 """
@@ -20,12 +21,14 @@ WRONG = 3.0
 WRONG_BETWEEN_JOINTS = 5.0
 """The same where missing physics of one joint can pretend a factor of 2 to 3."""
 SHANK_KG_M = {"exo_alone": 0.5, "with_human": 1.6}
-"""A shank's mass times the distance of its centre from the knee: 1-4 kg of machine at 0.2-0.3 m, and 6 % of
-50-100 kg of person at 0.25 m (Winter, Biomechanics and Motor Control of Human Movement, table 4.1)."""
+"""A shank's mass times the distance of its centre from the knee: 1-4 kg of machine at 0.2-0.3 m,
+and 6 % of 50-100 kg of person at 0.25 m (Winter, Biomechanics and Motor Control of Human Movement,
+table 4.1)."""
 IMPOSSIBLE = 30.0
 """Times that mass moment, or a part of it: no leg."""
 EXPLAINED = 0.7
-"""Of the torque's power by rigid body and friction: below, a joint is no witness of anything's size."""
+"""Of the torque's power by rigid body and friction: below, a joint is no witness of anything's
+size."""
 NOTHING = 1e-4
 """No unit is as far from N·m as this: the channels contradict each other in another way."""
 LAW_HOLDS = 0.8
@@ -38,13 +41,16 @@ TORQUE_UNITS = {
 SAME_UNIT = 1.3
 """Largest factor between a measured ratio and a unit's."""
 FOLLOWS = 0.7
-"""Correlation of an angle with its set-point below which it does not go after it, in whatever unit."""
+"""Correlation of an angle with its set-point below which it does not go after it, in whatever
+unit."""
 SMALLER_UNITS, NEAR = (1 / (2 * np.pi), np.pi / 180, 1 / 360), 1.25
-"""Turns under set-points in radians, radians under degrees, turns under degrees; and how near to one of these is it."""
+"""Turns under set-points in radians, radians under degrees, turns under degrees; and how near to
+one of these is it."""
 
 
 def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield angles in degrees or another unit: many times their set-point, or beyond what a joint can do."""
+    """Yield angles in degrees or another unit: many times their set-point, or beyond what a joint
+    can do."""
     for j, name in enumerate(motion.joints):
         q = motion.q[motion.valid, j]
         factor = _times_set_point(motion, j)
@@ -69,14 +75,15 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
 def _is_a_unit(factor: float) -> bool:
     """Tell whether an angle is so many times its set-point that only a unit can be the reason.
 
-    A drive that is weak or soft moves less than it is told, but hardly by the factor of a turn or a degree; none moves
-    several times as far.
+    A drive that is weak or soft moves less than it is told, but hardly by the factor of a turn or a
+    degree; none moves several times as far.
     """
     return factor > WRONG or any(1 / NEAR < factor / smaller < NEAR for smaller in SMALLER_UNITS)
 
 
 def _times_set_point(motion: Motion, joint: int) -> float | None:
-    """Return how many times its set-point an angle is; None where it goes elsewhere, as a joint that rests does."""
+    """Return how many times its set-point an angle is; None where it goes elsewhere, as a joint
+    that rests does."""
     if motion.reference is None:
         return None
     reference, q = motion.reference[motion.valid, joint], motion.q[motion.valid, joint]
@@ -85,12 +92,15 @@ def _times_set_point(motion: Motion, joint: int) -> float | None:
     if known.sum() < 2 or np.ptp(asked) == 0.0 or np.ptp(went) == 0.0:
         return None
     times = float(np.ptp(went) / np.ptp(asked))
-    follows = np.corrcoef(went, asked)[0, 1] > FOLLOWS and abs(went.mean() - times * asked.mean()) < np.ptp(went)
+    follows = np.corrcoef(went, asked)[0, 1] > FOLLOWS and abs(
+        went.mean() - times * asked.mean()
+    ) < np.ptp(went)
     return times if follows else None
 
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
-    """Yield torques in another unit than N·m, run by run, and runs at another scale than their like."""
+    """Yield torques in another unit than N·m, run by run, and runs at another scale than their
+    like."""
     without_witness = []
     for run in runs:
         wrong = _against_the_drives(run)
@@ -103,7 +113,8 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
 
 
 def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
-    """Return the joints whose torque is not what their position loops ask for; None where not both loops are known."""
+    """Return the joints whose torque is not what their position loops ask for; None where not both
+    loops are known."""
     laws = [drive_law(run.motion, j) for j in range(2)]
     wrong = {
         j: (law, f"{the(name)}'s position loop")
@@ -114,9 +125,11 @@ def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
 
 
 def drive_law(motion: Motion, joint: int) -> float | None:
-    """Return recorded torque over that of the position loop named in the metadata; None where it cannot be said.
+    """Return recorded torque over that of the position loop named in the metadata; None where it
+    cannot be said.
 
-    The torque is fitted by the angle's error and both speeds; the multiple of the error is the loop's stiffness.
+    The torque is fitted by the angle's error and both speeds; the multiple of the error is the
+    loop's stiffness.
     """
     controller = motion.metadata.get("controller", {}).get(motion.joints[joint], {})
     stiffness = controller.get("kp_nm_rad")
@@ -136,10 +149,12 @@ def drive_law(motion: Motion, joint: int) -> float | None:
 
 
 def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
-    """Return the joints whose torque is in another unit, judged by the shank, which both drives carry."""
+    """Return the joints whose torque is in another unit, judged by the shank, which both drives
+    carry."""
     moment, scale = shank(run)
     of_a_leg = run.motion.machine.is_exoskeleton
-    # What another machine's second link weighs, nobody knows beforehand: then the first joint's torque is the measure.
+    # What another machine's second link weighs, nobody knows beforehand: then the first joint's
+    # torque is the measure.
     typical = SHANK_KG_M[run.motion.run] if of_a_leg else moment
     if min(moment, scale) < NOTHING or any(
         fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)
@@ -158,10 +173,11 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
 
 
 def shank(run: Averages) -> tuple[float, float]:
-    """Return the shank's mass moment from the knee's torque, kg·m, and how many times it the hip's torque carries.
+    """Return the shank's mass moment from the knee's torque, kg·m, and how many times it the hip's
+    torque carries.
 
-    The multiple is 1 where the hip's torque can be explained with exactly this shank. Drag at the hip can leave the
-    multiple undetermined, but a wrong unit makes the shank too heavy for the hip.
+    The multiple is 1 where the hip's torque can be explained with exactly this shank. Drag at the
+    hip can leave the multiple undetermined, but a wrong unit makes the shank too heavy for the hip.
     """
     at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
     at_hip, torque = run.joint_columns(0), run.torque[:, 0]
@@ -187,7 +203,9 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
             odd, like = (second, first) if _less_plausible(second, first) else (first, second)
             times = factor if odd is second else 1 / max(factor, 1e-6)
             whose = "leg" if odd.motion.machine.is_exoskeleton else "machine"
-            yield _torque_fault(odd, j, times, f"{like.motion.file}, another run of the same {whose}")
+            yield _torque_fault(
+                odd, j, times, f"{like.motion.file}, another run of the same {whose}"
+            )
 
 
 def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
@@ -208,7 +226,9 @@ def _less_plausible(run: Averages, than: Averages) -> bool:
 
 def _torque_fault(run: Averages, joint: int, factor: float, witness: str) -> Fault:
     channel = column(run.motion, joint, "torque")
-    like = [unit for unit, size in TORQUE_UNITS.items() if 1 / SAME_UNIT < factor / size < SAME_UNIT]
+    like = [
+        unit for unit, size in TORQUE_UNITS.items() if 1 / SAME_UNIT < factor / size < SAME_UNIT
+    ]
     guess = f" ({' or '.join(like)}?)" if like else ""
     return Fault(
         run.motion.file,

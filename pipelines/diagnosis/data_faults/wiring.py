@@ -1,7 +1,7 @@
 """Wiring: channels of hip and knee exchanged, and signs that are reversed.
 
-The angles are held against their set-points, where these were recorded, and then all against what a leg can do
-(``body.py``): a wiring is said to be wrong when another explains both joints far better.
+The angles are held against their set-points, where these were recorded, and then all against what a
+leg can do (``body.py``): a wiring is said to be wrong when another explains both joints far better.
 """
 
 from collections.abc import Iterator
@@ -25,16 +25,18 @@ from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.mechanics.origin import settings_of
 
 FAR_BETTER = 0.5
-"""By which the power left unexplained must fall for each channel said to be wrong: the more channels, the less
-likely. Missing physics of a quarter of the torque changes it by a few tenths."""
+"""By which the power left unexplained must fall for each channel said to be wrong: the more
+channels, the less likely. Missing physics of a quarter of the torque changes it by a few tenths."""
 A_LIMB = 0.05
-"""Share of the cuffs' power: with less of it left unexplained they feel a limb, whatever would explain more."""
+"""Share of the cuffs' power: with less of it left unexplained they feel a limb, whatever would
+explain more."""
 FOLLOWS = 0.9
 """Correlation of an angle with its set-point."""
 SIGN, SWAP = "reversed", "exchanged"
 
 Wiring = tuple[Reading, tuple[int, int], tuple[float, float], tuple[tuple[int, str], ...], str]
-"""How angles are read; which torques are hip's and knee's; their signs; what is wrong then, and in which way."""
+"""How angles are read; which torques are hip's and knee's; their signs; what is wrong then, and in
+which way."""
 HIP, KNEE = 0, 1
 """Columns of the joints."""
 STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
@@ -49,8 +51,8 @@ WIRINGS: tuple[Wiring, ...] = (
     (AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
     (EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
     (EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
-    # The equations are odd: a reversed hip is a reversed knee with all torques reversed, a hip reversed in both
-    # channels cannot be told from such a knee, nor both angles from both torques.
+    # The equations are odd: a reversed hip is a reversed knee with all torques reversed, a hip
+    # reversed in both channels cannot be told from such a knee, nor both angles from both torques.
     (KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
@@ -73,8 +75,16 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
     for j in range(joints):
         own, best = alike[j, j], int(np.argmax(alike[j]))
         if own < -FOLLOWS:
-            yield _reversed(motion, ((j, "angle"),), f"it moves against its set-point (correlation {own:.2f})")
-        elif best != j and alike[j, best] > FOLLOWS and own < FOLLOWS / 2 and alike[best, j] > FOLLOWS and j < best:
+            yield _reversed(
+                motion, ((j, "angle"),), f"it moves against its set-point (correlation {own:.2f})"
+            )
+        elif (
+            best != j
+            and alike[j, best] > FOLLOWS
+            and own < FOLLOWS / 2
+            and alike[best, j] > FOLLOWS
+            and j < best
+        ):
             yield _exchanged(
                 motion,
                 ((j, "angle"), (best, "angle")),
@@ -94,7 +104,10 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         reading, channels, signs, *_ = wiring
         return sum(left[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
 
-    as_recorded, best = WIRINGS[0], min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3]))
+    as_recorded, best = (
+        WIRINGS[0],
+        min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3])),
+    )
     if best is as_recorded:
         return
     why = (
@@ -109,7 +122,8 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
-    """Yield force sensors that only carry a limb when thigh and shank are exchanged, or one is reversed."""
+    """Yield force sensors that only carry a limb when thigh and shank are exchanged, or one is
+    reversed."""
     if run.cuffs is None or run.motion.run != "with_human" or not np.isfinite(run.cuffs).all():
         return
     readings: dict[str, NDArray] = {
@@ -122,7 +136,11 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
     misfits = {what: cuff_misfit(run, cuffs) for what, cuffs in readings.items()}
     best = min(misfits, key=misfits.__getitem__)
     if as_recorded > A_LIMB and misfits[best] < FAR_BETTER**2 * as_recorded:
-        chosen = [cuff for cuff in CUFFS if "all" in best or "exchanged" in best or cuff.split("_")[0] in best]
+        chosen = [
+            cuff
+            for cuff in CUFFS
+            if "all" in best or "exchanged" in best or cuff.split("_")[0] in best
+        ]
         yield Fault(
             run.motion.file,
             f"{chosen[0]}_force_y_n",

@@ -1,8 +1,9 @@
 """What the residual depends on, for causes that nobody knows yet.
 
-Each variable that the runs know (angle, speed, load, time, phase, ...) is given a smooth curve, fitted on all
-folds but one and judged on that one. Folds are whole periods, so that noise, coloured noise included, earns
-nothing. The share of the residual's variance that a curve foretells ranks the variables.
+Each variable that the runs know (angle, speed, load, time, phase, ...) is given a smooth curve,
+fitted on all folds but one and judged on that one. Folds are whole periods, so that noise, coloured
+noise included, earns nothing. The share of the residual's variance that a curve foretells ranks the
+variables.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -37,7 +38,8 @@ MUCH_MORE = 1.5
 NOTICED = 0.2
 """Of the noise floor: excess below which it is not asked where it is."""
 ONE_SIDED = 4.0
-"""Ratio of squared excess between kinds of run, or files, from which it is said to be in one only."""
+"""Ratio of squared excess between kinds of run, or files, from which it is said to be in one
+only."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,8 @@ class Variable:
 
     name: str
     words: str
-    """As a sentence says it; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and ``{other}`` with its own."""
+    """As a sentence says it; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and
+    ``{other}`` with its own."""
     unit: str
     of: Callable[[Run, int], NDArray | None]
     """(m,) values in a run for a joint; None where the run does not know it."""
@@ -71,7 +74,9 @@ def _since_reversal(run: Run, j: int) -> NDArray:
     forward = run.state[1][:, j] > 0
     turned = np.flatnonzero(np.diff(forward, prepend=forward[0]))
     last = np.searchsorted(turned, np.arange(len(forward)), side="right") - 1
-    since = np.where(last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, LONGEST_S)
+    since = np.where(
+        last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, LONGEST_S
+    )
     return np.minimum(since, LONGEST_S)
 
 
@@ -95,10 +100,16 @@ def _phase(run: Run, j: int) -> NDArray | None:
 VARIABLES = (
     Variable("angle", "{joint}'s {place}", "rad", lambda run, j: run.state[0][:, j]),
     # What friction does has a jump where the joint reverses.
-    Variable("speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
+    Variable(
+        "speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True
+    ),
     Variable("acceleration", "{joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
     Variable(
-        "reversals", "{joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
+        "reversals",
+        "{joint}'s direction and the time since it reversed",
+        "s",
+        _since_reversal,
+        by_direction=True,
     ),
     Variable("load", "the {effort} that {joint} passes on", "N·m", _load, by_direction=True),
     Variable("other_angle", "{other}'s {other_place}", "rad", lambda run, j: _of_other(run, 0, j)),
@@ -106,8 +117,16 @@ VARIABLES = (
     Variable("other_load", "the {other_effort} that {other} passes on", "N·m", _load_of_other),
     Variable("cuff_force", "the cuffs' torque about {joint}", "N·m", _cuff),
     Variable("temperature", "the temperature of {joint}'s motor", "°C", _temperature),
-    Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
-    Variable("phase", "the phase of the excitation and no single variable of the motion", "s", _phase, lasting=False),
+    Variable(
+        "time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2
+    ),
+    Variable(
+        "phase",
+        "the phase of the excitation and no single variable of the motion",
+        "s",
+        _phase,
+        lasting=False,
+    ),
 )
 
 
@@ -153,11 +172,16 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
     found = []
     for j, joint in enumerate(machine.names):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
-        made = [Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s)) for v, s in shares.items()]
+        made = [
+            Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s))
+            for v, s in shares.items()
+        ]
         fast = [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)]
         frequency, share, in_step = _free_or_in_step(runs, fast, j)
         kind = (
-            "above the motion's own band, in step with its period" if in_step else "that is no harmonic of the motion"
+            "above the motion's own band, in step with its period"
+            if in_step
+            else "that is no harmonic of the motion"
         )
         said = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
         made.append(Dependence(joint, "tone", share, said))
@@ -190,15 +214,21 @@ def _words(joint: str, machine: Machine, words: str) -> str:
     )  # fmt: skip
 
 
-def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:
-    """Yield the runs of each kind with their residuals (m, O): what hides in one kind need not be in the other."""
+def by_kind(
+    runs: Sequence[Run], residuals: Sequence[NDArray]
+) -> Iterable[tuple[list[Run], list[NDArray]]]:
+    """Yield the runs of each kind with their residuals (m, O): what hides in one kind need not be
+    in the other."""
     for kind in dict.fromkeys(run.motion.run for run in runs):
         chosen = [i for i, run in enumerate(runs) if run.motion.run == kind]
         yield [runs[i] for i in chosen], [residuals[i] for i in chosen]
 
 
-def variable_share(variable: Variable, runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> float:
-    """Return the share of a joint's residual (m, O) variance that smooth curves along a variable foretell."""
+def variable_share(
+    variable: Variable, runs: Sequence[Run], residuals: Sequence[NDArray], j: int
+) -> float:
+    """Return the share of a joint's residual (m, O) variance that smooth curves along a variable
+    foretell."""
     total = error = 0.0
     for some, left in by_kind(runs, residuals):
         y = pooled(some, [r[:, j] for r in left], j)
@@ -217,14 +247,18 @@ def variable_share(variable: Variable, runs: Sequence[Run], residuals: Sequence[
 
 def _folds(variable: Variable, runs: Sequence[Run], j: int) -> list[NDArray]:
     periods = pooled(runs, [run.fold for run in runs], j)
-    return [periods, pooled(runs, [parts_of_period(run) for run in runs], j)] if variable.lasting else [periods]
+    return (
+        [periods, pooled(runs, [parts_of_period(run) for run in runs], j)]
+        if variable.lasting
+        else [periods]
+    )
 
 
 def parts_of_period(run: Run) -> NDArray:
     """Deal the parts of the excitation's period out to folds, (m,).
 
-    A law learnt in some parts of the period foretells the others; a curve that only imitates what repeats does not.
-    Without a period, stretches of a second are dealt out.
+    A law learnt in some parts of the period foretells the others; a curve that only imitates what
+    repeats does not. Without a period, stretches of a second are dealt out.
     """
     length = (run.motion.period_s or PARTS) / PARTS
     return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
@@ -236,16 +270,21 @@ def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
 
 
 def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
-    """Return the strongest frequency (Hz) that no period of the motion explains, and the share it foretells.
+    """Return the strongest frequency (Hz) that no period of the motion explains, and the share it
+    foretells.
 
-    Where a harmonic of the motion's period above twice the motion's own band holds most, it is that one: a motor that
-    hums while it is recorded may do so in step. ``residuals`` are (m, O) of each run, N·m; ``j`` is the output.
+    Where a harmonic of the motion's period above twice the motion's own band holds most, it is that
+    one: a motor that hums while it is recorded may do so in step. ``residuals`` are (m, O) of each
+    run, N·m; ``j`` is the output.
     """
     return _free_or_in_step(runs, residuals, j)[:2]
 
 
-def _free_or_in_step(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float, bool]:
-    """Return frequency and share of ``tone``, and whether it is in step with the motion's period."""
+def _free_or_in_step(
+    runs: Sequence[Run], residuals: Sequence[NDArray], j: int
+) -> tuple[float, float, bool]:
+    """Return frequency and share of ``tone``, and whether it is in step with the motion's
+    period."""
     free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
         return (*free, False)
@@ -258,17 +297,20 @@ def _tone_in(
     part: Callable[[Run, NDArray, NDArray], NDArray], above: float, runs: Sequence[Run], residuals: Sequence[NDArray],
     j: int,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all that it foretells.
+    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all
+    that it foretells.
 
-    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on all folds but one
-    and judged on that one.
+    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on
+    all folds but one and judged on that one.
     """
     total = error = 0.0
     found = []
     for held in range(FOLDS):
         rest = [run.usable[:, j] & (run.fold != held) for run in runs]
         frequency = _strongest(
-            runs, [part(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)], above
+            runs,
+            [part(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)],
+            above,
         )
         found.append(frequency)
         for run, learnt, residual in zip(runs, rest, residuals, strict=True):
@@ -285,7 +327,8 @@ def _tone_in(
 
 
 def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
-    """Return what of a residual (m,) does not repeat with the excitation, nought where it is not ``learnt``."""
+    """Return what of a residual (m,) does not repeat with the excitation, nought where it is not
+    ``learnt``."""
     kept = np.where(learnt, residual, 0.0)
     if not run.motion.period_s:
         return kept
@@ -296,7 +339,8 @@ def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
 
 
 def _repeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
-    """Return what of a residual (m,) repeats with the excitation, nought where it is not ``learnt``."""
+    """Return what of a residual (m,) repeats with the excitation, nought where it is not
+    ``learnt``."""
     return np.where(learnt, residual, 0.0) - _unrepeated(run, residual, learnt)
 
 
@@ -328,38 +372,58 @@ def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) ->
 
 
 def describe(
-    machine: Machine, found: Sequence[Dependence], above: Sequence[Excess], together: Sequence[Together] = ()
+    machine: Machine,
+    found: Sequence[Dependence],
+    above: Sequence[Excess],
+    together: Sequence[Together] = (),
 ) -> str:
-    """Say in a sentence or two what the joint with most above its floor depends on, and where that is.
+    """Say in a sentence or two what the joint with most above its floor depends on, and where that
+    is.
 
     ``together`` are pairs of variables that foretell the residual (see ``smooth_term``).
     """
-    squares = {d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in found}
+    squares = {
+        d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in found
+    }
     joint = max(squares, key=lambda name: squares[name])
     where = _where([e for e in above if e.joint == joint])
     own = [d for d in found if d.joint == joint]
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
-        words = " together with ".join(_words(joint, machine, variable.words) for variable in pair.variables)
-        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} depends on {words}{where}."
+        words = " together with ".join(
+            _words(joint, machine, variable.words) for variable in pair.variables
+        )
+        return (
+            f"{100 * pair.share:.0f} % of what is left at {the(joint)} depends on {words}{where}."
+        )
     if own[0].share < LITTLE:
         return (
             f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was "
             f"measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
         )
-    second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
-    return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")
+    second = next(
+        (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)),
+        None,
+    )
+    return (
+        own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")
+    )
 
 
 def _where(above: Sequence[Excess]) -> str:
     """Say in which kind of run, or in which one file, the excess is."""
     if not any(e.square > (NOTICED * e.floor_nm) ** 2 for e in above):
         return ", and it is hardly above the noise"
-    for what, words in (("run", {"with_human": "with the human", "exo_alone": "without the human"}), ("file", {})):
+    for what, words in (
+        ("run", {"with_human": "with the human", "exo_alone": "without the human"}),
+        ("file", {}),
+    ):
         groups: dict[str, list[float]] = {}
         for e in above:
             groups.setdefault(getattr(e, what), []).append(e.square)
         means = sorted(((float(np.mean(v)), name) for name, v in groups.items()), reverse=True)
         if len(means) > 1 and means[0][0] > ONE_SIDED * means[1][0]:
-            return f", mostly {words[means[0][1]]}" if what == "run" else f", mostly in {means[0][1]}"
+            return (
+                f", mostly {words[means[0][1]]}" if what == "run" else f", mostly in {means[0][1]}"
+            )
     return ", in all validation runs alike" if len(above) > 1 else ""

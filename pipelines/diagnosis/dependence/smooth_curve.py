@@ -1,4 +1,5 @@
-"""Smooth curves and surfaces of what a run knows, and their error on folds they were not fitted to."""
+"""Smooth curves and surfaces of what a run knows, and their error on folds they were not fitted
+to."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,12 +35,17 @@ class Curve:
         """Place the knots where equally many blocks lie between two."""
         knots = []
         for variable in variables:
-            known = [(x[run.usable[:, j]]) for run in runs if (x := variable.of(run, j)) is not None]
-            knots.append(_knots(np.concatenate(known), variable.knots if len(variables) == 1 else FEWER))
+            known = [
+                (x[run.usable[:, j]]) for run in runs if (x := variable.of(run, j)) is not None
+            ]
+            knots.append(
+                _knots(np.concatenate(known), variable.knots if len(variables) == 1 else FEWER)
+            )
         return cls(tuple(variables), tuple(knots), j)
 
     def design(self, run: Run) -> NDArray:
-        """Return the splines' values in a run, (m, k); nought where the run does not know a variable."""
+        """Return the splines' values in a run, (m, k); nought where the run does not know a
+        variable."""
         design = np.ones((len(run.time), 1))
         for variable, knots in zip(self.variables, self.knots, strict=True):
             x = variable.of(run, self.joint)
@@ -87,7 +93,9 @@ class Products:
         shrunk = others + _shrinkage(others, ridges[:, np.newaxis])
         rest = np.broadcast_to(self.right.sum(axis=0) - right, (len(ridges), *right.shape))
         c = np.linalg.solve(shrunk, rest[..., np.newaxis])[..., 0]
-        explained = 2.0 * np.sum(c * right, axis=-1) - np.einsum("rfi,fij,rfj->rf", c, columns, c, optimize=True)
+        explained = 2.0 * np.sum(c * right, axis=-1) - np.einsum(
+            "rfi,fij,rfj->rf", c, columns, c, optimize=True
+        )
         return np.sum(self.square[there] - explained, axis=1)
 
 
@@ -98,7 +106,8 @@ def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
 
 
 def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) -> list[Products]:
-    """Multiply out a design (n, k) and a residual (n,) for several partitions of the rows into folds (n,).
+    """Multiply out a design (n, k) and a residual (n,) for several partitions of the rows into
+    folds (n,).
 
     Rows that all partitions put into the same folds are multiplied out once.
     """

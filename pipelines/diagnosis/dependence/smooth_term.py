@@ -1,7 +1,8 @@
 """What a model gains by a cause that nobody can name: a smooth surface in place of an equation.
 
-The surface is over the one or two variables that foretell most of a joint's residual on folds it was not
-fitted to, with the shrinkage that foretells best. Where nothing foretells enough, there is no surface.
+The surface is over the one or two variables that foretell most of a joint's residual on folds it
+was not fitted to, with the shrinkage that foretells best. Where nothing foretells enough, there is
+no surface.
 """
 
 import itertools
@@ -11,7 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.dependence.explained_share import VARIABLES, Together, Variable, parts_of_period, pooled
+from pipelines.diagnosis.dependence.explained_share import (
+    VARIABLES,
+    Together,
+    Variable,
+    parts_of_period,
+    pooled,
+)
 from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
 from pipelines.diagnosis.evidence.observed_run import Run
 
@@ -52,7 +59,11 @@ class SmoothTerm:
     @property
     def together(self) -> list[Together]:
         """What ``dependence.describe`` can say of surfaces over two variables."""
-        return [Together(s.joint, s.curve.variables, s.share) for s in self.surfaces if len(s.curve.variables) > 1]
+        return [
+            Together(s.joint, s.curve.variables, s.share)
+            for s in self.surfaces
+            if len(s.curve.variables) > 1
+        ]
 
     def describe(self) -> str:
         """Say what the surfaces are over."""
@@ -67,10 +78,12 @@ class SmoothTerm:
 def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm:
     """Fit surfaces to the residuals (m, O) of training runs, joint by joint.
 
-    With both kinds of run a law must foretell one kind from the other, or be at home in the one that has most of
-    the error.
+    With both kinds of run a law must foretell one kind from the other, or be at home in the one
+    that has most of the error.
     """
-    made = [_of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))]
+    made = [
+        _of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))
+    ]
     return SmoothTerm(tuple(surface for surface in made if surface is not None))
 
 
@@ -94,13 +107,21 @@ def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surf
 def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
     known = [v for v in VARIABLES if v.lasting and all(v.of(run, j) is not None for run in runs)]
     one = max((_surface([v], runs, residuals, j) for v in known), key=lambda s: s.share)
-    two = max((_surface(p, runs, residuals, j) for p in itertools.combinations(known, 2)), key=lambda s: s.share)
+    two = max(
+        (_surface(p, runs, residuals, j) for p in itertools.combinations(known, 2)),
+        key=lambda s: s.share,
+    )
     best = two if two.share > one.share + BETTER else one
     return best if best.share > EARNED else None
 
 
-def _surface(variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface:
-    curve, kinds = Curve.along(variables, runs, j), list(dict.fromkeys(run.motion.run for run in runs))
+def _surface(
+    variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int
+) -> Surface:
+    curve, kinds = (
+        Curve.along(variables, runs, j),
+        list(dict.fromkeys(run.motion.run for run in runs)),
+    )
     y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
     partitions = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
     if len(kinds) > 1:

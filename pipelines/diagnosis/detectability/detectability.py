@@ -1,10 +1,12 @@
-"""The smallest size of each cause that a motion and a noise level would reveal, and the ties they cannot break.
+"""The smallest size of each cause that a motion and a noise level would reveal, and the ties they
+cannot break.
 
-An effect of magnitude theta adds theta c to the measured torques; the baseline takes up its share P c and
-leaves theta (I - P) c. With each output's rows divided by its noise and multiplied by the root of the share
-of independent samples, the log likelihood that naming the effect gains is half a noncentral chi-square of
-noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds its price: the prior odds against
-a cause, and half the logarithm of the independent samples for each amplitude. So
+An effect of magnitude theta adds theta c to the measured torques; the baseline takes up its share P
+c and leaves theta (I - P) c. With each output's rows divided by its noise and multiplied by the
+root of the share of independent samples, the log likelihood that naming the effect gains is half a
+noncentral chi-square of noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds
+its price: the prior odds against a cause, and half the logarithm of the independent samples for
+each amplitude. So
 
     theta_min = (z_a + z_b) / |(I - P) c|
 
@@ -58,7 +60,8 @@ NEVER = 1e-3
 NOTHING = 1e-10
 """Share of an effect's square that the baseline leaves, below which it leaves nothing."""
 LEAST = 1e-3
-"""Of a joint's torque: what an effect of the largest typical size makes where it has to do with the motion at all."""
+"""Of a joint's torque: what an effect of the largest typical size makes where it has to do with the
+motion at all."""
 STEPS = 8
 """Of the search for the size of an effect that bends the motion."""
 
@@ -69,11 +72,13 @@ class Detectable:
 
     effect: Effect
     smallest_rms_nm: float
-    """Rms of its torque at its joint (else the first), before the baseline takes its share; inf: never seen."""
+    """Rms of its torque at its joint (else the first), before the baseline takes its share; inf:
+    never seen."""
     smallest: float
     """The magnitude in the unit of ``parameter``."""
     shape: tuple[tuple[str, float], ...]
-    """Shape parameters that the size holds for: it is enough for most of those tried, none being known beforehand."""
+    """Shape parameters that the size holds for: it is enough for most of those tried, none being
+    known beforehand."""
     best_rms_nm: float
     """The same rms at the shape that shows most."""
     limited_by: str
@@ -130,7 +135,8 @@ class Sight:
     values: NDArray
     """The baseline's values, that effects which bend the motion bend."""
     root: NDArray
-    """(O,) root of the independent share over the noise and what a good rig leaves; nought without such an output."""
+    """(O,) root of the independent share over the noise and what a good rig leaves; nought without
+    such an output."""
     noise: NDArray
     """(O,) N·m."""
     independent: float
@@ -155,9 +161,13 @@ class Sight:
         independent = float(np.max(share * plain.count))
         values = solve(plain, root**2)
         loaded = tuple(with_load(run, baseline, values) for run in runs)
-        torque = np.concatenate([(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)])
+        torque = np.concatenate(
+            [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
+        )
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        sight = cls(loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms)
+        sight = cls(
+            loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms
+        )
         return replace(sight, basis=np.linalg.qr(sight.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
@@ -182,13 +192,20 @@ class Sight:
 
     def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
         """Return the share of the joint's torque that a column (m, O, 1) makes."""
-        return self.rms(effect, column) / max(float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny)
+        return self.rms(effect, column) / max(
+            float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny
+        )
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, over the runs in which it acts."""
+        """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, over the runs in which
+        it acts."""
         j = self.joint(effect)
-        acting = [(r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)]
-        return float(np.sqrt(np.mean(np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting]) ** 2)))
+        acting = [
+            (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
+        ]
+        return float(
+            np.sqrt(np.mean(np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting]) ** 2))
+        )
 
 
 @dataclass(frozen=True)
@@ -207,7 +224,8 @@ class Look:
     span: NDArray
     """(rows, k) orthonormal: all that the effect of this shape could explain."""
     level: NDArray
-    """(rows, l) orthonormal: what of it a mere level explains, as a spring's preload or a drift's beginning does."""
+    """(rows, l) orthonormal: what of it a mere level explains, as a spring's preload or a drift's
+    beginning does."""
     plausible: bool
     """Whether typical sizes of this shape make a torque that a joint could have, and any at all."""
 
@@ -223,16 +241,18 @@ def detectability(
 
     Parameters
     ----------
-    runs : what the diagnosis would be fitted to; of the measured torques only the baseline's fit is used
-    floor : noise of each output, (O,), and its independent share
-    power : chance with which an effect of the smallest size is found
-    report : told the share done and the cause at hand
+    runs : what the diagnosis would be fitted to; of the measured torques only the baseline's fit is
+    used floor : noise of each output, (O,), and its independent share power : chance with which an
+    effect of the smallest size is found report : told the share done and the cause at hand
     """
     sight = Sight.of([at_block_rate(run) for run in runs], baseline, floor)
-    # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
+    # What the wearer may carry instead of the machine goes by the same name; the machine's is
+    # reported.
     motions = [run.motion for run in runs]
     effects = [
-        e for e in proposals(baseline, baseline.kinds) if e.run is None and not e.each_run and e.shows_in(motions)
+        e
+        for e in proposals(baseline, baseline.kinds)
+        if e.run is None and not e.each_run and e.shows_in(motions)
     ]
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
@@ -253,7 +273,8 @@ def detectability_of_recorded(
     report: Callable[[float, str], None] = lambda share, what: None,
     known: Sequence[str] = (),
 ) -> list[Detectable]:
-    """Return the same for recorded motions, their noise measured from what does not repeat between periods.
+    """Return the same for recorded motions, their noise measured from what does not repeat between
+    periods.
 
     Training runs count, as they do for a diagnosis; where there is none, all do.
     """
@@ -265,7 +286,9 @@ def detectability_of_recorded(
     active = np.any([run.usable.any(axis=0) for run in runs], axis=0).astype(float)
     plain = fit((), runs, baseline, active)
     plain = fit((), runs, baseline, plain.weights)
-    return detectability(runs, baseline, noise_floor(runs, evaluate(plain, runs, baseline)), power, report)
+    return detectability(
+        runs, baseline, noise_floor(runs, evaluate(plain, runs, baseline)), power, report
+    )
 
 
 def as_json(found: Sequence[Detectable]) -> dict:
@@ -275,7 +298,8 @@ def as_json(found: Sequence[Detectable]) -> dict:
 
 @cache
 def needed_noncentrality(columns: int, price: float, power: float) -> float:
-    """Return the noncentrality at which a log likelihood gain over ``columns`` exceeds its price with this power.
+    """Return the noncentrality at which a log likelihood gain over ``columns`` exceeds its price
+    with this power.
 
     (z_a + z_b)^2 for one column, with z_a^2 twice the price.
     """
@@ -327,7 +351,10 @@ def _spread(values: NDArray) -> NDArray:
 
 def _in_run(effect: Effect, shape: Sequence[float], run: Run) -> tuple[float, ...]:
     begin, end = run.time[0], run.time[-1]
-    return tuple(float(begin + v * (end - begin) if p.per_run else v) for p, v in zip(effect.shape, shape, strict=True))
+    return tuple(
+        float(begin + v * (end - begin) if p.per_run else v)
+        for p, v in zip(effect.shape, shape, strict=True)
+    )
 
 
 def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
@@ -358,12 +385,16 @@ def _companions(effect: Effect) -> list[int]:
 
 
 def _levels(effect: Effect) -> list[int]:
-    """Return those companions that are another quantity than the first amplitude, as a preload beside a stiffness."""
+    """Return those companions that are another quantity than the first amplitude, as a preload
+    beside a stiffness."""
     return [i for i in _companions(effect) if effect.linear[i].unit != effect.linear[0].unit]
 
 
-def _wide(effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: Sequence[Run]) -> list[NDArray]:
-    """Return some of an effect's columns, those that each run has for itself in places of their own, (m, O, k)."""
+def _wide(
+    effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: Sequence[Run]
+) -> list[NDArray]:
+    """Return some of an effect's columns, those that each run has for itself in places of their
+    own, (m, O, k)."""
     per_run = [effect.linear[i].per_run for i in chosen]
     own = TermColumns.of(effect, [run.motion.run for run in runs], per_run)
     return [own.expand(column[:, :, chosen], r) for r, column in enumerate(columns)]
@@ -372,8 +403,9 @@ def _wide(effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: S
 def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list[NDArray]:
     """Return the effect at unit magnitude, (m, O, 1) of each run.
 
-    Companions of either sign, a preload, a level, the cosine beside the sine, are such that it makes least torque:
-    a spring rests in the middle of the motion, a drift starts at minus half of what it becomes.
+    Companions of either sign, a preload, a level, the cosine beside the sine, are such that it
+    makes least torque: a spring rests in the middle of the motion, a drift starts at minus half of
+    what it becomes.
     """
     lead = [c[:, :, :1] for c in columns]
     companions = _companions(effect)
@@ -381,7 +413,9 @@ def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list
         return lead
     wide = _wide(effect, columns, companions, sight.runs)
     usable = [run.usable for run in sight.runs]
-    A, y = (np.concatenate([c[u] for c, u in zip(part, usable, strict=True)]) for part in (wide, lead))
+    A, y = (
+        np.concatenate([c[u] for c, u in zip(part, usable, strict=True)]) for part in (wide, lead)
+    )
     values = np.linalg.lstsq(A, y[:, 0], rcond=1e-12)[0]
     return [c - (w @ values)[:, :, np.newaxis] for c, w in zip(lead, wide, strict=True)]
 
@@ -389,7 +423,9 @@ def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list
 def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     """Size an effect that bends the motion or a reading: step until it is just seen."""
     effect, start = candidate.effect, np.array(candidate.shapes[0])
-    zero = np.array([v if p.forms else p.neutral for v, p in zip(start, effect.shape, strict=False)])
+    zero = np.array(
+        [v if p.forms else p.neutral for v, p in zip(start, effect.shape, strict=False)]
+    )
     reach = float(np.linalg.norm(start - zero))
 
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
@@ -422,13 +458,23 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
 def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
     """Return what the bent baseline adds to the untouched one, (m, O, 1) of each run."""
     return [
-        bent_column(*columns_under([candidate.term(r)], run, sight.baseline), sight.values, sight.untouched[r], run)
+        bent_column(
+            *columns_under([candidate.term(r)], run, sight.baseline),
+            sight.values,
+            sight.untouched[r],
+            run,
+        )
         for r, run in enumerate(sight.runs)
     ]
 
 
 def _growth(
-    effect: Effect, left: NDArray, column: Sequence[NDArray], columns: int, sight: Sight, power: float
+    effect: Effect,
+    left: NDArray,
+    column: Sequence[NDArray],
+    columns: int,
+    sight: Sight,
+    power: float,
 ) -> tuple[float, str]:
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
     if _squared(left) <= NOTHING * _squared(sight.rows(column)[:, 0]):
@@ -437,23 +483,33 @@ def _growth(
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
     # A good rig has a little of the effect, as if its amplitude were known to so much.
     share = sight.share(effect, column)
-    by_background = 2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
+    by_background = (
+        2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
+    )
     if by_noise >= by_background:
         return by_noise, "noise"
     return by_background, "materiality"
 
 
 def _usual(looks: list[Look]) -> Look:
-    """Return the look that shows less than most shapes do: the size that it needs is enough for ``USUAL`` of them."""
+    """Return the look that shows less than most shapes do: the size that it needs is enough for
+    ``USUAL`` of them."""
     return sorted(looks, key=lambda look: look.rms)[round(USUAL * (len(looks) - 1))]
 
 
 def _detectable(
-    effect: Effect, look: Look, looks: dict[Effect, list[Look]], unexplained: NDArray, torque_rms: float
+    effect: Effect,
+    look: Look,
+    looks: dict[Effect, list[Look]],
+    unexplained: NDArray,
+    torque_rms: float,
 ) -> Detectable:
-    """Put together what is known of one cause; ``unexplained`` is the share of it that each cause leaves."""
+    """Put together what is known of one cause; ``unexplained`` is the share of it that each cause
+    leaves."""
     others = sorted(zip(unexplained, (other.label for other in looks), strict=True))
-    alike = [(share, label) for share, label in others if label != effect.label and _alike(look, share)]
+    alike = [
+        (share, label) for share, label in others if label != effect.label and _alike(look, share)
+    ]
     names = [p.name for p in effect.shape] if look.shape else []
     return Detectable(
         effect, look.rms, look.size, tuple(zip(names, look.shape, strict=True)),
@@ -469,9 +525,11 @@ def _alike(look: Look, unexplained: NDArray | float) -> NDArray:
 
 
 def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray:
-    """Return the share of each effect that each cannot explain, the sine squared of the angle between them, (e, e).
+    """Return the share of each effect that each cannot explain, the sine squared of the angle
+    between them, (e, e).
 
-    A mere level does not count as an explanation: a spring without stiffness is an offset, and called that.
+    A mere level does not count as an explanation: a spring without stiffness is an offset, and
+    called that.
     """
     every = [other for others in looks for other in others]
     directions = np.array([look.left for look in chosen])
@@ -484,7 +542,8 @@ def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray
 
 
 def _explained(directions: NDArray, spans: Sequence[NDArray]) -> NDArray:
-    """Return the share of each unit vector (e, rows) in each orthonormal span (rows, k), (e, spans)."""
+    """Return the share of each unit vector (e, rows) in each orthonormal span (rows, k), (e,
+    spans)."""
     squares = (directions @ np.hstack(spans)) ** 2
     ends = np.cumsum([0, *(span.shape[1] for span in spans)])
     total = np.hstack([np.zeros((len(squares), 1)), np.cumsum(squares, axis=1)])

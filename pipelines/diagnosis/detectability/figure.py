@@ -1,4 +1,5 @@
-"""The figure of what can be seen: the smallest torque of each cause that would be noticed, joint by joint."""
+"""The figure of what can be seen: the smallest torque of each cause that would be noticed, joint by
+joint."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,9 +20,13 @@ def draw(found: Sequence[Detectable], stem: Path, title: str) -> None:
     groups = [[one for one in found if (one.effect.joint or first) == joint] for joint in joints]
     height = 0.9 + 0.22 * max(len(group) for group in groups)
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, len(joints), figsize=(5.8 * len(joints), height), sharex=True, squeeze=False)
+        figure, axes = plt.subplots(
+            1, len(joints), figsize=(5.8 * len(joints), height), sharex=True, squeeze=False
+        )
         for axis, joint, group in zip(axes[0], joints, groups, strict=True):
-            _bars(axis, joint, sorted(group, key=lambda one: (one.smallest_rms_nm, one.effect.name)))
+            _bars(
+                axis, joint, sorted(group, key=lambda one: (one.smallest_rms_nm, one.effect.name))
+            )
         figure.suptitle(title, x=0.02, ha="left", fontweight="bold")
         figure.tight_layout()
         save(figure, stem)
@@ -50,7 +55,9 @@ def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
     axis.annotate("the joint's own torque", (limit, -0.8), fontsize=7, color=ORANGE, ha="center", va="bottom",
                   annotation_clip=False)  # fmt: skip
     axis.grid(axis="y", visible=False)
-    axis.set_xlabel(f"smallest effect that would be seen, {group[0].unit} rms (white tick: at its best shape)")
+    axis.set_xlabel(
+        f"smallest effect that would be seen, {group[0].unit} rms (white tick: at its best shape)"
+    )
     axis.set_title(joint, loc="left")
 
 

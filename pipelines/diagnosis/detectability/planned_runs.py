@@ -15,9 +15,14 @@ from pipelines.signals.blocks import BlockAverage
 
 
 def planned_motions(
-    trajectory: Trajectory, plant: PlantSettings, noise: NoiseSettings, kinds: tuple[str, ...], rate_hz: float
+    trajectory: Trajectory,
+    plant: PlantSettings,
+    noise: NoiseSettings,
+    kinds: tuple[str, ...],
+    rate_hz: float,
 ) -> list[Motion]:
-    """Return one motion of each kind of run, its torque that of rigid body and friction, without cuff forces."""
+    """Return one motion of each kind of run, its torque that of rigid body and friction, without
+    cuff forces."""
     count = round(min(noise.duration_s, trajectory.duration_s) * rate_hz)
     time = np.arange(count) / rate_hz
     q, dq, ddq = trajectory.at(time)
@@ -25,7 +30,9 @@ def planned_motions(
     Y = LEG.regressor(q, dq, ddq, geometry)
     made = []
     for kind in kinds:
-        X = np.array(plant.exo_inertial) + (np.array(plant.human_inertial) if kind == "with_human" else 0.0)
+        X = np.array(plant.exo_inertial) + (
+            np.array(plant.human_inertial) if kind == "with_human" else 0.0
+        )
         made.append(_motion(time, (q, dq, ddq), Y @ X, kind, plant, geometry, trajectory, rate_hz))
     return made
 
@@ -41,7 +48,9 @@ def _motion(
         geometry=geometry, file=kind,
         metadata={"joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]},
     )  # fmt: skip
-    for joint, levels in zip(names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True):
+    for joint, levels in zip(
+        names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True
+    ):
         motion.torque[:] += Friction(joint).torque(motion, np.array(levels))
     return motion
 
@@ -49,8 +58,8 @@ def _motion(
 def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> Floor:
     """Return the noise of two drives behind the regression filter; cuffs are not planned.
 
-    Of noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 - i/D) rho^i) / D,
-    and its integral over all lags is that of the noise itself.
+    Of noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 -
+    i/D) rho^i) / D, and its integral over all lags is that of the noise itself.
     """
     rho = np.exp(-1.0 / (rate_hz * noise.correlation_s)) if noise.correlation_s > 0 else 0.0
     D = block.decimation
@@ -58,4 +67,6 @@ def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> 
     variance = (1.0 + 2.0 * np.sum((1.0 - lags / D) * rho**lags)) / D
     integral = (1.0 + rho) / (1.0 - rho) / D
     rms = np.array([noise.hip_nm, noise.knee_nm]) * np.sqrt(variance)
-    return Floor(np.append(rms, [np.nan, np.nan]), np.full(4, variance / integral), from_periods=False)
+    return Floor(
+        np.append(rms, [np.nan, np.nan]), np.full(4, variance / integral), from_periods=False
+    )

@@ -1,1 +1,2 @@
-"""What the decision is made from: runs behind filters, their noise, and how the residual repeats."""
+"""What the decision is made from: runs behind filters, their noise, and how the residual
+repeats."""

@@ -18,8 +18,8 @@ from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
 RELAXATION = 0.5
-"""Share of the step from a rigid body to a refitted one. Behind a soft spring a full step overshoots, and alternates
-between heavier and lighter bodies for ever."""
+"""Share of the step from a rigid body to a refitted one. Behind a soft spring a full step
+overshoots, and alternates between heavier and lighter bodies for ever."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class Baseline:
     machine: Machine
     cuffs: bool
     known: tuple[Effect, ...] = ()
-    """What else the machine is known to have; each acts like friction, by linear parameters that all runs share."""
+    """What else the machine is known to have; each acts like friction, by linear parameters that
+    all runs share."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -39,7 +40,8 @@ class Baseline:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Rigid bodies, friction, what the machine is known to have, and the force sensors' zeros."""
+        """Rigid bodies, friction, what the machine is known to have, and the force sensors'
+        zeros."""
         return baseline(self.machine, self.kinds, self.known, cuffs=self.cuffs)
 
     @cached_property
@@ -54,12 +56,17 @@ class Baseline:
 
     @cached_property
     def nonnegative(self) -> list[int]:
-        """Columns whose values are never negative: inertia, friction, and what the machine is known to have.
+        """Columns whose values are never negative: inertia, friction, and what the machine is known
+        to have.
 
         First moments of mass may be negative: a link may be overbalanced.
         """
         columns = enumerate(self.layout.columns)
-        return [k for k, c in columns if c.parameter.typical[0] >= 0.0 and c.parameter.unit != FIRST_MOMENT]
+        return [
+            k
+            for k, c in columns
+            if c.parameter.typical[0] >= 0.0 and c.parameter.unit != FIRST_MOMENT
+        ]
 
     @property
     def size(self) -> int:
@@ -68,13 +75,15 @@ class Baseline:
 
 
 def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
-    """Return the baseline that the kinds of run at hand allow, with what else the machine is ``known`` to have."""
+    """Return the baseline that the kinds of run at hand allow, with what else the machine is
+    ``known`` to have."""
     kinds = kinds_of(run.motion for run in runs)
     return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
 
 
 def like_trained(run: Run, baseline: Baseline) -> Run:
-    """Return the run without its cuffs where none was there to train on: their zeros are not known."""
+    """Return the run without its cuffs where none was there to train on: their zeros are not
+    known."""
     if baseline.cuffs or not run.has_cuffs:
         return run
     usable = run.usable.copy()
@@ -83,12 +92,14 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
 
 
 def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
-    """Return baseline values (b,) part of the way from those before to refitted ones; the refitted ones without any."""
+    """Return baseline values (b,) part of the way from those before to refitted ones; the refitted
+    ones without any."""
     return refitted if before is None else RELAXATION * refitted + (1.0 - RELAXATION) * before
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,)."""
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in
+    ``values`` (b,)."""
     layout = baseline.layout
     body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
     return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

@@ -27,7 +27,9 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
     return run.average(columns), run.measured_at(motions.link)
 
 
-def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:
+def gram_of_runs(
+    runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None
+) -> Gram:
     """Multiply out all runs; ``measured`` (m, O) each where it is not the runs' own."""
     measured = measured or [run.measured for run in runs]
     grams = [gram_of(c, y, r.usable) for r, c, y in zip(runs, columns, measured, strict=True)]

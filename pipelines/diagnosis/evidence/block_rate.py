@@ -12,7 +12,8 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
 HIGHEST_CUTOFF = 0.4
-"""Highest cutoff, as a share of the rate: a motion filtered above it moves no faster at this rate."""
+"""Highest cutoff, as a share of the rate: a motion filtered above it moves no faster at this
+rate."""
 
 
 def at_block_rate(run: Run) -> Run:

@@ -1,9 +1,10 @@
-"""A wearer who pushes, felt in the cuffs and by the drives at once: evidence that no rhythm has to be guessed for.
+"""A wearer who pushes, felt in the cuffs and by the drives at once: evidence that no rhythm has to
+be guessed for.
 
-What repeats with the motion may be a muscle's reflex or a spring; what does not, and comes through the cuffs, is
-somebody's will. A machine's own troubles, a drag that wanders or a sensor that drifts, leave the cuffs alone. The
-evidence is the log likelihood that the drives' scatter between adjacent periods gains where the cuffs' is taken off
-it, newton metre for newton metre.
+What repeats with the motion may be a muscle's reflex or a spring; what does not, and comes through
+the cuffs, is somebody's will. A machine's own troubles, a drag that wanders or a sensor that
+drifts, leave the cuffs alone. The evidence is the log likelihood that the drives' scatter between
+adjacent periods gains where the cuffs' is taken off it, newton metre for newton metre.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,8 @@ FEWEST = 30
 
 
 def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
-    """Return the log likelihood that a wearer's push gains by what does not repeat at each joint, (J,).
+    """Return the log likelihood that a wearer's push gains by what does not repeat at each joint,
+    (J,).
 
     Parameters
     ----------
@@ -35,7 +37,9 @@ def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
     """
     joints = len(runs[0].motion.joints)
     slow = [
-        slowed(run, residual, SLOW_S, NEEDED) for run, residual in zip(runs, residuals, strict=True) if run.has_cuffs
+        slowed(run, residual, SLOW_S, NEEDED)
+        for run, residual in zip(runs, residuals, strict=True)
+        if run.has_cuffs
     ]
     gains = np.zeros(joints)
     if not slow:

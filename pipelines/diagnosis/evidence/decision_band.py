@@ -45,7 +45,8 @@ class DecisionBand:
         count = usable.sum(axis=1)
         weight = np.where(count >= LEAST_SHARE * k, count / k, 0.0)
         operators = tuple(
-            _averaging(blocks, usable[:, :, o], count[:, o], len(run.time)) for o in range(run.usable.shape[1])
+            _averaging(blocks, usable[:, :, o], count[:, o], len(run.time))
+            for o in range(run.usable.shape[1])
         )
         return cls(run, run.time[blocks].mean(axis=1), blocks, weight, operators)
 

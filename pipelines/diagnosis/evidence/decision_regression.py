@@ -1,8 +1,8 @@
 """All searched runs in the decision band as one weighted regression, the baseline projected out.
 
 Rows are averages over 0.1 s of every output of every run, divided by their noise and whitened as
-noise of first order; so the squared length of a residual is a chi-square. What the baseline can imitate is
-projected out of everything, which is the same as a flat prior on its parameters.
+noise of first order; so the squared length of a residual is a chi-square. What the baseline can
+imitate is projected out of everything, which is the same as a flat prior on its parameters.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,7 +32,8 @@ class DecisionRegression:
     roots: tuple[NDArray, ...]
     """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
     operator: sparse.csr_matrix
-    """(N, sum of m O): takes the blocks of all runs to weighted rows; those without weight are left out."""
+    """(N, sum of m O): takes the blocks of all runs to weighted rows; those without weight are left
+    out."""
     whitening: sparse.csr_matrix
     """(N, N): takes from each average what the one before it foretells of its noise."""
     weighty: NDArray
@@ -87,7 +88,9 @@ class DecisionRegression:
         operator.eliminate_zeros()
         empty = [np.zeros(0)] * 4
         kinds = tuple(run.motion.run for run in runs)
-        blank = cls(kinds, bands, roots, operator, whitening, weighty, output[weighty], torque, *empty)
+        blank = cls(
+            kinds, bands, roots, operator, whitening, weighty, output[weighty], torque, *empty
+        )
         rows = blank.rows(baseline)
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
         basis = _orthonormal(rows)
@@ -143,7 +146,8 @@ class DecisionRegression:
         return np.asarray(self._inverse**2 @ of_output)
 
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield for each run the times (m,) s of an output's rows, and what the baseline leaves there, (m,).
+        """Yield for each run the times (m,) s of an output's rows, and what the baseline leaves
+        there, (m,).
 
         The residual is in units of the rows' noise.
         """
@@ -160,7 +164,8 @@ class DecisionRegression:
         return splu(self.whitening.tocsc(), permc_spec="NATURAL")
 
     def shares(self, columns: NDArray) -> NDArray:
-        """Return rows (R, k) whose squares add up to a column's squared share of the drives' torque.
+        """Return rows (R, k) whose squares add up to a column's squared share of the drives'
+        torque.
 
         The share at a joint is the column's rms over the drive's rms torque.
         """
@@ -173,7 +178,9 @@ class DecisionRegression:
         return columns[use] * scale[:, np.newaxis]
 
 
-def _whitening(bands: Sequence[DecisionBand], weighty: NDArray, memory: NDArray) -> sparse.csr_matrix:
+def _whitening(
+    bands: Sequence[DecisionBand], weighty: NDArray, memory: NDArray
+) -> sparse.csr_matrix:
     """Return what whitens averages whose noise resembles that of the average before, (N, N).
 
     Parameters
@@ -197,7 +204,8 @@ def _whitening(bands: Sequence[DecisionBand], weighty: NDArray, memory: NDArray)
 
 
 def _operator(band: DecisionBand, root: NDArray) -> sparse.csr_matrix:
-    """Return what takes a run's blocks and outputs, m O, to its weighted averages and outputs, M O."""
+    """Return what takes a run's blocks and outputs, m O, to its weighted averages and outputs, M
+    O."""
     outputs = root.shape[1]
     weighted = [sparse.diags(root[:, o]) @ op for o, op in enumerate(band.operators)]
     M, m = weighted[0].shape

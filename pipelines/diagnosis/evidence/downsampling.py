@@ -1,4 +1,5 @@
-"""Fast recordings at the rate that the diagnosis needs: motion below 20 Hz asks for no kilohertz."""
+"""Fast recordings at the rate that the diagnosis needs: motion below 20 Hz asks for no
+kilohertz."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,8 @@ ENOUGH_HZ = 200.0
 
 
 def thinned(motion: Motion) -> Motion:
-    """Return the motion with neighbouring samples averaged to ``ENOUGH_HZ`` or a little more; as it is where slower."""
+    """Return the motion with neighbouring samples averaged to ``ENOUGH_HZ`` or a little more; as it
+    is where slower."""
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion
@@ -22,7 +24,8 @@ def thinned(motion: Motion) -> Motion:
         for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "temperature")
         if getattr(motion, name) is not None
     }
-    if motion.measured_angle is not None:  # a mean of readings is no reading: it has counts that the encoder lacks
+    # A mean of readings is no reading: it has counts that the encoder lacks.
+    if motion.measured_angle is not None:
         averaged["measured_angle"] = motion.measured_angle[starts + every.decimation // 2]
     blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))
     rate = motion.sample_rate_hz / every.decimation

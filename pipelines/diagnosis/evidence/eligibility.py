@@ -1,4 +1,5 @@
-"""The runs that a diagnosis is given: of one machine, whose joints move for long enough to say anything."""
+"""The runs that a diagnosis is given: of one machine, whose joints move for long enough to say
+anything."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -17,10 +18,11 @@ from pipelines.mechanics.silence import silent_torque
 MOST_NM = 10_000.0
 """Largest plausible torque, N·m; a larger one is in another unit."""
 COPIED = 1e-12
-"""Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than their last count."""
+"""Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than
+their last count."""
 LEAST_S = 5.0
-"""Least motion of an exoskeleton, s, all runs of a kind and purpose together: less does not separate gravity, inertia
-and friction."""
+"""Least motion of an exoskeleton, s, all runs of a kind and purpose together: less does not
+separate gravity, inertia and friction."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
@@ -48,7 +50,8 @@ def _refuse_monsters(motion: Motion) -> None:
 
 
 def _refuse_one_angle_twice(motion: Motion) -> None:
-    """Refuse joints of which one only repeats the other's angle: no motion then tells their torques apart."""
+    """Refuse joints of which one only repeats the other's angle: no motion then tells their torques
+    apart."""
     if motion.measured_angle is None or not motion.valid.any():
         return
     q = motion.measured_angle[motion.valid]
@@ -66,7 +69,8 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
 
 
 def _refuse_twins(motions: Sequence[Motion]) -> None:
-    """Refuse one measurement under two names: an error would pass for one of a run that no fit has seen."""
+    """Refuse one measurement under two names: an error would pass for one of a run that no fit has
+    seen."""
     for one, other in combinations(motions, 2):
         if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
             raise InputError(
@@ -76,7 +80,8 @@ def _refuse_twins(motions: Sequence[Motion]) -> None:
 
 
 def _refuse_standstill(motions: Sequence[Motion]) -> None:
-    """Refuse runs of one kind and purpose in which a joint hardly moves or both hardly move at once."""
+    """Refuse runs of one kind and purpose in which a joint hardly moves or both hardly move at
+    once."""
     files = ", ".join(m.file for m in motions)
     together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
     moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
@@ -114,7 +119,8 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
-    """Refuse an angle that is one number all along: what a filter leaves of it only seems to move."""
+    """Refuse an angle that is one number all along: what a filter leaves of it only seems to
+    move."""
     measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
     values = np.concatenate(measured) if measured else np.zeros(0)
     if len(values) and np.ptp(values) == 0.0:
@@ -127,4 +133,8 @@ def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
 
 
 def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:
-    return float(sum(mask.sum() / motion.sample_rate_hz for mask, motion in zip(marked, motions, strict=True)))
+    return float(
+        sum(
+            mask.sum() / motion.sample_rate_hz for mask, motion in zip(marked, motions, strict=True)
+        )
+    )

@@ -1,7 +1,7 @@
 """Sums of products of columns, by output: all that a weighted fit needs.
 
-With Gram matrices in hand a fit of any set of columns costs a solve of that set's size, whatever the
-length of the recordings.
+With Gram matrices in hand a fit of any set of columns costs a solve of that set's size, whatever
+the length of the recordings.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,9 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray) -> Gram:
     usable : (m, O) array of bool
     """
     _, outputs, c = columns.shape
-    out = Gram(np.zeros((outputs, c, c)), np.zeros((outputs, c)), np.zeros(outputs), np.zeros(outputs))
+    out = Gram(
+        np.zeros((outputs, c, c)), np.zeros((outputs, c)), np.zeros(outputs), np.zeros(outputs)
+    )
     for o in range(outputs):
         rows = usable[:, o]
         A, y = columns[rows, o], measured[rows, o]
@@ -60,7 +62,8 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray) -> Gram:
 
 
 def solve(gram: Gram, weights: NDArray) -> NDArray:
-    """Return the coefficients (c,) of the weighted fit; ``weights`` (O,) are the outputs' inverse variances."""
+    """Return the coefficients (c,) of the weighted fit; ``weights`` (O,) are the outputs' inverse
+    variances."""
     A = np.einsum("o,oij->ij", weights, gram.columns)
     b = np.einsum("o,oi->i", weights, gram.measured)
     size = np.sqrt(np.maximum(np.diag(A), np.finfo(float).tiny))
@@ -76,7 +79,8 @@ def error(gram: Gram, values: NDArray) -> NDArray:
 
 
 def weights_under(gram: Gram) -> NDArray:
-    """Return each output's inverse variance under the fit to all columns, iterated, (O,) 1/(N·m)²."""
+    """Return each output's inverse variance under the fit to all columns, iterated, (O,)
+    1/(N·m)²."""
     weights = np.where(gram.count > 0, 1.0, 0.0)
     for _ in range(PASSES):
         squares = error(gram, solve(gram, weights))

@@ -1,6 +1,8 @@
-"""What a machine is known to have besides its rigid body and friction: part of what everything is held against.
+"""What a machine is known to have besides its rigid body and friction: part of what everything is
+held against.
 
-Who built a machine knows its rotors and gears. Data need not show that they are there, only how large they are.
+Who built a machine knows its rotors and gears. Data need not show that they are there, only how
+large they are.
 """
 
 from collections.abc import Sequence
@@ -19,11 +21,14 @@ def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]
     InputError
         Where there is none of this name or at this joint, or drawings do not show it.
     """
-    return tuple(effect_at(label, machine, _fits, "diagnose.known") for label in dict.fromkeys(labels))
+    return tuple(
+        effect_at(label, machine, _fits, "diagnose.known") for label in dict.fromkeys(labels)
+    )
 
 
 def _fits(effect: type[Effect]) -> bool:
-    """Tell whether drawings show an effect, as an inertia, a spring or a mass, and only its linear parameters are open.
+    """Tell whether drawings show an effect, as an inertia, a spring or a mass, and only its linear
+    parameters are open.
 
     How a joint rubs is on no drawing.
     """

@@ -31,7 +31,8 @@ AROUND_IN_ANGLE, AROUND_IN_TIME = 20, 120
 STEEP = 6
 """Widths of the same where the level may be steep; a line itself would raise so narrow a median."""
 LEAST_INFORMED = 1e-3
-"""Least information about an order, as a share of that about the best known one: less is taken as that much."""
+"""Least information about an order, as a share of that about the best known one: less is taken as
+that much."""
 HARMONICS = 8
 """Of the motion, on each side of one."""
 

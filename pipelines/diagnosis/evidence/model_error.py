@@ -1,7 +1,7 @@
 """What even a good rig gets wrong: a share of what its torques vary by.
 
-What is off by some share of the torque varies with it. A constant that the baseline has anyway, as a lift's weight,
-is told off with it and hides nothing.
+What is off by some share of the torque varies with it. A constant that the baseline has anyway, as
+a lift's weight, is told off with it and hides nothing.
 """
 
 from collections.abc import Sequence
@@ -17,18 +17,21 @@ IMPERFECTION = (0.009, 0.02)
 
 
 def imperfection(runs: Sequence[Run]) -> NDArray:
-    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
+    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth
+    nothing."""
     torque = telling_torque(runs)
     return torque * imperfect_share(len(torque))
 
 
 def imperfect_share(outputs: int) -> NDArray:
-    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives first, then cuffs."""
+    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives
+    first, then cuffs."""
     return np.repeat(IMPERFECTION, outputs // 2)
 
 
 def telling_torque(runs: Sequence[Run]) -> NDArray:
-    """Return the rms of each output's torque (O,), N·m, less a constant where the machine's bodies have any."""
+    """Return the rms of each output's torque (O,), N·m, less a constant where the machine's bodies
+    have any."""
     squares, count = np.zeros(runs[0].measured.shape[1]), np.zeros(runs[0].measured.shape[1])
     for run in runs:
         known = np.where(run.usable, run.measured, 0.0)

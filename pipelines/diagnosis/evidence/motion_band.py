@@ -7,11 +7,13 @@ from pipelines.diagnosis.evidence.observed_run import Run
 LOWEST_HZ = 1.2
 """Below it the motion itself has its lines, however slow it is."""
 HARMONICS, MOVING = 2.0, 0.99
-"""Harmonics of the motion's own band that its misfit has lines up to, and share of the speed's power in that band."""
+"""Harmonics of the motion's own band that its misfit has lines up to, and share of the speed's
+power in that band."""
 
 
 def above_the_motion_hz(run: Run) -> float:
-    """Return the frequency above which the motion, and what a model gets wrong of it, has no lines."""
+    """Return the frequency above which the motion, and what a model gets wrong of it, has no
+    lines."""
     return max(LOWEST_HZ, HARMONICS * _band_hz(run))
 
 

@@ -1,4 +1,5 @@
-"""The noise floor, from data alone: what does not repeat from one period of the excitation to the next."""
+"""The noise floor, from data alone: what does not repeat from one period of the excitation to the
+next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_LAG_S = 1.0
-"""Without periods noise is what changes faster than averages of this length, s, on an exoskeleton's scale."""
+"""Without periods noise is what changes faster than averages of this length, s, on an exoskeleton's
+scale."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,9 @@ class Floor:
 def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     """Estimate the noise from differences between adjacent periods at the same phase.
 
-    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods. Without periods the
-    noise is what is faster than the motion, and as dense below: what is missing and as fast passes for noise.
+    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods.
+    Without periods the noise is what is faster than the motion, and as dense below: what is missing
+    and as fast passes for noise.
     """
     pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(d) for d in pairs)
@@ -52,7 +55,8 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
 
 
 def scatter(run: Run, residual: NDArray) -> NDArray:
-    """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not usable."""
+    """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not
+    usable."""
     period = run.motion.period_s
     if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
         return np.zeros((0, residual.shape[1]))
@@ -61,7 +65,9 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     whole = round(shift)
     if abs(shift - whole) > 0.1:
         # The period is no whole number of blocks: interpolate the later one.
-        later = np.column_stack([np.interp(run.time + period, run.time, r, right=np.nan) for r in residual.T])
+        later = np.column_stack(
+            [np.interp(run.time + period, run.time, r, right=np.nan) for r in residual.T]
+        )
         ahead = np.clip(np.searchsorted(run.time, run.time + period), 0, len(run.time) - 1)
         usable = run.usable & run.usable[ahead]
         # Interpolation halves the later noise's variance on average, to two thirds.
@@ -76,7 +82,8 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
 
 
 def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
-    """Return a residual (m, O) less its running average over ``than_s``, NaN where it is not usable.
+    """Return a residual (m, O) less its running average over ``than_s``, NaN where it is not
+    usable.
 
     Next to a gap or a reversal the average is of those samples that are usable, at least half.
     """

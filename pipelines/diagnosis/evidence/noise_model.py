@@ -58,7 +58,8 @@ class NoiseModel:
     from_periods: bool
 
     def at(self, hz: NDArray) -> NDArray:
-        """Return the density at frequencies (k,), (O, k); below ``WANDER_HZ`` it is not known to grow."""
+        """Return the density at frequencies (k,), (O, k); below ``WANDER_HZ`` it is not known to
+        grow."""
         first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
         pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, TINY_HZ))
         return (self.density * (first + pink).T).T
@@ -75,12 +76,14 @@ class NoiseModel:
         return np.sqrt(variance), np.maximum(adjacent / variance, 0.0)
 
     def sigma(self, length_s: float) -> NDArray:
-        """Return the standard deviation that averages act with where what they hold is slow, (O,) N·m."""
+        """Return the standard deviation that averages act with where what they hold is slow, (O,)
+        N·m."""
         sd, memory = self.averaged(length_s)
         return np.asarray(sd * np.sqrt((1.0 + memory) / (1.0 - memory)))
 
     def excess(self, hz: NDArray, length_s: float) -> NDArray:
-        """Return by how much slow noise exceeds that of averages of first order, (O, k) (N·m)²/Hz."""
+        """Return by how much slow noise exceeds that of averages of first order, (O, k)
+        (N·m)²/Hz."""
         sd, memory = self.averaged(length_s)
         turn = np.multiply.outer(memory, np.cos(2.0 * np.pi * hz * length_s))
         of_order_one = (sd**2 * (1.0 - memory**2) * length_s) / (1.0 + memory**2 - 2.0 * turn.T)
@@ -94,13 +97,19 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     if from_periods:
         series, band, pink = differences, (WANDER_HZ, HIGHEST_HZ), PINK
     else:
-        series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
+        series = [
+            np.where(run.usable, residual, np.nan)
+            for run, residual in zip(runs, residuals, strict=True)
+        ]
         above = max(above_the_motion_hz(run) for run in runs)
         latest, highest = WITHOUT_PERIODS_HZ
         band, pink = (min(above, latest), highest), np.array([UNKNOWN_PINK])
     rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
     outputs = range(residuals[0].shape[1])
-    fits = [_spectrum_of([one[:, o] for one in series if len(one)], rate_hz, band, pink) for o in outputs]
+    fits = [
+        _spectrum_of([one[:, o] for one in series if len(one)], rate_hz, band, pink)
+        for o in outputs
+    ]
     density, correlation_s, ratio = np.array(fits).T
     return NoiseModel(density, correlation_s, ratio, from_periods)
 
@@ -135,14 +144,18 @@ Piece = tuple[NDArray, NDArray, NDArray]
 def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece]:
     """Return each piece's spectrum within a band, as ``_of_piece`` gives it."""
     pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
-    return [_of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST]
+    return [
+        _of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST
+    ]
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
-    """Return one piece's frequencies (Hz), power densities, and the share of white noise left at each.
+    """Return one piece's frequencies (Hz), power densities, and the share of white noise left at
+    each.
 
     Slow cosines are fitted and subtracted, or what is slow would leak into the band through gaps.
-    Through gaps they also take some of what is faster: of white noise the share that is left is known.
+    Through gaps they also take some of what is faster: of white noise the share that is left is
+    known.
     """
     known, n = np.isfinite(x), len(x)
     count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))

@@ -1,8 +1,8 @@
 """All runs as one linear regression: outputs, baseline columns, masks and folds.
 
-An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about each
-joint that they exert on the person. The second pair is a second measurement of the human's share, and
-what separates causes in the drive or the structure from causes in the person.
+An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about
+each joint that they exert on the person. The second pair is a second measurement of the human's
+share, and what separates causes in the drive or the structure from causes in the person.
 """
 
 from dataclasses import dataclass
@@ -51,10 +51,15 @@ class Run:
 
     def slow(self, full_rate: NDArray) -> NDArray:
         """Return what (n, ...) at full rate holds below the cut-off, where there is one."""
-        return full_rate if self.cutoff_hz is None else filtered(self.motion, full_rate, self.cutoff_hz)
+        return (
+            full_rate
+            if self.cutoff_hz is None
+            else filtered(self.motion, full_rate, self.cutoff_hz)
+        )
 
     def with_fast(self, residual: NDArray) -> NDArray:
-        """Return what is left (m, O) with what is faster than the cut-off: no column foretells it, and it may hum."""
+        """Return what is left (m, O) with what is faster than the cut-off: no column foretells it,
+        and it may hum."""
         return residual if self.fast is None else residual + self.fast
 
     def blocks_in(self, seconds: float) -> float:
@@ -68,7 +73,8 @@ class Run:
         return passed if self.cutoff_hz is None else min(passed, self.cutoff_hz)
 
     def measured_at(self, link: Motion) -> NDArray:
-        """Return what was measured where the links move otherwise than the encoders say, (m, O) N·m."""
+        """Return what was measured where the links move otherwise than the encoders say, (m, O)
+        N·m."""
         if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
         cuffs = self.motion.cuff_torque(link.q)
@@ -83,7 +89,8 @@ class Run:
 
 
 def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
-    """Put one motion behind the regression filter, which may let nothing pass that is faster than a cut-off."""
+    """Put one motion behind the regression filter, which may let nothing pass that is faster than a
+    cut-off."""
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
@@ -111,11 +118,17 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
         block=block,
         starts=starts,
         time=time,
-        state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
+        state=(
+            block.mean(motion.q, starts),
+            block.mean(motion.dq, starts),
+            block.mean(motion.ddq, starts),
+        ),
         measured=block.mean(slow, starts),
         usable=usable,
         valid=valid,
-        fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
+        fold=np.floor((time - time[0]) / part).astype(int) % FOLDS
+        if part < length
+        else number % FOLDS,
         cutoff_hz=cutoff_hz,
         fast=None if cutoff_hz is None else block.mean(whole - slow, starts),
     )

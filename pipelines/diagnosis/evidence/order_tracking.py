@@ -43,7 +43,8 @@ APART = 1.5
 LONGEST_STEP = 1.5
 """Of a refinement, times that of Gauss and Newton."""
 BESIDE, MUCH_WEAKER = 5.0, 0.05
-"""A line within so many widths of a stronger one, with at most this share of its likelihood ratio, is a part of it."""
+"""A line within so many widths of a stronger one, with at most this share of its likelihood ratio,
+is a part of it."""
 LEAST_S = 2.0
 """Of usable motion in a run, without which it is left out."""
 

@@ -40,7 +40,8 @@ class Prepared:
 
     @property
     def slow_rms(self) -> NDArray:
-        """What the baseline leaves in the decision band, (O,) N·m rms; zero without such an output."""
+        """What the baseline leaves in the decision band, (O,) N·m rms; zero without such an
+        output."""
         squares, weight = np.zeros(len(self.torque)), np.zeros(len(self.torque))
         for run, residual in zip(self.runs, self.residuals, strict=True):
             band = DecisionBand.of(run)
@@ -65,9 +66,13 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
     noise = noise_model(laden, residuals)
     predicted = _at_full_rate(laden, baseline, values)
     motions = [run.motion for run in laden]
-    lines = lines_in(motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)])
+    lines = lines_in(
+        motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)]
+    )
     torque = telling_torque(runs)
-    return Prepared(laden, baseline, columns, values, weights, noise, torque, predicted, tuple(lines))
+    return Prepared(
+        laden, baseline, columns, values, weights, noise, torque, predicted, tuple(lines)
+    )
 
 
 def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> tuple[NDArray, ...]:

@@ -46,7 +46,9 @@ class ResidualShares:
         }  # fmt: skip
 
 
-def residual_shares(runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel) -> list[ResidualShares]:
+def residual_shares(
+    runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel
+) -> list[ResidualShares]:
     """Split the residuals (m, O) of each run, for each joint."""
     bands = [DecisionBand.of(run) for run in runs]
     averaged = [band.average(r) for band, r in zip(bands, residuals, strict=True)]
@@ -54,7 +56,9 @@ def residual_shares(runs: Sequence[Run], residuals: Sequence[NDArray], noise: No
     return [_of_joint(j, bands, averaged, noise) for j in range(joints)]
 
 
-def _of_joint(j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray], noise: NoiseModel) -> ResidualShares:
+def _of_joint(
+    j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray], noise: NoiseModel
+) -> ResidualShares:
     known = [band.weight[:, j] > 0.0 for band in bands]
     values = [a[k, j] for a, k in zip(averaged, known, strict=True)]
     everything = np.concatenate(values)
@@ -66,7 +70,9 @@ def _of_joint(j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray]
     counts = np.array([len(v) for v in values])
     grand = float(means @ counts) / counts.sum()
     between = float(counts @ (means - grand) ** 2) / counts.sum()
-    repeated = [_repeating(band, a[:, j], k) for band, a, k in zip(bands, averaged, known, strict=True)]
+    repeated = [
+        _repeating(band, a[:, j], k) for band, a, k in zip(bands, averaged, known, strict=True)
+    ]
     products = np.concatenate(repeated)
     above = max(total - noisy, 0.0)
     if not len(products):
@@ -97,7 +103,9 @@ def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:
     return values[now[use]] * values[later[use]]
 
 
-def _with_person_only(bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float) -> float | None:
+def _with_person_only(
+    bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float
+) -> float | None:
     """Return how much more repeats with a person than without, as a share of all."""
     powers = []
     for kind in KINDS:

@@ -1,8 +1,9 @@
 """Residuals in the band where physics lives: below a few hertz.
 
-The torque is averaged over 25 ms, the acceleration comes from a filter that lets 8 to 12 Hz pass. Between the two
-lies what the drive's control makes of counted angles: it repeats with the motion, is no missing physics, and no
-model of the motion can predict it. Whether error is systematic is therefore asked of longer averages.
+The torque is averaged over 25 ms, the acceleration comes from a filter that lets 8 to 12 Hz pass.
+Between the two lies what the drive's control makes of counted angles: it repeats with the motion,
+is no missing physics, and no model of the motion can predict it. Whether error is systematic is
+therefore asked of longer averages.
 """
 
 from collections.abc import Sequence
@@ -45,13 +46,17 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     count = np.maximum(np.sum([run.usable.sum(axis=0) for run in longer], axis=0), 1)
     rms = np.sqrt(np.sum(squares, axis=0) / count)
     independent = count * floor.independent_share
-    # Where not even a second's worth of samples could be compared the floor is unknown: nothing is systematic.
+    # Where not even a second's worth of samples could be compared the floor is unknown: nothing is
+    # systematic.
     known = np.where(np.isfinite(floor.rms), floor.rms, np.inf)
     return SlowError(rms, known, independent)
 
 
-def slowed(run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0) -> tuple[Run, NDArray]:
-    """Average neighbouring blocks to a length, (m/k, O), where a share of them is usable; never across a gap."""
+def slowed(
+    run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0
+) -> tuple[Run, NDArray]:
+    """Average neighbouring blocks to a length, (m/k, O), where a share of them is usable; never
+    across a gap."""
     width = run.block.decimation / run.motion.sample_rate_hz
     k = max(1, round(length_s / width))
     whole = len(residual) // k * k
@@ -59,7 +64,11 @@ def slowed(run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float 
     together = time[:, -1] - time[:, 0] < (k - 0.5) * width
     there = run.usable[:whole].reshape(-1, k, residual.shape[1])
     count = there.sum(axis=1)
-    mean = np.where(there, residual[:whole].reshape(there.shape), 0.0).sum(axis=1) / np.maximum(count, 1)
+    mean = np.where(there, residual[:whole].reshape(there.shape), 0.0).sum(axis=1) / np.maximum(
+        count, 1
+    )
     usable = (count >= needed * k) & together[:, np.newaxis]
-    longer = replace(run, time=time.mean(axis=1), usable=usable, block=BlockAverage(k * run.block.decimation))
+    longer = replace(
+        run, time=time.mean(axis=1), usable=usable, block=BlockAverage(k * run.block.decimation)
+    )
     return longer, mean

@@ -1,9 +1,11 @@
-"""When something begins in a run: the one change in time that is sought exactly, and how far it is known.
+"""When something begins in a run: the one change in time that is sought exactly, and how far it is
+known.
 
-What has begun acts as if it had always been there. So the squared error of every instant at once is made of two running
-sums: of what is left without it before, and with it after. That error grows with the distance from the instant and not
-with its square, so no curvature tells how far the instant is known; its ratio of likelihoods does, whatever the motion
-(Hansen, 2000, Econometrica 68(3), theorem 2).
+What has begun acts as if it had always been there. So the squared error of every instant at once is
+made of two running sums: of what is left without it before, and with it after. That error grows
+with the distance from the instant and not with its square, so no curvature tells how far the
+instant is known; its ratio of likelihoods does, whatever the motion (Hansen, 2000, Econometrica
+68(3), theorem 2).
 """
 
 from dataclasses import dataclass
@@ -16,11 +18,13 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.estimation.long_run import long_run_covariance
 
 ALIKE_S = 0.5
-"""How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
+"""How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are
+about 1 Hz."""
 ALIKE = 4.0
 """Weighted squared error within which two onsets explain a run alike."""
 CRITICAL = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
-"""Of the ratio of likelihoods: 7.35, below which the larger peak of two walks that drift down is in 95 % of cases."""
+"""Of the ratio of likelihoods: 7.35, below which the larger peak of two walks that drift down is in
+95 % of cases."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,16 @@ class Onset:
     size: float
     """Weighted square of all that it would do."""
     inflation: float
-    """How much further an instant is in doubt than if every block were news: the long-run variance of what noise adds
-    to the difference of two instants' likelihoods, over its variance were the noise white and as the weights say."""
+    """How much further an instant is in doubt than if every block were news: the long-run variance
+    of what noise adds to the difference of two instants' likelihoods, over its variance were the
+    noise white and as the weights say."""
 
     @classmethod
-    def of(cls, run: Run, without: NDArray, throughout: NDArray, learnt: NDArray, weights: NDArray) -> "Onset":
-        """Weigh what is left (m, O) where it never comes and where it was there throughout, on ``learnt`` (m, O).
+    def of(
+        cls, run: Run, without: NDArray, throughout: NDArray, learnt: NDArray, weights: NDArray
+    ) -> "Onset":
+        """Weigh what is left (m, O) where it never comes and where it was there throughout, on
+        ``learnt`` (m, O).
 
         ``weights`` (O,) are the outputs' inverse variances.
         """
@@ -62,7 +70,8 @@ class Onset:
     def likeliest(self) -> float:
         """The middle one of the instants that explain the run alike, s.
 
-        What was there all along, or never, needs no coincidence, and is taken where chance may make the difference.
+        What was there all along, or never, needs no coincidence, and is taken where chance may make
+        the difference.
         """
         doubt = CRITICAL * self.inflation
         for simple in (0, -1):
@@ -72,9 +81,11 @@ class Onset:
         return float(likely[len(likely) // 2])
 
     def interval(self, run: Run, misfit: NDArray) -> tuple[float, float]:
-        """Return the ends of the 95 % interval, s, no further than from the run's first block to its last.
+        """Return the ends of the 95 % interval, s, no further than from the run's first block to
+        its last.
 
-        ``misfit`` (O,) N·m is what the model gets wrong with the motion, and so alike from block to block.
+        ``misfit`` (O,) N·m is what the model gets wrong with the motion, and so alike from block to
+        block.
         """
         wrong = run.blocks_in(ALIKE_S) * float(np.sum((self.pull * misfit) ** 2))
         doubt = CRITICAL * (self.inflation + wrong / self.size) if self.size > 0.0 else np.inf

@@ -1,4 +1,5 @@
-"""A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells of."""
+"""A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells
+of."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,10 +20,13 @@ from pipelines.model import Model, model_from_parameters
 
 
 def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
-    """Return a fit as the model of a kind of run; what each run has for itself is as in the first one fitted."""
+    """Return a fit as the model of a kind of run; what each run has for itself is as in the first
+    one fitted."""
     # Nobody asks how sure the values are.
     size = len(made.values)
-    frame, _ = parameter_rows.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size)))
+    frame, _ = parameter_rows.parameters(
+        made, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size))
+    )
     return model_from_parameters(frame, kind, baseline.machine)
 
 
@@ -38,10 +42,11 @@ def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
 def values_of_each_run(
     made: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells.
+    """Return what each run has for itself of the causes that have such values, by label, as
+    ``verdict.json`` tells.
 
-    Those of the runs that were trained on are the fit's own, with its intervals; the others were learnt from their
-    runs, all else held, and have none.
+    Those of the runs that were trained on are the fit's own, with its intervals; the others were
+    learnt from their runs, all else held, and have none.
     """
     told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
     for number, cause in enumerate(made.causes):
@@ -52,14 +57,18 @@ def values_of_each_run(
     for run in validate if told else ():
         for term in settled(made, run, baseline):
             if term.effect.label in told and term.effect.explains(run.motion):
-                told[term.effect.label].append(_told(term.effect, run, term.effect.physical(term.values)))
+                told[term.effect.label].append(
+                    _told(term.effect, run, term.effect.physical(term.values))
+                )
     return told
 
 
 def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None) -> dict[str, Any]:
-    """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a verdict tells it.
+    """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a
+    verdict tells it.
 
-    An instant outside the run is none: what never came has no value, and what was there all along came at its begin.
+    An instant outside the run is none: what never came has no value, and what was there all along
+    came at its begin.
     """
     own = {p.name: i for i, p in enumerate(effect.parameters) if p.per_run}
     came, values = values < NEVER, np.where(values <= ALWAYS, 0.0, values)
@@ -67,5 +76,8 @@ def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None
         "file": run.motion.file,
         "purpose": run.motion.purpose,
         "values": {name: float(values[i]) if came[i] else None for name, i in own.items()},
-        "ci95": {name: ends[i].tolist() if ends is not None and came[i] else None for name, i in own.items()},
+        "ci95": {
+            name: ends[i].tolist() if ends is not None and came[i] else None
+            for name, i in own.items()
+        },
     }

@@ -1,7 +1,8 @@
 """What a model leaves of the validation runs, which no fit has seen.
 
-Shared parameters come from training. What is tied to wall time, an onset or a phase, or set anew at each start, each
-validation run fits for itself: on one half of its seconds to be scored on the other, and the other way round.
+Shared parameters come from training. What is tied to wall time, an onset or a phase, or set anew at
+each start, each validation run fits for itself: on one half of its seconds to be scored on the
+other, and the other way round.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,8 @@ STRETCH_S = 1.0
 ROUNDS = 2
 """How often onsets are sought and all else fitted anew, for each is found with the others held."""
 NEWTON_STEPS = 3
-"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
+"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear
+in."""
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
@@ -67,8 +69,11 @@ Learnt = tuple[NDArray, NDArray, list[Term]]
 
 
 def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
-    """Fit the run's own onsets, phases and bends to those samples that are to be learnt from, (m, O)."""
-    begins = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None]
+    """Fit the run's own onsets, phases and bends to those samples that are to be learnt from, (m,
+    O)."""
+    begins = [
+        (number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None
+    ]
     terms = [_shared_term(cause) for cause in fit.causes]
     for place in begins:
         terms = _with_shape(terms, *place, NEVER)
@@ -76,50 +81,71 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     for _ in range(ROUNDS if begins else 0):
         for place in begins:
             instant = _begun(fit, made, place, run, baseline, learnt)
-            made = _learn_amplitudes(fit, _with_shape(made[2], *place, instant), run, baseline, learnt)
+            made = _learn_amplitudes(
+                fit, _with_shape(made[2], *place, instant), run, baseline, learnt
+            )
     return made
 
 
-def _begun(fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray) -> float:
+def _begun(
+    fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray
+) -> float:
     """Return the instant (s) at which a cause begins, all else held."""
     values, _, terms = made
-    ends = [columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)]
+    ends = [
+        columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)
+    ]
     without, throughout = (measured - columns @ values for columns, measured in ends)
     return Onset.of(run, without, throughout, learnt, fit.weights).likeliest
 
 
-def _learn_amplitudes(fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
+def _learn_amplitudes(
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray
+) -> Learnt:
     """Fit the run's own amplitudes and bends to samples (m, O)."""
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
-    bent, (columns, measured) = _bent(fit, terms, run, baseline, columns_under(terms, run, baseline), learnt)
+    bent, (columns, measured) = _bent(
+        fit, terms, run, baseline, columns_under(terms, run, baseline), learnt
+    )
     values = shared.copy()
     values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
     return values, measured - columns @ values, bent
 
 
 def _bent(
-    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, plain: tuple[NDArray, NDArray], learnt: NDArray
+    fit: Fit,
+    terms: list[Term],
+    run: Run,
+    baseline: Baseline,
+    plain: tuple[NDArray, NDArray],
+    learnt: NDArray,
 ) -> tuple[list[Term], tuple[NDArray, NDArray]]:
-    """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and columns under them.
+    """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and
+    columns under them.
 
     By Gauss and Newton's steps; ``plain`` are the columns and torques under the terms as given.
     """
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
-    places = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
+    places = [
+        (number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None
+    ]
     for _ in range(NEWTON_STEPS if places else 0):
         columns, measured = plain
         slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
         wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
         steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
         for (number, i), step in zip(places, steps, strict=True):
-            value = float(np.clip(terms[number].shape[i] + step, *reach(fit.causes[number].effect.shape[i])))
+            value = float(
+                np.clip(terms[number].shape[i] + step, *reach(fit.causes[number].effect.shape[i]))
+            )
             terms = _with_shape(terms, number, i, value)
         plain = columns_under(terms, run, baseline)
     return terms, plain
 
 
 def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
-    """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O) where it is learnt."""
+    """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O)
+    where it is learnt."""
     root = np.sqrt(weights) * learnt
     A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
     return np.asarray(np.linalg.lstsq(A, (left * root).ravel(), rcond=1e-9)[0])
@@ -132,7 +158,9 @@ def _slope(
     """Return the column (m, O, 1) of a shape of one term, as ``fit.slope`` does of all runs."""
     number, i = place
     step = step_of(fit.causes[number], i)
-    ahead, read = columns_under(_with_shape(terms, number, i, terms[number].shape[i] + step), run, baseline)
+    ahead, read = columns_under(
+        _with_shape(terms, number, i, terms[number].shape[i] + step), run, baseline
+    )
     columns, measured = plain
     return (((ahead @ values - read) - (columns @ values - measured)) / step)[:, :, np.newaxis]
 

@@ -35,7 +35,8 @@ class Fit:
     layout: ParameterLayout
     """Of the values: the baseline's terms, then the causes."""
     loads: NDArray | None = None
-    """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
+    """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those
+    the runs came with."""
 
     def instead(self, number: int, cause: Candidate) -> list[Candidate]:
         """Return the causes with another in the place of one."""
@@ -47,9 +48,14 @@ class Fit:
 
 
 def fit(
-    causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray, loads: NDArray | None = None
+    causes: Sequence[Candidate],
+    runs: Sequence[Run],
+    baseline: Baseline,
+    weights: NDArray,
+    loads: NDArray | None = None,
 ) -> Fit:
-    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that ``Fit.loads`` tells of.
+    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that
+    ``Fit.loads`` tells of.
 
     ``weights`` (O,) are the outputs' inverse variances.
     """
@@ -62,7 +68,9 @@ def fit(
 
 def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
     """Return runs with the loads that a fit is for."""
-    return list(runs) if made.loads is None else [with_load(run, baseline, made.loads) for run in runs]
+    return (
+        list(runs) if made.loads is None else [with_load(run, baseline, made.loads) for run in runs]
+    )
 
 
 def residuals_on(made: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
@@ -75,7 +83,9 @@ def _last_sensors(cause: Candidate) -> bool:
     return cause.effect.side is Side.SENSOR
 
 
-def _layout(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline) -> ParameterLayout:
+def _layout(
+    causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
+) -> ParameterLayout:
     """Return the layout of the columns of baseline and causes in runs."""
     effects = (*baseline.effects, *(cause.effect for cause in causes))
     return ParameterLayout.of(effects, [run.motion.run for run in runs])
@@ -84,7 +94,8 @@ def _layout(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 def stacked_columns(
     causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 ) -> list[tuple[NDArray, NDArray]]:
-    """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in places of their own."""
+    """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in
+    places of their own."""
     layout = _layout(causes, runs, baseline)
     made = (columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs))
     return [(layout.expand(columns, r), measured) for r, (columns, measured) in enumerate(made)]
@@ -99,11 +110,17 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
     return weights, rms, float(np.sum(count[there] * np.log(rms[there])))
 
 
-def onsets_of(made: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline) -> list[Onset]:
-    """Return for each run when a cause may begin in it by its shape parameter ``i``, all else as it was fitted."""
+def onsets_of(
+    made: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline
+) -> list[Onset]:
+    """Return for each run when a cause may begin in it by its shape parameter ``i``, all else as it
+    was fitted."""
     ends = [made.instead(number, made.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)]
     without, throughout = (
-        [measured - columns @ made.values for columns, measured in stacked_columns(causes, runs, baseline)]
+        [
+            measured - columns @ made.values
+            for columns, measured in stacked_columns(causes, runs, baseline)
+        ]
         for causes in ends
     )
     return [
@@ -118,17 +135,22 @@ def slope(
 ) -> list[NDArray]:  # fmt: skip
     """Return what a shape does to the prediction, per unit of it, (m, O) of each run.
 
-    ``place`` is (cause, shape parameter, run), run -1 for all; ``plain`` are the fit's own columns and torques.
+    ``place`` is (cause, shape parameter, run), run -1 for all; ``plain`` are the fit's own columns
+    and torques.
     """
     number, i, run = place
     cause = made.causes[number]
     step = step_of(cause, i, max(run, 0))
     moved = cause.moved(i, step, None if run < 0 else [run])
     ahead = stacked_columns(made.instead(number, moved), runs, baseline)
-    return [((c @ made.values - y) - (d @ made.values - z)) / step for (c, y), (d, z) in zip(ahead, plain, strict=True)]
+    return [
+        ((c @ made.values - y) - (d @ made.values - z)) / step
+        for (c, y), (d, z) in zip(ahead, plain, strict=True)
+    ]
 
 
 def step_of(cause: Candidate, i: int, run: int = 0) -> float:
-    """Return the step of a difference along a shape parameter, as large as in one run its value asks for."""
+    """Return the step of a difference along a shape parameter, as large as in one run its value
+    asks for."""
     low, high = cause.effect.shape[i].typical
     return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)

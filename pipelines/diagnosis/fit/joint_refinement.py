@@ -42,9 +42,9 @@ class Refinement:
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit with every shape at its best.
 
-        A load that swings is simulated with the rigid bodies that the fit itself finds. Where these come to no rest,
-        and the cause would do harm, it is simulated with those that the library had: the fit may then predict other
-        runs badly.
+        A load that swings is simulated with the rigid bodies that the fit itself finds. Where these
+        come to no rest, and the cause would do harm, it is simulated with those that the library
+        had: the fit may then predict other runs badly.
         """
         start = self._start(causes)
         still = [cause for cause in causes if not cause.effect.swings]
@@ -77,7 +77,8 @@ class Refinement:
         return min(made, key=lambda one: one.cost)
 
     def _start(self, causes: Sequence[Candidate]) -> Fit:
-        """Return the fit of the shapes as they are, with the rigid bodies with which the library simulated them."""
+        """Return the fit of the shapes as they are, with the rigid bodies with which the library
+        simulated them."""
         bodies = next((cause.bodies for cause in causes if cause.bodies), None)
         if bodies is None:
             return self._fit(causes, self._runs, None)
@@ -85,7 +86,8 @@ class Refinement:
         return self._fit(causes, self._laden(loads), loads)
 
     def _loads_after(self, best: Fit) -> NDArray:
-        """Return the baseline values (size,) whose rigid bodies make the loads of the round after a fit."""
+        """Return the baseline values (size,) whose rigid bodies make the loads of the round after a
+        fit."""
         size = self._baseline.size
         return relaxed(best.values[:size], None if best.loads is None else best.loads[:size])
 
@@ -111,10 +113,11 @@ class Refinement:
         return best
 
     def _forms(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the best fit of all that change the form of one cause, shapes refined at each form.
+        """Return the best fit of all that change the form of one cause, shapes refined at each
+        form.
 
-        The library chose forms at the rate of the decision band, and a transmission's is always straight:
-        with the other causes, and in shorter blocks, another form may be the best.
+        The library chose forms at the rate of the decision band, and a transmission's is always
+        straight: with the other causes, and in shorter blocks, another form may be the best.
         """
         tried = [best]
         for number, cause in enumerate(best.causes):
@@ -134,7 +137,10 @@ class Refinement:
                 continue
             found = onsets_of(best, number, i, runs, self._baseline)
             acting = best.columns_of(number).runs
-            instants = [found[r].likeliest if r in acting else shape[i] for r, shape in enumerate(cause.shapes)]
+            instants = [
+                found[r].likeliest if r in acting else shape[i]
+                for r, shape in enumerate(cause.shapes)
+            ]
             causes = best.instead(number, cause.with_own(i, instants))
             best = min((best, self._fit(causes, runs, best.loads)), key=lambda made: made.cost)
         return best

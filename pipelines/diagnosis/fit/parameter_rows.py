@@ -1,4 +1,5 @@
-"""The tables a diagnosis writes: parameters of the extended model, residuals before and after, candidates."""
+"""The tables a diagnosis writes: parameters of the extended model, residuals before and after,
+candidates."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -51,14 +52,19 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
 
 
 def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:
-    """Return the ends of the interval of the instant at which a cause begins in a run, by its place among the cause's
-    parameters; nothing where it has none."""
+    """Return the ends of the interval of the instant at which a cause begins in a run, by its place
+    among the cause's parameters; nothing where it has none."""
     linear = len(fit.causes[number].effect.linear)
-    return {linear + i: ends for (which, i, r), ends in sure.onsets.items() if (which, r) == (number, run)}
+    return {
+        linear + i: ends
+        for (which, i, r), ends in sure.onsets.items()
+        if (which, r) == (number, run)
+    }
 
 
 def _bodies(baseline: Baseline) -> dict[str, NDArray]:
-    """Return the columns of the rigid bodies, (bodies, parameters), whose sum each row of a body tells of."""
+    """Return the columns of the rigid bodies, (bodies, parameters), whose sum each row of a body
+    tells of."""
     layout = baseline.layout
     if len(layout.bodies) == 1:
         return {baseline.kinds[0]: layout.bodies_in(baseline.kinds[0])}
@@ -67,7 +73,8 @@ def _bodies(baseline: Baseline) -> dict[str, NDArray]:
 
 
 def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's fitted values in a run that it was fitted to and acts in, (p,), and their slopes.
+    """Return a cause's fitted values in a run that it was fitted to and acts in, (p,), and their
+    slopes.
 
     The slopes, (p, size), are how they change with what the covariance is of.
     """
@@ -83,7 +90,8 @@ def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray
 
 
 def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their intervals, (p, 2)."""
+    """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their
+    intervals, (p, 2)."""
     effect = fit.causes[number].effect
     fitted, fitted_slopes = _in_run(fit, sure, number, run)
     values, slopes = effect.physical(fitted), effect.jacobian(fitted) @ fitted_slopes

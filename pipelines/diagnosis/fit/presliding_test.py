@@ -1,9 +1,11 @@
-"""What the verdict leaves out: whether friction turns round at once where a joint does, or builds up over a travel.
+"""What the verdict leaves out: whether friction turns round at once where a joint does, or builds
+up over a travel.
 
-A faultless joint with dry friction may stand at a reversal while the torque swings; one whose friction is elastic gives
-way all along. The torque of the two is alike, their angles are not: of the first nothing moves while friction changes
-sides, of the second the encoder tells the travel over which it does. So the model's own Coulomb friction is put on
-its other side at once, late, over a range of speeds and over a travel, and each is held against the torque there.
+A faultless joint with dry friction may stand at a reversal while the torque swings; one whose
+friction is elastic gives way all along. The torque of the two is alike, their angles are not: of
+the first nothing moves while friction changes sides, of the second the encoder tells the travel
+over which it does. So the model's own Coulomb friction is put on its other side at once, late, over
+a range of speeds and over a travel, and each is held against the torque there.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,24 +31,27 @@ from pipelines.signals.blocks import dilate
 NEAR_S = 0.12
 """About a reversal: as long as a low-pass of ``CUTOFF_HZ`` feels what happens there."""
 SHORTEST, LONGEST = 2e-5, 0.01
-"""rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more shows away from
-reversals too."""
+"""rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more
+shows away from reversals too."""
 TRAVELS = 16
 """Number of travels tried between ``SHORTEST`` and ``LONGEST``."""
 SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
 """rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
 LATE_S = (0.02, 0.04, 0.06)
-"""After the reversal, as far as ``time_delay`` goes: friction does so where a torque is read late, and nobody knows."""
+"""After the reversal, as far as ``time_delay`` goes: friction does so where a torque is read late,
+and nobody knows."""
 ROUNDING = 1e-9
 """Share of the largest angle below which a step between two readings is rounding."""
 TAKEN = 0.2
-"""Share of the error's power about reversals that a travel must take beyond what speed or a delay takes."""
+"""Share of the error's power about reversals that a travel must take beyond what speed or a delay
+takes."""
 NEEDED = 6.0
 """Log likelihood that a travel must gain over the best way without one."""
 COUNTS = 2
 """Of the encoder: over a shorter travel friction changes sides between two readings."""
 GIVES = (PreslidingHysteresis, Backlash, JointElasticity)
-"""Causes by which friction changes sides over a travel of the angle as it is read; where one is named, that is told."""
+"""Causes by which friction changes sides over a travel of the angle as it is read; where one is
+named, that is told."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,8 @@ class BuildUp:
     at_once: float
     otherwise: float
     over_travel: float
-    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what friction leaves that changes sides at
-    once, in the best way that is no travel, and over it."""
+    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what friction leaves
+    that changes sides at once, in the best way that is no travel, and over it."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +92,21 @@ class _About:
 
     @classmethod
     def of(cls, motion: Motion, model: Model, baseline: Baseline, j: int) -> "_About | None":
-        """Return None where the angle as read is not known, nor the motion at 5 Hz, or the joint never turns round."""
+        """Return None where the angle as read is not known, nor the motion at 5 Hz, or the joint
+        never turns round."""
         label = Friction(baseline.joints[j], on=baseline.machine).label
-        coulomb = [(effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters]
+        coulomb = [
+            (effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters
+        ]
         level, near = float(model.linear_values[coulomb].sum()), _near(motion, j)
-        # A motion that was filtered as low as the torque is here lacks some of what its torque holds.
-        if motion.measured_angle is None or motion.cutoff_hz <= CUTOFF_HZ or level <= 0.0 or not near.any():
+        # A motion that was filtered as low as the torque is here lacks some of what its torque
+        # holds.
+        if (
+            motion.measured_angle is None
+            or motion.cutoff_hz <= CUTOFF_HZ
+            or level <= 0.0
+            or not near.any()
+        ):
             return None
         read, speed = np.ascontiguousarray(motion.measured_angle[:, j]), motion.dq[:, j]
         told = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(motion)
@@ -108,7 +122,8 @@ class _About:
 
 
 def _near(motion: Motion, j: int) -> NDArray:
-    """Tell which samples are about a joint's reversals and can be trusted below the cut-off, (n,) bool."""
+    """Tell which samples are about a joint's reversals and can be trusted below the cut-off, (n,)
+    bool."""
     about = dilate(turns(motion)[:, j], round(NEAR_S * motion.sample_rate_hz))
     return np.asarray(about & motion.valid & ~unsure(motion, CUTOFF_HZ))
 
@@ -117,11 +132,17 @@ Side = Callable[[_About], NDArray]
 """The side on which friction is along a run, (n,) from -1 to 1."""
 
 
-def built_up(made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]) -> list[BuildUp]:
-    """Return the joints whose friction builds up; the travel is told by the runs to train on, and the others judge."""
+def built_up(
+    made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
+) -> list[BuildUp]:
+    """Return the joints whose friction builds up; the travel is told by the runs to train on, and
+    the others judge."""
     known = {cause.label for cause in made.causes}
     # Once: what a run has for itself is learnt for that.
-    runs = [[(run.motion, model_of_run(made, baseline, run)) for run in some] for some in (train, validate)]
+    runs = [
+        [(run.motion, model_of_run(made, baseline, run)) for run in some]
+        for some in (train, validate)
+    ]
     found = []
     for j, joint in enumerate(baseline.joints):
         if known & {gives(joint, on=baseline.machine).label for gives in GIVES}:
@@ -135,7 +156,9 @@ def built_up(made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequ
     return found
 
 
-def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Baseline, j: int) -> BuildUp | None:
+def _of_joint(
+    train: Sequence[_About], validate: Sequence[_About], baseline: Baseline, j: int
+) -> BuildUp | None:
     joint = baseline.joints[j]
     scale = baseline.machine.scale(joint)
     count = max(_count(about.read) for about in (*train, *validate))
@@ -146,7 +169,8 @@ def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Bas
     over = [_side_over(0.5 * count, travel) for travel in travels]
     best, trained = _best(train, over)
     if best in (0, TRAVELS - 1):
-        return None  # at once, as far as the encoder tells, or over more than what is about a reversal
+        # At once, as far as the encoder tells, or over more than what is about a reversal.
+        return None
     by_speed = [_side_by_speed(speed * scale.speed) for speed in SPEEDS]
     # At once by the angle as it was read, too: what that alone gains is not the travel's.
     as_read = _side_over(0.5 * count, SHORTEST * scale.travel)
@@ -157,7 +181,11 @@ def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Bas
     ratios = trained / beaten, left / otherwise
     if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
         return None
-    return BuildUp(joint, float(travels[best]), *np.sqrt([_power(validate, _side_at_once), otherwise, left]).tolist())
+    return BuildUp(
+        joint,
+        float(travels[best]),
+        *np.sqrt([_power(validate, _side_at_once), otherwise, left]).tolist(),
+    )
 
 
 def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:
@@ -179,7 +207,9 @@ def _side_by_speed(speed: float) -> Side:
 
 
 def _side_late(delay: float) -> Side:
-    return lambda about: np.interp(about.motion.time - delay, about.motion.time, np.sign(about.speed))
+    return lambda about: np.interp(
+        about.motion.time - delay, about.motion.time, np.sign(about.speed)
+    )
 
 
 def _side_over(grain: float, travel: float) -> Side:
@@ -195,9 +225,11 @@ def _count(angle: NDArray) -> float:
 
 @njit(cache=True)
 def dahl(angle: NDArray, grain: float, travel: float) -> NDArray:
-    """Return Dahl's friction along an angle (n,), from -1 to 1: it goes with the travel, whatever the time it takes.
+    """Return Dahl's friction along an angle (n,), from -1 to 1: it goes with the travel, whatever
+    the time it takes.
 
-    An encoder that flickers by less than ``grain`` has not moved. Dahl (1976), AIAA Journal 14(12), eq. 4, exponent 1.
+    An encoder that flickers by less than ``grain`` has not moved. Dahl (1976), AIAA Journal 14(12),
+    eq. 4, exponent 1.
     """
     out = np.zeros(len(angle))
     at, z = angle[0], 0.0

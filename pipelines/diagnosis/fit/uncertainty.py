@@ -1,4 +1,5 @@
-"""Intervals of an extended model's parameters, shapes included, that survive autocorrelation and small misfit."""
+"""Intervals of an extended model's parameters, shapes included, that survive autocorrelation and
+small misfit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,12 +28,14 @@ class Uncertainty:
     covariance: NDArray
     critical: float
     shapes: tuple[tuple[int, int, int], ...]
-    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared. First
-    those that are fitted, then those that were chosen among forms."""
+    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where
+    shared. First those that are fitted, then those that were chosen among forms."""
     normal: NDArray
-    """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
+    """Weighted normal matrix of the same parameters in the same order: what collinearity is read
+    from."""
     onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
-    """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval, s."""
+    """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval,
+    s."""
 
     def includes_zero(self, values: NDArray, amplitudes: slice) -> bool:
         """Tell whether the joint 95 % region of some amplitudes includes zero (Wald's test).
@@ -56,15 +59,19 @@ class Uncertainty:
         return len(size) > 0 and statistic <= inflation * float(chi2.ppf(0.95, len(size)))
 
 
-def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
-    """Linearise about a fit: its columns, and what a step in each free shape does to the prediction.
+def uncertainty(
+    fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray
+) -> Uncertainty:
+    """Linearise about a fit: its columns, and what a step in each free shape does to the
+    prediction.
 
-    Two errors add: noise, and model error, which is what is left of slow error, at the least what no model of a good
-    rig gets right, ``imperfect`` (O,) N·m rms. Model error is small, but it is correlated over half a second and
-    repeats in every period, so more data do not average it out. Shapes that are not fitted but taken at a usual value
-    may be anywhere in their typical range. Of a shape that was chosen among a few forms, as an exponent, what is
-    between them is as likely: data and typical range tell how far from the form it may be. When something begins is
-    known so much better than how large it is that neither makes the other less sure.
+    Two errors add: noise, and model error, which is what is left of slow error, at the least what
+    no model of a good rig gets right, ``imperfect`` (O,) N·m rms. Model error is small, but it is
+    correlated over half a second and repeats in every period, so more data do not average it out.
+    Shapes that are not fitted but taken at a usual value may be anywhere in their typical range. Of
+    a shape that was chosen among a few forms, as an exponent, what is between them is as likely:
+    data and typical range tell how far from the form it may be. When something begins is known so
+    much better than how large it is that neither makes the other less sure.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
@@ -73,11 +80,18 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     forms = _forms(fit.causes)
     places = [*_shapes(fit.causes, len(runs), fitted=True), *forms]
     slopes = [slope(fit, place, runs, baseline, plain) for place in places]
-    wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
+    wide = [
+        np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2)
+        for r, c in enumerate(columns)
+    ]
     weights = fit.weights
-    gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
+    gram = sum(
+        np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a)
+        for run, a in zip(runs, wide, strict=True)
+    )
     scores = [
-        np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
+        np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a)
+        for run, e, a in zip(runs, left, wide, strict=True)
     ]
     filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
@@ -111,7 +125,8 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
 
 
 def _correlated_blocks(run: Run) -> float:
-    """Return the number of blocks with the same model error: neighbours within ``ALIKE_S``, once a period."""
+    """Return the number of blocks with the same model error: neighbours within ``ALIKE_S``, once a
+    period."""
     seconds = len(run.time) / run.blocks_in(1.0)
     return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or RECURRENCE_S), 1.0)
 
@@ -119,17 +134,22 @@ def _correlated_blocks(run: Run) -> float:
 def _onsets(
     fit: Fit, runs: Sequence[Run], baseline: Baseline, misfit: NDArray
 ) -> dict[tuple[int, int, int], tuple[float, float]]:
-    """Return the ends of the interval of each instant at which a cause begins, by (cause, shape parameter, run)."""
+    """Return the ends of the interval of each instant at which a cause begins, by (cause, shape
+    parameter, run)."""
     ends: dict[tuple[int, int, int], tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
         if (i := cause.onset) is not None:
             onsets = onsets_of(fit, number, i, runs, baseline)
-            ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.columns_of(number).runs}
+            ends |= {
+                (number, i, r): onsets[r].interval(runs[r], misfit)
+                for r in fit.columns_of(number).runs
+            }
     return ends
 
 
 def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
-    """Return shapes that were chosen among forms and could lie between them: (cause, shape parameter, -1).
+    """Return shapes that were chosen among forms and could lie between them: (cause, shape
+    parameter, -1).
 
     Where no value is negative, zero stands for a form without the parameter.
     """
@@ -143,7 +163,8 @@ def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
-    """Return shapes but onsets that are fitted, or not: (cause, shape parameter, run), run -1 where all share it."""
+    """Return shapes but onsets that are fitted, or not: (cause, shape parameter, run), run -1 where
+    all share it."""
     return [
         (number, i, run)
         for number, cause in enumerate(causes)

@@ -52,7 +52,8 @@ class Validated:
 def without_each(
     made: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
-    """Return the model without each of its causes, the others kept and fitted anew under the same loads, by label.
+    """Return the model without each of its causes, the others kept and fitted anew under the same
+    loads, by label.
 
     Parameters
     ----------
@@ -62,7 +63,9 @@ def without_each(
     found, runs = {}, laden(train, made, baseline)
     for label in dict.fromkeys(cause.label for cause in made.causes):
         rest = [cause for cause in made.causes if cause.label != label]
-        found[label] = Validated.of(fit(rest, runs, baseline, weights, made.loads), validate, baseline)
+        found[label] = Validated.of(
+            fit(rest, runs, baseline, weights, made.loads), validate, baseline
+        )
     return found
 
 
@@ -82,10 +85,13 @@ def removed_share(less: Validated, whole: Validated) -> float | None:
     Returns
     -------
     float or None
-        At the joint where the cause gains most; None where the model without it is at the noise floor.
+        At the joint where the cause gains most; None where the model without it is at the noise
+        floor.
     """
     joint = int(np.argmax(less.errors.rms - whole.errors.rms))
-    floor, without, with_it = (float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms))
+    floor, without, with_it = (
+        float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms)
+    )
     power = without**2 - floor**2
     return float(np.clip((without**2 - with_it**2) / power, 0.0, 1.0)) if power > 0.0 else None
 

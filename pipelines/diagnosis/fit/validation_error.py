@@ -1,7 +1,8 @@
 """What naming causes gains on validation runs, with an interval from whole periods.
 
-A cause's gain, wherever a user reads of one, is what the error grows by where that cause alone is left out and all
-else is fitted anew. What a set of causes takes together is of the error of rigid body and friction.
+A cause's gain, wherever a user reads of one, is what the error grows by where that cause alone is
+left out and all else is fitted anew. What a set of causes takes together is of the error of rigid
+body and friction.
 """
 
 from collections.abc import Sequence
@@ -55,7 +56,9 @@ def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
         counts.append(np.bincount(number[chosen], minlength=number.max() + 1))
         everywhere = everywhere + np.sum(residual[run.valid, :J] ** 2, axis=0)
         valid += int(run.valid.sum())
-    return Errors(np.concatenate(squares), np.concatenate(counts), np.sqrt(everywhere / max(valid, 1)))
+    return Errors(
+        np.concatenate(squares), np.concatenate(counts), np.sqrt(everywhere / max(valid, 1))
+    )
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,8 @@ class Gain:
 
 
 def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0) -> Gain:
-    """Return the gain at a joint (the one that gains most by default), its interval by resampling blocks."""
+    """Return the gain at a joint (the one that gains most by default), its interval by resampling
+    blocks."""
     if joint is None:
         joint = int(np.argmax(before.rms - after.rms))
     rng = np.random.default_rng(seed)

@@ -57,17 +57,28 @@ class Answer:
 def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> Answer:
     """Name the likely causes of the median probability set, each with its ties.
 
-    ``together`` are groups of labels that were named as ties before: one of such a group is named where the group is
-    likely, though none of it may be as probable as nothing.
+    ``together`` are groups of labels that were named as ties before: one of such a group is named
+    where the group is likely, though none of it may be as probable as nothing.
     """
     best = _best(posterior)
     found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
     for group in together:
-        if posterior.any_of(group) >= CRITERIA.likely and not any(group & one.members for one in found):
-            members = ((chosen, i) for chosen in posterior.sets for i in chosen if posterior.elements[i].label in group)
+        if posterior.any_of(group) >= CRITERIA.likely and not any(
+            group & one.members for one in found
+        ):
+            members = (
+                (chosen, i)
+                for chosen in posterior.sets
+                for i in chosen
+                if posterior.elements[i].label in group
+            )
             found.append(_named(posterior, *next(members)))
     named = [one for one in found if one.probability >= CRITERIA.likely]
-    return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, _unlisted(posterior))
+    return Answer(
+        tuple(sorted(named, key=lambda one: -one.probability)),
+        posterior.nothing,
+        _unlisted(posterior),
+    )
 
 
 def _unlisted(posterior: Posterior) -> float:
@@ -76,10 +87,11 @@ def _unlisted(posterior: Posterior) -> float:
 
 
 def _best(posterior: Posterior) -> Set:
-    """Return the most probable shapes of the most probable set of labels that has all that are likely.
+    """Return the most probable shapes of the most probable set of labels that has all that are
+    likely.
 
-    What most sets have in common may be likely where the most probable single set lacks it (Barbieri and Berger,
-    2004, Annals of Statistics 32(3): the median probability model).
+    What most sets have in common may be likely where the most probable single set lacks it
+    (Barbieri and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
     has_all = [labels for labels in posterior.by_labels if likely <= labels]
@@ -87,10 +99,14 @@ def _best(posterior: Posterior) -> Set:
     return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
 
 
-def in_place(posterior: Posterior, label: str, others: frozenset[str]) -> tuple[float, dict[str, float]]:
-    """Return how probable a cause is beside others, and each other listed cause in its place, the most probable first.
+def in_place(
+    posterior: Posterior, label: str, others: frozenset[str]
+) -> tuple[float, dict[str, float]]:
+    """Return how probable a cause is beside others, and each other listed cause in its place, the
+    most probable first.
 
-    Each set with the cause is compared with the sets that have another listed cause instead, all else alike.
+    Each set with the cause is compared with the sets that have another listed cause instead, all
+    else alike.
     """
     listed = {e.label for e in posterior.elements if not e.is_law}
     own, rivals = 0.0, dict.fromkeys(sorted(listed - others - {label}), 0.0)
@@ -109,4 +125,6 @@ def _named(posterior: Posterior, best: Set, i: int) -> Named:
     own, rivals = in_place(posterior, element.label, rest)
     ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied * own]
     members = frozenset((element.label, *(label for label, _ in ties)))
-    return Named(element, posterior.any_of(members), posterior.marginals[element.label], tuple(ties))
+    return Named(
+        element, posterior.any_of(members), posterior.marginals[element.label], tuple(ties)
+    )

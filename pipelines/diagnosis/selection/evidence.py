@@ -56,7 +56,8 @@ class Element:
     each_run: bool = False
     """Whether its value is another in every run."""
     sized_each_run: bool = False
-    """Of a cause: whether each run has a size of it for itself, so that one run says nothing of another's."""
+    """Of a cause: whether each run has a size of it for itself, so that one run says nothing of
+    another's."""
     worn: bool = False
     """Whether the person carries it."""
     wearer: str = "all"
@@ -96,8 +97,11 @@ class Nonnegative:
         """Read them off a library, whose columns stand at places among ``count``."""
         regression, chosen = library.regression, library.prepared.baseline.nonnegative
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-        imitation = np.zeros((len(values), count))  # an unlisted law may hold friction itself: it imitates none
-        for cause, columns, derivatives in zip(library.causes, at.causes, at.derivatives, strict=True):
+        # An unlisted law may hold friction itself: it imitates none.
+        imitation = np.zeros((len(values), count))
+        for cause, columns, derivatives in zip(
+            library.causes, at.causes, at.derivatives, strict=True
+        ):
             imitation[:, [*columns, *derivatives]] = cause.imitation
         return cls(values[chosen], regression.baseline_variance[chosen], imitation[chosen])
 
@@ -112,11 +116,13 @@ class Evidence:
     """(O, n) of the columns with the measured torque."""
     elements: tuple[Element, ...]
     background: tuple[tuple[int, float, float], ...]
-    """What a good rig has: column, its variance relative to other causes' (zero for slow noise), and that of noise."""
+    """What a good rig has: column, its variance relative to other causes' (zero for slow noise),
+    and that of noise."""
     auxiliary: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
-    """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
+    """(O,) what all columns together explain of each output's rows, squared and in units of the
+    noise."""
     nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
@@ -171,7 +177,8 @@ class Evidence:
 
 
 def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -> Iterator[float]:
-    """Yield what all columns together explain of each output's rows; curves of time are of drives."""
+    """Yield what all columns together explain of each output's rows; curves of time are of
+    drives."""
     variance = np.array([curve.noise for curve in library.curves])
     for output, (products, target) in enumerate(zip(gram, right, strict=True)):
         own = sum(curve.joint == output for curve in library.curves)
@@ -181,8 +188,9 @@ def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -
 def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, most: int) -> float:
     """Return what columns explain of one output's rows, squared and in units of the noise.
 
-    What they would explain of noise alone is subtracted. Slow noise has no form that could be wrong, but its variance
-    is an estimate: what it explains counts as far as one for each of its coefficients.
+    What they would explain of noise alone is subtracted. Slow noise has no form that could be
+    wrong, but its variance is an estimate: what it explains counts as far as one for each of its
+    coefficients.
 
     Parameters
     ----------
@@ -207,7 +215,8 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
 
 
 def _beyond_noise(gram: NDArray, right: NDArray, precision: NDArray, first: int) -> float:
-    """Return what columns from ``first`` on explain beside those before, less what they would explain of noise.
+    """Return what columns from ``first`` on explain beside those before, less what they would
+    explain of noise.
 
     ``precision`` (n,) is that of the prior of each column's coefficient.
     """
@@ -251,9 +260,16 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     names = library.prepared.baseline.joints
     laws = _laws_by_kind(library.laws, at.laws)
     for j in range(len(names)):
-        own = [(int(p), c.variance) for p, c in zip(at.curves, library.curves, strict=True) if c.joint == j]
+        own = [
+            (int(p), c.variance)
+            for p, c in zip(at.curves, library.curves, strict=True)
+            if c.joint == j
+        ]
         laws[TIME, j, "all"] = own
-    elements = [_of_cause(number, cause, at, library.prepared) for number, cause in enumerate(library.causes)]
+    elements = [
+        _of_cause(number, cause, at, library.prepared)
+        for number, cause in enumerate(library.causes)
+    ]
     elements += [
         Element(
             label=law_label(kind, None if j is None else names[j]),
@@ -272,11 +288,14 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         if wearer != "cuffs"
     ]
     effects = [cause.candidate.effect for cause in library.causes]
-    return _in_any_form(elements, {effect.label: effect.any_form for effect in effects if effect.any_form})
+    return _in_any_form(
+        elements, {effect.label: effect.any_form for effect in effects if effect.any_form}
+    )
 
 
 def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> list[Element]:
-    """Give laws that are a listed cause in any form that cause's label; ``any_form`` has laws by label."""
+    """Give laws that are a listed cause in any form that cause's label; ``any_form`` has laws by
+    label."""
     best = {e.label: e for e in elements if e.label in any_form and e.first and e.context < 0}
     of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
     return [
@@ -315,7 +334,11 @@ def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
 def _of_cause(number: int, cause: Cause, at: _Places, prepared: Prepared) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
-    tracked = isinstance(effect, Cogging) and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
+    tracked = (
+        isinstance(effect, Cogging)
+        and joint
+        and cause.candidate.shapes[0] == orders_of(joint, prepared)
+    )
     return Element(
         label=effect.label,
         name=effect.name,
@@ -345,7 +368,8 @@ def _positive(cause: Cause) -> list[int]:
     if cause.candidate.directions:
         return []
     if bends:
-        # A column is the effect at its shape: turned over, it would be a spring that pushes, a delay that comes early.
+        # A column is the effect at its shape: turned over, it would be a spring that pushes, a
+        # delay that comes early.
         free = [p for p in effect.shape if p.default is None]
         return [0] if all(p.typical[0] >= 0 and p.unit != "1" for p in free) else []
     if len(effect.linear) != len(cause.amplitudes):
@@ -361,7 +385,9 @@ def _background(library: Library, at: _Places):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from ((int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
+            yield from (
+                (int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True)
+            )
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

@@ -32,7 +32,8 @@ class Finding:
     probability: float
     """Of a cause with its ties, or of something in the deepest node besides what others tell."""
     causes: tuple[tuple[str, float], ...]
-    """Of level ``cause`` the named one and its ties; else the listed causes that come closest. With probabilities."""
+    """Of level ``cause`` the named one and its ties; else the listed causes that come closest. With
+    probabilities."""
     laws: tuple[tuple[str, float], ...]
     """Unlisted laws in the deepest node above a cause, with their probabilities."""
     path: tuple[tuple[str, Any, float], ...]
@@ -64,7 +65,9 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
         return []
     found = [_of_cause(posterior, named) for named in answer.named]
     named = {label for one in found for label, _ in one.causes}
-    rest = frozenset(i for i, element in enumerate(posterior.elements) if element.label not in named)
+    rest = frozenset(
+        i for i, element in enumerate(posterior.elements) if element.label not in named
+    )
     found += _remainder(posterior, rest)
     return sorted(found, key=lambda finding: -finding.probability)
 
@@ -106,7 +109,9 @@ def _distinct(nodes: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return list({tuple(node.items()): node for node in nodes}.values())
 
 
-def _likely(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> Iterator[tuple[Finding, Inside]]:
+def _likely(
+    posterior: Posterior, rest: Inside, node: Mapping[str, Any]
+) -> Iterator[tuple[Finding, Inside]]:
     """Yield the findings of a node that are likely, and the elements of each.
 
     Whether it repeats is left out where neither is likely.
@@ -123,7 +128,9 @@ def _likely(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> Iter
             return
 
 
-def _finding(posterior: Posterior, node: Mapping[str, Any], inside: Inside, probability: float) -> Finding:
+def _finding(
+    posterior: Posterior, node: Mapping[str, Any], inside: Inside, probability: float
+) -> Finding:
     """Return the finding that something of these elements, which lie within a node, is missing."""
     deepest = [level for level in LEVELS if level in node] or ["repeats"]
     return Finding(
@@ -148,12 +155,16 @@ def _path(posterior: Posterior, node: Mapping[str, Any]) -> tuple[tuple[str, Any
 def _within(posterior: Posterior, node: Mapping[str, Any]) -> Inside:
     """Return the elements that have a node's values."""
     pairs = enumerate(posterior.elements)
-    return frozenset(i for i, e in pairs if all(getattr(e, level) == value for level, value in node.items()))
+    return frozenset(
+        i for i, e in pairs if all(getattr(e, level) == value for level, value in node.items())
+    )
 
 
 def _ranked(posterior: Posterior, inside: Inside, *, are_laws: bool) -> Iterator[tuple[str, float]]:
     """Yield the labels of causes or of laws, the most probable first, with their probabilities."""
-    labels = {posterior.elements[i].label for i in inside if posterior.elements[i].is_law == are_laws}
+    labels = {
+        posterior.elements[i].label for i in inside if posterior.elements[i].is_law == are_laws
+    }
     return ((label, p) for label, p in posterior.marginals.items() if label in labels)
 
 

@@ -1,8 +1,9 @@
 """How probable it is that a named cause is an unlisted effect that only resembles it.
 
-No catalogue is complete. The posterior explains an effect that nobody listed by whichever listed cause resembles it
-most, and is as sure of it as of a true cause. The validation runs tell them apart: a true cause removes nearly all of
-the systematic error that the model leaves without it there, a mere resemblance a part.
+No catalogue is complete. The posterior explains an effect that nobody listed by whichever listed
+cause resembles it most, and is as sure of it as of a true cause. The validation runs tell them
+apart: a true cause removes nearly all of the systematic error that the model leaves without it
+there, a mere resemblance a part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,17 +23,20 @@ LEAST = 0.01
 
 
 def kept_share(
-    removed: ArrayLike, smooth_law_ratio: ArrayLike = 0.0, look_alike: ArrayLike = CRITERIA.look_alike
+    removed: ArrayLike,
+    smooth_law_ratio: ArrayLike = 0.0,
+    look_alike: ArrayLike = CRITERIA.look_alike,
 ) -> NDArray:
-    """Return the share of its probability that a named cause keeps, (...): that it is no look-alike.
+    """Return the share of its probability that a named cause keeps, (...): that it is no
+    look-alike.
 
     Parameters
     ----------
     removed : ArrayLike
         (...) share of the systematic error of the validation runs that it removes, 0 to 1.
     smooth_law_ratio : ArrayLike
-        (...) probability of smooth laws of its family and joint in its place, over its own. An unlisted effect has that
-        already.
+        (...) probability of smooth laws of its family and joint in its place, over its own. An
+        unlisted effect has that already.
     look_alike : ArrayLike
         (2,) the criterion.
     """
@@ -42,10 +46,12 @@ def kept_share(
 
 
 def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], float]) -> Posterior:
-    """Return the posterior in which each named cause may be an unlisted effect of its family and joint.
+    """Return the posterior in which each named cause may be an unlisted effect of its family and
+    joint.
 
-    Every set with the cause gives a share of its probability to the same set with an unlisted law in its place. What
-    smooth laws of that family and joint have in its place already is no part of that share.
+    Every set with the cause gives a share of its probability to the same set with an unlisted law
+    in its place. What smooth laws of that family and joint have in its place already is no part of
+    that share.
 
     Parameters
     ----------
@@ -56,7 +62,9 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
     """
     kept: dict[str, float] = {}
     for labels, share in removed.items():
-        kept |= dict.fromkeys(labels, float(kept_share(share, _smooth_law_ratio(posterior, labels))))
+        kept |= dict.fromkeys(
+            labels, float(kept_share(share, _smooth_law_ratio(posterior, labels)))
+        )
     elements = list(posterior.elements)
     law_of: dict[int, int] = {}
     for i, element in enumerate(posterior.elements):
@@ -65,7 +73,9 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
             elements.append(_unlisted(element))
     sets, log_odds = [], []
     for chosen, odds in zip(posterior.sets, posterior.log_odds, strict=True):
-        for other, weight in _split(chosen, law_of, [kept.get(elements[i].label, 1.0) for i in chosen]):
+        for other, weight in _split(
+            chosen, law_of, [kept.get(elements[i].label, 1.0) for i in chosen]
+        ):
             if weight > 0.0:
                 sets.append(other)
                 log_odds.append(odds + np.log(weight))
@@ -74,22 +84,28 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
 
 
 def _smooth_law_ratio(posterior: Posterior, labels: frozenset[str]) -> float:
-    """Return the probability of smooth laws in the place of tied causes, of their family and joint, over their own."""
+    """Return the probability of smooth laws in the place of tied causes, of their family and joint,
+    over their own."""
     places = {(e.family, e.joint) for e in posterior.elements if e.label in labels}
     laws = {e.label for e in posterior.elements if e.is_law and (e.family, e.joint) in places}
-    probability = sum(p for own, p in posterior.by_labels.items() if own & laws and not own & labels)
+    probability = sum(
+        p for own, p in posterior.by_labels.items() if own & laws and not own & labels
+    )
     return probability / posterior.any_of(labels)
 
 
 def _split(
     chosen: Sequence[int], law_of: Mapping[int, int], kept: Sequence[float]
 ) -> list[tuple[tuple[int, ...], float]]:
-    """Return the set with each choice of its causes replaced by unlisted laws, and its share of the probability."""
+    """Return the set with each choice of its causes replaced by unlisted laws, and its share of the
+    probability."""
     ways = [
         [(i, p), (law_of[i], 1.0 - p)] if i in law_of else [(i, 1.0)]
         for i, p in zip(chosen, kept, strict=True)
     ]  # fmt: skip
-    return [(tuple(i for i, _ in way), float(np.prod([p for _, p in way]))) for way in product(*ways)]
+    return [
+        (tuple(i for i, _ in way), float(np.prod([p for _, p in way]))) for way in product(*ways)
+    ]
 
 
 def _unlisted(cause: Element) -> Element:

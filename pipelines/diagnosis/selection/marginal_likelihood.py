@@ -2,8 +2,8 @@
 
 Given shapes everything is linear and Gaussian: y = sum over the set of (A a + D d) + F f + noise,
 with A the element's columns, D steps along its shapes and towards another form, and F the
-background of a good rig. So the marginal likelihood is a closed form in Gram matrices (Bishop, 2006,
-Pattern Recognition and Machine Learning, sec. 3.5):
+background of a good rig. So the marginal likelihood is a closed form in Gram matrices (Bishop,
+2006, Pattern Recognition and Machine Learning, sec. 3.5):
 
     log p = u' (I + S G S)^-1 u / 2 - log det (I + S G S) / 2,  u = S X'y,  S the prior's sd.
 """
@@ -53,7 +53,10 @@ class MarginalLikelihood:
 
     def _background(self) -> tuple[NDArray, NDArray]:
         told = self.evidence.background
-        sd = [np.sqrt(self.criteria.background_cause**2 * variance + noise) for _, variance, noise in told]
+        sd = [
+            np.sqrt(self.criteria.background_cause**2 * variance + noise)
+            for _, variance, noise in told
+        ]
         return np.array([place for place, _, _ in told], dtype=int), np.array(sd)
 
     def prior(self, chosen: Sequence[int]) -> float:
@@ -74,13 +77,22 @@ class MarginalLikelihood:
         elements = [self.evidence.elements[i] for i in chosen]
         amplitudes = np.array(self.criteria.amplitudes)
         try:
-            nearest = [amplitudes[np.argmin(np.abs(np.log(amplitudes / size)))] for size in self.sizes(chosen)]
+            nearest = [
+                amplitudes[np.argmin(np.abs(np.log(amplitudes / size)))]
+                for size in self.sizes(chosen)
+            ]
             columns = np.concatenate([self.parts[i] for i in chosen])
-            variance = np.concatenate([self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)])
+            variance = np.concatenate(
+                [self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)]
+            )
             value = self._log_evidence(columns, variance, elements)
         except np.linalg.LinAlgError:
             return -np.inf
-        return value - len(chosen) * float(np.log(len(amplitudes))) + float(self.apart[list(chosen)].sum())
+        return (
+            value
+            - len(chosen) * float(np.log(len(amplitudes)))
+            + float(self.apart[list(chosen)].sum())
+        )
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
         """Return the prior variances of an element's columns and derivatives."""
@@ -99,7 +111,9 @@ class MarginalLikelihood:
         own = [values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)]
         return np.maximum([_share(v) for v in own], LEAST_SIZE)
 
-    def _log_evidence(self, columns: NDArray, variance: NDArray, elements: Sequence[Element]) -> float:
+    def _log_evidence(
+        self, columns: NDArray, variance: NDArray, elements: Sequence[Element]
+    ) -> float:
         """Return the log Bayes factor of columns with prior variances, signs included."""
         sd = np.sqrt(variance)
         system = self.gram[np.ix_(columns, columns)] * np.outer(sd, sd)
@@ -116,9 +130,11 @@ class MarginalLikelihood:
         return value + self._log_nonnegative(columns, lower, u, sd)
 
     def _log_nonnegative(self, columns: NDArray, lower: NDArray, u: NDArray, sd: NDArray) -> float:
-        """Return what knowing that the baseline's friction and inertia are not negative adds to the log Bayes factor.
+        """Return what knowing that the baseline's friction and inertia are not negative adds to the
+        log Bayes factor.
 
-        Their prior is flat but for the sign. What causes take over from them is subtracted: y = B (b - P a) + A a.
+        Their prior is flat but for the sign. What causes take over from them is subtracted: y = B
+        (b - P a) + A a.
         """
         known = self.evidence.nonnegative
         if known is None:
@@ -188,14 +204,17 @@ class MarginalLikelihood:
 
 
 def power(explained: NDArray, weight: float, model_error: float) -> NDArray:
-    """Return how much of each output's likelihood counts, (o,): less where much is explained, for no form is exact.
+    """Return how much of each output's likelihood counts, (o,): less where much is explained, for
+    no form is exact.
 
     ``explained`` (o,) is squared and in units of the noise.
     """
     return np.asarray(weight / (1.0 + model_error * weight * explained))
 
 
-def _without(gram: NDArray, right: NDArray, background: NDArray, sd: NDArray) -> tuple[NDArray, NDArray]:
+def _without(
+    gram: NDArray, right: NDArray, background: NDArray, sd: NDArray
+) -> tuple[NDArray, NDArray]:
     """Marginalise background columns with prior sds out of the products."""
     system = gram[np.ix_(background, background)] * np.outer(sd, sd)
     system[np.diag_indices_from(system)] += 1.0
@@ -235,7 +254,8 @@ def _shown(element: Element, c: Criteria) -> float:
 
 
 def _line(ratio: float, variance: float, phases: int, share: float) -> float:
-    """Return the log Bayes factor of a line whose sine and cosine have a prior share, against none."""
+    """Return the log Bayes factor of a line whose sine and cosine have a prior share, against
+    none."""
     prior = 0.5 * share**2
     return ratio * prior / (prior + variance) - phases * float(np.log1p(prior / variance))
 
@@ -243,8 +263,8 @@ def _line(ratio: float, variance: float, phases: int, share: float) -> float:
 def _log_sign(amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int) -> float:
     """Return what knowing that amplitudes (p, k) are not negative adds to the log evidence.
 
-    The prior is symmetric, so the factor is twice the posterior probability of the sign; of several, the product, as
-    if they were independent.
+    The prior is symmetric, so the factor is twice the posterior probability of the sign; of
+    several, the product, as if they were independent.
     """
     k = amplitudes.shape[1]
     units = np.zeros((len(u), k))

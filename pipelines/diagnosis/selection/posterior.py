@@ -35,7 +35,8 @@ CONTEXTS = 8
 """Most sets whose causes are refined together."""
 
 STRONGEST = 2
-"""Number of most probable single causes, each of which is refined together with possible partners."""
+"""Number of most probable single causes, each of which is refined together with possible
+partners."""
 
 SURE = 1.0 - 1e-12
 """What counts as certain: beyond it rounding decides."""
@@ -80,14 +81,16 @@ class Posterior:
     def at_least(self, labels: frozenset[str], probability: float) -> "Posterior":
         """Return the posterior where some label of a group has at least this probability.
 
-        Ratios among the sets with such a label, and among those without, are kept (Jeffrey, 1965, The Logic of
-        Decision, chapter 11).
+        Ratios among the sets with such a label, and among those without, are kept (Jeffrey, 1965,
+        The Logic of Decision, chapter 11).
         """
         inside = np.array([not labels.isdisjoint(self.labels_of(chosen)) for chosen in self.sets])
         if not inside.any():
             return self
         wanted = float(logit(min(probability, SURE)))
-        lacking = wanted - float(logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside]))
+        lacking = wanted - float(
+            logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside])
+        )
         if not TOLERANCE < lacking < np.inf:
             return self
         return self._with(self.log_odds + np.where(inside, lacking, 0.0))
@@ -116,7 +119,8 @@ class Posterior:
 
     @cached_property
     def unweighed(self) -> frozenset[frozenset[str]]:
-        """Sets of labels without a finite log odds at any shape: rounding made their matrices indefinite."""
+        """Sets of labels without a finite log odds at any shape: rounding made their matrices
+        indefinite."""
         pairs = zip(self.sets, self.log_odds, strict=True)
         weighed = {self.labels_of(chosen) for chosen, odds in pairs if np.isfinite(odds)}
         return frozenset(self.by_labels.keys() - weighed)
@@ -141,7 +145,8 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     """Weigh all sets of up to three elements."""
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
-    # A shape that a cause has beside others counts in their set only, or the cause would count twice.
+    # A shape that a cause has beside others counts in their set only, or the cause would count
+    # twice.
     odds |= {(i,): float(v) for i, v in enumerate(weigh.alone) if evidence.elements[i].context < 0}
     for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
         odds[chosen] = weigh(chosen)
@@ -159,7 +164,8 @@ def _ordered(chosen: Sequence[int]) -> Set:
 
 
 def likely_contexts(weighed: Posterior) -> list[Context]:
-    """Return the sets of several elements, more probable than nothing, to refine their causes together."""
+    """Return the sets of several elements, more probable than nothing, to refine their causes
+    together."""
     found: dict[frozenset[str], Context] = {}
     for chosen in weighed.sets:
         elements = [weighed.elements[i] for i in chosen]
@@ -173,7 +179,8 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
 
 
 def strongest(weighed: Posterior) -> list[int]:
-    """Return the library's numbers of the causes that alone explain most, unless nothing is missing."""
+    """Return the library's numbers of the causes that alone explain most, unless nothing is
+    missing."""
     found: dict[str, int] = {}
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None

@@ -41,7 +41,8 @@ def of_set(chosen: Sequence[NDArray]) -> NDArray:
 
 
 def weights(criteria: Criteria) -> NDArray:
-    """Return the log odds of one unit of each feature, (f,); the base rate counts once in a set that is not empty."""
+    """Return the log odds of one unit of each feature, (f,); the base rate counts once in a set
+    that is not empty."""
     found = {name: getattr(criteria, name) for name in FEATURES}
     found["cause"] += criteria.base_rate
     found["law"] += criteria.base_rate

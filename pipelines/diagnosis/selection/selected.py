@@ -1,4 +1,5 @@
-"""What the evidence of the runs that are searched says: the library, the posterior, the answer read off it."""
+"""What the evidence of the runs that are searched says: the library, the posterior, the answer read
+off it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +16,13 @@ from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.look_alikes import with_look_alikes
-from pipelines.diagnosis.selection.posterior import SURE, Posterior, likely_contexts, posterior, strongest
+from pipelines.diagnosis.selection.posterior import (
+    SURE,
+    Posterior,
+    likely_contexts,
+    posterior,
+    strongest,
+)
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 
@@ -42,7 +49,8 @@ class AllRunsSearch:
 class Selected:
     """What the evidence of the searched runs says, before and after the validation runs judge it.
 
-    The training runs are searched; where what they name leaves more than noise on the validation runs, all runs are.
+    The training runs are searched; where what they name leaves more than noise on the validation
+    runs, all runs are.
     """
 
     library: Library | None
@@ -59,12 +67,12 @@ class Selected:
     dropped: frozenset[str] = frozenset()
     """Labels that were named until the validation runs spoke against them."""
     charged: Mapping[str, float] = field(default_factory=dict)
-    """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
-    of its ties, which has zero."""
+    """What the validation runs take from log odds, by variant of a cause: its harm, or how far it
+    falls behind the best of its ties, which has zero."""
 
     removed: Mapping[str, float] = field(default_factory=dict)
-    """Share of the validation runs' systematic error that each cause removed when it was tested for being a look-alike,
-    by label."""
+    """Share of the validation runs' systematic error that each cause removed when it was tested for
+    being a look-alike, by label."""
 
     by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
@@ -86,14 +94,16 @@ class Selected:
 
     @property
     def without_names(self) -> "Selected":
-        """What is missing, without the causes that are named: the validation runs speak against them."""
+        """What is missing, without the causes that are named: the validation runs speak against
+        them."""
         assert self.posterior is not None
         answer = replace(self.answer, named=())
         found = tuple(findings(self.posterior, answer))
         return replace(self, answer=answer, findings=found, dropped=frozenset(self.answer.labels))
 
     def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
-        """Return what all runs show, after what the first ``train_count`` of them, to train on, showed alone."""
+        """Return what all runs show, after what the first ``train_count`` of them, to train on,
+        showed alone."""
         assert first.searched is not None
         by_all = AllRunsSearch(train_count, answer_of(first.searched).labels)
         return replace(self, by_all=by_all)
@@ -106,18 +116,24 @@ class Selected:
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
         candidate = self.library.causes[element.place].candidate
-        return replace(candidate, shapes=candidate.shapes[: self.by_all.train_count]) if self.by_all else candidate
+        return (
+            replace(candidate, shapes=candidate.shapes[: self.by_all.train_count])
+            if self.by_all
+            else candidate
+        )
 
     @property
     def doubted(self) -> frozenset[str]:
-        """Labels that the validation runs speak against: they do harm there, or a tie of theirs predicts better."""
+        """Labels that the validation runs speak against: they do harm there, or a tie of theirs
+        predicts better."""
         return frozenset(e.label for e in self._elements if self.charged.get(e.variant, 0.0) < 0.0)
 
     def worst_harm(self, ratios: Mapping[str, float]) -> dict[str, float]:
-        """Return the charges for the named cause that harms the validation runs most, by variant; empty if none does.
+        """Return the charges for the named cause that harms the validation runs most, by variant;
+        empty if none does.
 
-        Where a named cause does harm, so do its ties: these data cannot tell them apart. A cause whose size each run
-        has for itself is not charged, for one run says nothing of another's.
+        Where a named cause does harm, so do its ties: these data cannot tell them apart. A cause
+        whose size each run has for itself is not charged, for one run says nothing of another's.
 
         Parameters
         ----------
@@ -127,16 +143,20 @@ class Selected:
         harmful = [
             (ratio, one.members)
             for one in self.answer.named
-            if (ratio := ratios.get(one.element.label, 0.0)) < 0.0 and not one.element.sized_each_run
+            if (ratio := ratios.get(one.element.label, 0.0)) < 0.0
+            and not one.element.sized_each_run
         ]
         for ratio, members in sorted(harmful, key=lambda pair: pair[0]):
-            alike = {e.variant for e in self._elements if e.label in members and not e.sized_each_run}
+            alike = {
+                e.variant for e in self._elements if e.label in members and not e.sized_each_run
+            }
             if charges := {variant: ratio for variant in alike if not self.charged.get(variant)}:
                 return charges
         return {}
 
     def rivals_of(self, number: int) -> dict[str, Candidate]:
-        """Return the ties to fit in the place of a named cause, by variant, unless they were compared before.
+        """Return the ties to fit in the place of a named cause, by variant, unless they were
+        compared before.
 
         A cause whose size each run has for itself is not compared: a validation run fits its own.
         """
@@ -156,25 +176,35 @@ class Selected:
         Parameters
         ----------
         charges : mapping of str to float
-            What the validation runs take from log odds as well, zero or negative, by variant of a cause.
+            What the validation runs take from log odds as well, zero or negative, by variant of a
+            cause.
         harms : bool
-            Whether the model predicts these runs worse with the charged cause, which is then told as dropped.
+            Whether the model predicts these runs worse with the charged cause, which is then told
+            as dropped.
         """
         assert self.searched is not None
         charged = {**self.charged, **charges}
         floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
         weighed = _with_floors(self.searched.judged(charged), floors)
         again = replace(self._reweighed(weighed), charged=charged)
-        doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
+        doubted = {
+            one.element.label
+            for one in self.answer.named
+            if harms and one.element.variant in charges
+        }
         return replace(again, dropped=(self.dropped | doubted) - set(again.answer.labels))
 
     def _reweighed(self, weighed: Posterior) -> "Selected":
-        """Return the answer read off another posterior; only causes named or tied before may be named."""
+        """Return the answer read off another posterior; only causes named or tied before may be
+        named."""
         likely = answer_of(weighed, [one.members for one in self.answer.named])
-        # Anything else that becomes likely is a finding: refuting one cause is no evidence for another.
+        # Anything else that becomes likely is a finding: refuting one cause is no evidence for
+        # another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
-        return replace(self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer)))
+        return replace(
+            self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer))
+        )
 
     def with_look_alikes(self, removed: Mapping[str, float]) -> "Selected":
         """Return the answer in which named causes may be unlisted effects that resemble them.
@@ -182,7 +212,8 @@ class Selected:
         Parameters
         ----------
         removed : mapping of str to float
-            Share of the systematic error of the validation runs that each named cause removes, by label.
+            Share of the systematic error of the validation runs that each named cause removes, by
+            label.
         """
         if self.posterior is None or not removed:
             return self
@@ -199,15 +230,22 @@ class Selected:
         """Return the most probable shape of a tie in the place of a named cause."""
         assert self.posterior is not None
         labels = map(self.posterior.labels_of, self.posterior.sets)
-        has_it = [(own, chosen) for own, chosen in zip(labels, self.posterior.sets, strict=True) if label in own]
+        has_it = [
+            (own, chosen)
+            for own, chosen in zip(labels, self.posterior.sets, strict=True)
+            if label in own
+        ]
         rest = {other.element.label for other in self.answer.named} - {one.element.label}
-        in_place = (chosen for own, chosen in has_it if rest <= own and one.element.label not in own)
+        in_place = (
+            chosen for own, chosen in has_it if rest <= own and one.element.label not in own
+        )
         best = next(in_place, has_it[0][1])
         return next(e for i in best if (e := self.posterior.elements[i]).label == label)
 
 
 def _lowered(one: Named, charges: Mapping[str, float], elements: Sequence[Element]) -> float:
-    """Return the probability of a named cause and its ties after what the least charged of them is charged itself.
+    """Return the probability of a named cause and its ties after what the least charged of them is
+    charged itself.
 
     It was fitted without what else is charged: that takes nothing from it.
     """
@@ -230,7 +268,9 @@ def select(prepared: Prepared, report: Report = silent) -> Selected:
     """Weigh all sets of causes and laws, and read the answer off the posterior."""
     library, evidence, found = weighed(prepared, report)
     answer = answer_of(found)
-    return Selected(library, evidence, found, found, answer, tuple(findings(found, answer)), _router(prepared))
+    return Selected(
+        library, evidence, found, found, answer, tuple(findings(found, answer)), _router(prepared)
+    )
 
 
 def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidence:

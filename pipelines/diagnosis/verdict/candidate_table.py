@@ -1,4 +1,5 @@
-"""``candidates/1``: every set of causes and laws that was weighed in full, and what became of it."""
+"""``candidates/1``: every set of causes and laws that was weighed in full, and what became of
+it."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -119,7 +120,9 @@ def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterat
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
     """Return the joints at which other parameters take an effect up whole, and which."""
     everywhere = machine.mechanism.absorbs.get(effect.name)
-    by_joint = {joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names}
+    by_joint = {
+        joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
+    }
     return {joint: into for joint, into in by_joint.items() if into}
 
 
@@ -137,11 +140,17 @@ def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
-    return _without_numbers(d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it")
+    return _without_numbers(
+        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it"
+    )
 
 
 def _without_numbers(d: Diagnosis, label: str, verdict: str, reason: str) -> dict[str, Any]:
-    blank = {j.column(f"rmse_{when}"): None for j in d.baseline.machine.joints for when in ("before", "after")}
+    blank = {
+        j.column(f"rmse_{when}"): None
+        for j in d.baseline.machine.joints
+        for when in ("before", "after")
+    }
     return {
         "causes": [label], "parameters": [], "train_score": None, "gain_nm": None,
         "gain_low_nm": None, "gain_high_nm": None, "probability": None, **blank,

@@ -72,7 +72,8 @@ def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
 
 
 def _next(d: Diagnosis, named: Named) -> str | None:
-    """Say how much less likely the next listed cause is in its place, beside the other named ones."""
+    """Say how much less likely the next listed cause is in its place, beside the other named
+    ones."""
     assert d.selected.posterior is not None
     label, ties = named.element.label, dict(named.ties)
     own, rivals = in_place(d.selected.posterior, label, frozenset(d.causes) - {label})
@@ -81,5 +82,11 @@ def _next(d: Diagnosis, named: Named) -> str | None:
         return None
     rival, p = others[0]
     odds = (own + sum(rivals[tied] for tied in ties)) / p
-    times = "no" if odds <= 1.0 else f"{odds:.3g} times" if odds < CERTAIN else f"over {CERTAIN:g} times"
+    times = (
+        "no"
+        if odds <= 1.0
+        else f"{odds:.3g} times"
+        if odds < CERTAIN
+        else f"over {CERTAIN:g} times"
+    )
     return f"the next listed cause in its place, {in_words(effect_labelled(rival))}, is {times} less likely"

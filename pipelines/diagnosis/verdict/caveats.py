@@ -58,7 +58,8 @@ def _high_floor(d: Diagnosis) -> list[str]:
 
 
 def _at_ends(d: Diagnosis) -> list[str]:
-    """Say which shape of a named cause ended where its search ends: its other values hold only with it."""
+    """Say which shape of a named cause ended where its search ends: its other values hold only with
+    it."""
     return [
         f"the fit of {cause.label} ended at the limit of its search, {parameter.name} = {value:.3g}"
         f"{'' if parameter.unit == '1' else f' {parameter.unit}'}: "
@@ -136,7 +137,11 @@ def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
     """Return joints whose validation runs have a larger error, with it and with the training's."""
     errors = zip(d.after.errors.rms.tolist(), d.after.fit.rms.tolist(), strict=False)
     pairs = zip(d.baseline.joints, errors, strict=True)
-    return {} if d.data.spoilt else {joint: both for joint, both in pairs if both[0] > LARGER * both[1]}
+    return (
+        {}
+        if d.data.spoilt
+        else {joint: both for joint, both in pairs if both[0] > LARGER * both[1]}
+    )
 
 
 def _differs(d: Diagnosis) -> list[str]:

@@ -1,7 +1,7 @@
 """What naming the causes means for control: the adaptive loop on the model without and with them.
 
-The controller has no model of the leg, its network learns one. So what changes is the leg it is simulated on, and with
-that the tracking error and the torque that a simulation promises.
+The controller has no model of the leg, its network learns one. So what changes is the leg it is
+simulated on, and with that the tracking error and the torque that a simulation promises.
 """
 
 from dataclasses import replace
@@ -20,20 +20,26 @@ from pipelines.model import Model, Term
 from pipelines.settings.simulate import SimulateSettings
 
 CASE = SimulateSettings()
-"""The reference case of docs/simulation.md: the same for every machine, so that numbers can be compared."""
+"""The reference case of docs/simulation.md: the same for every machine, so that numbers can be
+compared."""
 
 NOT_OF_THE_LOOP = {"sweep_nm_s_rad", "figures"}
 
 
 def control(d: Diagnosis) -> dict[str, Any]:
-    """Return tracking error and peak torque of the adaptive loop without and with the named causes, as JSON objects.
+    """Return tracking error and peak torque of the adaptive loop without and with the named causes,
+    as JSON objects.
 
     Both count from ``settled_after_s`` on: before, the drives are at their limit, whatever the leg.
     """
     run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
     told: dict[str, Any] = {
         "run": run,
-        "controller": {"type": "rbf", "reference": "gait", **CASE.model_dump(mode="json", exclude=NOT_OF_THE_LOOP)},
+        "controller": {
+            "type": "rbf",
+            "reference": "gait",
+            **CASE.model_dump(mode="json", exclude=NOT_OF_THE_LOOP),
+        },
         "without": None,
         "with": None,
         "reason": None,
@@ -41,7 +47,9 @@ def control(d: Diagnosis) -> dict[str, Any]:
     if not d.baseline.machine.is_exoskeleton:
         return told | {"reason": "the reference case is a leg's gait, with its gains and limits"}
     if d.data.spoilt:
-        return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
+        return told | {
+            "reason": "acquisition is at fault: no model of these recordings can be trusted"
+        }
     fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}
     reasons = [] if d.causes else ["no cause is named"]
     for which, made in fits.items():
@@ -56,7 +64,9 @@ def control(d: Diagnosis) -> dict[str, Any]:
 def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:
     motion = d.validate[0].motion
     terms = tuple(_from_the_begin(term) for term in model)
-    loop = track(make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait())
+    loop = track(
+        make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait()
+    )
     if loop.ran_away:
         raise InputError(loop.ran_away)
     settled = loop.time >= CASE.settled_after_s
@@ -70,6 +80,7 @@ def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]
 
 
 def _from_the_begin(term: Term) -> Term:
-    """Let what comes at some time of a run be there from its begin, or the loop might end before."""
+    """Let what comes at some time of a run be there from its begin, or the loop might end
+    before."""
     onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
     return replace(term, values=np.where(onset, 0.0, term.values))

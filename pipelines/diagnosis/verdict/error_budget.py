@@ -1,6 +1,8 @@
-"""The error budget: what the baseline's squared error on validation runs is made of, joint by joint.
+"""The error budget: what the baseline's squared error on validation runs is made of, joint by
+joint.
 
-Mean squares of independent parts add up, root mean squares do not: every share is a mean square, (N·m)².
+Mean squares of independent parts add up, root mean squares do not: every share is a mean square,
+(N·m)².
 """
 
 from collections.abc import Callable, Sequence
@@ -16,8 +18,14 @@ from pipelines.diagnosis.fit.held_out import evaluate
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.validation_error import errors_of, scored
 
-FLOOR, REPEATS, WANDERS, LEFT = "noise_floor", "repeatable_unexplained", "not_repeatable", "unexplained"
-"""Shares beside the causes'; ``LEFT`` stands for the two before it where no period tells them apart."""
+FLOOR, REPEATS, WANDERS, LEFT = (
+    "noise_floor",
+    "repeatable_unexplained",
+    "not_repeatable",
+    "unexplained",
+)
+"""Shares beside the causes'; ``LEFT`` stands for the two before it where no period tells them
+apart."""
 
 
 def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
@@ -31,7 +39,9 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     scatter = scatter_between_periods(d.validate, d.after.residuals)
     budget = {}
     for j, joint in enumerate(d.baseline.joints):
-        shares = {FLOOR: float(floor[j])} | {label: float(share[j]) for label, share in causes.items()}
+        shares = {FLOOR: float(floor[j])} | {
+            label: float(share[j]) for label, share in causes.items()
+        }
         above = float(left[j] - floor[j])
         if scatter is None:
             shares[LEFT] = above
@@ -42,10 +52,14 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     return budget
 
 
-def shares_of_causes(labels: Sequence[str], left_by: Callable[[frozenset[str]], NDArray]) -> dict[str, NDArray]:
-    """Return what each cause takes away, averaged over all orders in which they can be named (Shapley 1953).
+def shares_of_causes(
+    labels: Sequence[str], left_by: Callable[[frozenset[str]], NDArray]
+) -> dict[str, NDArray]:
+    """Return what each cause takes away, averaged over all orders in which they can be named
+    (Shapley 1953).
 
-    Causes overlap: what the first of two takes, the second cannot. The average is fair to both, and adds up.
+    Causes overlap: what the first of two takes, the second cannot. The average is fair to both, and
+    adds up.
 
     Parameters
     ----------
@@ -74,12 +88,18 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
-    made = fit([c for c in d.after.fit.causes if c.label in labels], d.train, d.baseline, d.before.fit.weights)
+    made = fit(
+        [c for c in d.after.fit.causes if c.label in labels],
+        d.train,
+        d.baseline,
+        d.before.fit.weights,
+    )
     return errors_of(d.validate, evaluate(made, d.validate, d.baseline)).rms ** 2
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:
-    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)²; None without periods.
+    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)²;
+    None without periods.
 
     Noise and all that moves from period to period, drift included: what is left above it repeats.
     """
@@ -92,7 +112,10 @@ def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -
         place = np.round(run.time[chosen] % run.motion.period_s / width).astype(int)
         own = residual[chosen, : len(run.motion.joints)]
         count = np.bincount(place)
-        mean = np.stack([np.bincount(place, e) for e in own.T], axis=1) / np.maximum(count, 1)[:, np.newaxis]
+        mean = (
+            np.stack([np.bincount(place, e) for e in own.T], axis=1)
+            / np.maximum(count, 1)[:, np.newaxis]
+        )
         squares = squares + np.sum((own - mean[place]) ** 2, axis=0)
         freedom += int(np.sum(np.maximum(count - 1, 0)))
     return squares / freedom if freedom else None

@@ -48,7 +48,9 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     return told
 
 
-def _node_in_words(d: Diagnosis, node: dict[str, Any], finding: dict[str, Any], of_other_joint: bool) -> str:
+def _node_in_words(
+    d: Diagnosis, node: dict[str, Any], finding: dict[str, Any], of_other_joint: bool
+) -> str:
     level, value = node["level"], node["value"]
     if level == "missing":
         return "something is missing"
@@ -59,7 +61,9 @@ def _node_in_words(d: Diagnosis, node: dict[str, Any], finding: dict[str, Any], 
     if level == "joint":
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
-        return family_in_words(value, finding["joint"], d.baseline.machine, of_other_joint=of_other_joint)
+        return family_in_words(
+            value, finding["joint"], d.baseline.machine, of_other_joint=of_other_joint
+        )
     return str(finding["causes"][0]["words"])
 
 
@@ -68,4 +72,9 @@ def _laws(finding: Finding, machine: Machine) -> Iterator[dict[str, Any]]:
     for label, p in finding.laws:
         if p >= WORTH_A_LINE:
             kind, joint = kind_and_joint(label)
-            yield {"law": kind, "joint": joint, "probability": p, "words": law_in_words(label, machine)}
+            yield {
+                "law": kind,
+                "joint": joint,
+                "probability": p,
+                "words": law_in_words(label, machine),
+            }

@@ -85,7 +85,8 @@ def _size(d: Diagnosis, place: int) -> str:
 
 
 def _error_there(d: Diagnosis) -> str:
-    """Return the error at the joint of the first finding; of none, where it is largest compared with the noise."""
+    """Return the error at the joint of the first finding; of none, where it is largest compared
+    with the noise."""
     of_finding = d.selected.findings[0].joint if d.selected.findings else None
     place = d.baseline.joints.index(of_finding) if of_finding else _worst_joint(d)
     joint = d.baseline.joints[place]
@@ -147,7 +148,9 @@ def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
         return ""
     words, p = close[0]["words"], close[0]["probability"]
     share = d.selected.removed.get(cause_label(close[0]), 1.0)
-    only = f", but removes only {100.0 * share:.0f} % of the systematic error on the validation runs"
+    only = (
+        f", but removes only {100.0 * share:.0f} % of the systematic error on the validation runs"
+    )
     but = only if share < NEARLY_ALL else ""
     return f" Of the listed causes {words} ({p:.2f}) comes closest{but}."
 
@@ -171,7 +174,8 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     """Name the causes, and say what naming them gains."""
     doubts = [doubt_of_gain(d, cause_label(cause)) for cause in causes]
     named = "; and ".join(
-        _in_words(cause) + (f", {doubt[0]}" if doubt else "") for cause, doubt in zip(causes, doubts, strict=True)
+        _in_words(cause) + (f", {doubt[0]}" if doubt else "")
+        for cause, doubt in zip(causes, doubts, strict=True)
     )
     before, after = d.before.errors.rms, d.after.errors.rms
     most = int(((before**2 - after**2) / d.floor_rms**2).argmax())
@@ -188,7 +192,8 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 
 
 def _they(causes: list[dict[str, Any]]) -> str:
-    """Return what stands for the causes that were fitted; of those tied with one another the first is."""
+    """Return what stands for the causes that were fitted; of those tied with one another the first
+    is."""
     if len(causes) > 1:
         return "them"
     return "the first of them" if causes[0]["indistinguishable_from"] else "it"
@@ -199,7 +204,9 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
     with_one = {cause["joint"] for cause in causes}
     none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
-    return "".join(f" At {the(joint)}, where a cause is named, the error does not fall." for joint in none)
+    return "".join(
+        f" At {the(joint)}, where a cause is named, the error does not fall." for joint in none
+    )
 
 
 def _remains(d: Diagnosis, most: int) -> str:

@@ -65,7 +65,8 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
 
 
 def tie_between(named: str, other: str, confirm_named: str, confirm_other: str) -> Tie:
-    """Return why two effects (names without joints) are not told apart, structural or only on this motion."""
+    """Return why two effects (names without joints) are not told apart, structural or only on this
+    motion."""
     structural = STRUCTURAL.get(frozenset({named, other}))
     if structural:
         return structural

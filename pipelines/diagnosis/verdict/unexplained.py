@@ -1,4 +1,5 @@
-"""What the named causes leave: what it depends on, and a smooth term that extends the model by it."""
+"""What the named causes leave: what it depends on, and a smooth term that extends the model by
+it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,19 +31,26 @@ class Unexplained:
         """Return what the verdict says of it."""
         return {
             "description": self.description,
-            "depends_on": [{"joint": d.joint, "variable": d.variable, "share": d.share} for d in self.depends_on],
+            "depends_on": [
+                {"joint": d.joint, "variable": d.variable, "share": d.share}
+                for d in self.depends_on
+            ],
             "smooth_term": {"what": self.smooth, "rmse_nm": self.rmse_nm},
         }
 
 
 def unexplained(d: Diagnosis, found: list[Dependence]) -> Unexplained:
-    """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs.
+    """Describe the residual of validation runs and extend the model by a smooth term learnt on
+    train runs.
 
     ``found`` is what the extended model's residual depends on.
     """
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
-    left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
+    left = [
+        r - np.nan_to_num(term.torque(run))
+        for run, r in zip(d.validate, d.after.residuals, strict=True)
+    ]
     rms = errors_of(d.validate, left).rms
     return Unexplained(
         description=describe(d.baseline.machine, found, above, term.together),

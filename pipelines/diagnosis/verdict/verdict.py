@@ -38,7 +38,10 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
         "findings": findings(d),
         "sought_on": "train" if d.selected.by_all is None else "all",
-        "router": {joint.name: shares.as_json() for joint, shares in zip(joints, d.selected.router, strict=True)},
+        "router": {
+            joint.name: shares.as_json()
+            for joint, shares in zip(joints, d.selected.router, strict=True)
+        },
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),
         "caveats": caveats(d),
@@ -55,7 +58,9 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "units": {j.name: {"torque": j.unit("torque"), "angle": j.unit("angle")} for j in joints},
         "known": [_known(d, effect) for effect in d.baseline.known],
         "causes": causes,
-        "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults],
+        "data_faults": [
+            {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
+        ],
         "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
@@ -116,7 +121,9 @@ def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> dict[str, list[dict[str, Any]]]:
+def _depends_on(
+    before: Sequence[Dependence], after: Sequence[Dependence]
+) -> dict[str, list[dict[str, Any]]]:
     """Return what each joint's residual depends on, under the baseline and the extended model."""
     left = {(one.joint, one.variable): one.share for one in after}
     return {

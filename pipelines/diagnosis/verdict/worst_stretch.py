@@ -1,4 +1,5 @@
-"""The diagnosed models beside the recording they get most wrong: torque, and 1 s simulations under that torque."""
+"""The diagnosed models beside the recording they get most wrong: torque, and 1 s simulations under
+that torque."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -46,14 +47,20 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
         last = max(run.time[-1] - STRETCH_S, run.time[0])
         for begin in np.arange(run.time[0], last + STEP_S, STEP_S):
             inside = np.searchsorted(run.time, [begin, begin + STRETCH_S])
-            yield float(np.diff(total[inside])[0]), Stretch(number, float(begin), float(begin + STRETCH_S))
+            yield (
+                float(np.diff(total[inside])[0]),
+                Stretch(number, float(begin), float(begin + STRETCH_S)),
+            )
 
 
-def simulated_error(made: Validated, d: Diagnosis, stretch: Stretch) -> tuple[NDArray, NDArray] | None:
-    """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN between two.
+def simulated_error(
+    made: Validated, d: Diagnosis, stretch: Stretch
+) -> tuple[NDArray, NDArray] | None:
+    """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN
+    between two.
 
-    None where the model cannot be simulated: causes that the forward dynamics cannot hold together, or a mass matrix
-    that no leg has.
+    None where the model cannot be simulated: causes that the forward dynamics cannot hold together,
+    or a mass matrix that no leg has.
     """
     run = d.validate[stretch.run]
     try:
@@ -66,6 +73,10 @@ def simulated_error(made: Validated, d: Diagnosis, stretch: Stretch) -> tuple[ND
     first, last = result.first, result.first + length - 1
     times = run.motion.time
     shown = (times[last] > stretch.begin) & (times[first] < stretch.end)
-    time = np.pad(times[first[shown, np.newaxis] + np.arange(length)], ((0, 0), (0, 1)), constant_values=np.nan)
+    time = np.pad(
+        times[first[shown, np.newaxis] + np.arange(length)],
+        ((0, 0), (0, 1)),
+        constant_values=np.nan,
+    )
     error = np.pad(result.error[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     return time.ravel(), error.reshape(-1, error.shape[2])

@@ -1,4 +1,5 @@
-"""How a joint's columns were counted: in registers that lost their sign, or that start anew when they are full."""
+"""How a joint's columns were counted: in registers that lost their sign, or that start anew when
+they are full."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,6 +40,9 @@ def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, 
         return found
     found["angle"] = Counting(found["angle"].bits, full)
     # A set-point may step by a turn, and so be told to; it starts anew only where the angle does.
-    if "reference" in found and full_at(found["reference"].undone(logged["reference"]), turns) == full:
+    if (
+        "reference" in found
+        and full_at(found["reference"].undone(logged["reference"]), turns) == full
+    ):
         found["reference"] = Counting(found["reference"].bits, full)
     return found

@@ -43,15 +43,23 @@ def propose(paths: Sequence[Path]) -> Proposal:
         columns = source.load(source.names)
         durations = [name for name, values in columns.items() if values.dtype.kind == "m"]
         columns = {name: _numeric(values) for name, values in columns.items()}
-        dates = {name: stamps for name, values in columns.items() if (stamps := _dates(values)) is not None}
+        dates = {
+            name: stamps
+            for name, values in columns.items()
+            if (stamps := _dates(values)) is not None
+        }
         columns |= dates
         found = meanings(source.names)
         told = dict.fromkeys(durations, "ns") | dict.fromkeys(dates, "iso8601")
         time = guess_time(found, columns, told)
         if time is None:
-            back = [m.column for m in found if m.quantity == "time" and _goes_back(columns[m.column])]
+            back = [
+                m.column for m in found if m.quantity == "time" and _goes_back(columns[m.column])
+            ]
             if back:
-                raise InputError(f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round")
+                raise InputError(
+                    f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round"
+                )
             raise InputError(
                 f"none of {_in_short(source.names)} goes forward as a clock does, over ten rows or more and at "
                 f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
@@ -60,15 +68,23 @@ def propose(paths: Sequence[Path]) -> Proposal:
     for path in paths[1:]:
         _refuse_other_columns(path, source)
     proposal = Proposal()
-    proposal.remark(f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`.")
-    proposal.remark("What is UNSURE was chosen among several; look at it. FILL IN what no log can tell.")
+    proposal.remark(
+        f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`."
+    )
+    proposal.remark(
+        "What is UNSURE was chosen among several; look at it. FILL IN what no log can tell."
+    )
     for note in source.notes:
         proposal.remark(f"Read as {source.format}: {note}.")
     write_time(proposal, time)
     columns[time.column] = time.stamps(columns[time.column])
     run = _longest_run(columns[time.column], time.unit)
     assert run is not None, "a clock goes forward over ten rows or more"
-    here = {name: values[run.rows] for name, values in columns.items() if len(values) == len(columns[time.column])}
+    here = {
+        name: values[run.rows]
+        for name, values in columns.items()
+        if len(values) == len(columns[time.column])
+    }
     with about(paths[0]):
         joints = group_joints([m for m in found if m.column in here], here, run.time_s, time.column)
         if not joints:
@@ -76,10 +92,14 @@ def propose(paths: Sequence[Path]) -> Proposal:
                 "no name of a column that changes says angle or position, and no column integrates to another among "
                 f"{_in_short(source.names)}; write the map by hand, docs/import.md tells how"
             )
-    single = {name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"}
+    single = {
+        name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"
+    }
     used = {time.column}
     for number, joint in enumerate(joints):
-        used |= set(write_joint(proposal, number, joint, here, run.time_s, len(joints) == 1, single))
+        used |= set(
+            write_joint(proposal, number, joint, here, run.time_s, len(joints) == 1, single)
+        )
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
     _remark_on_the_rest(proposal, [name for name in source.names if name not in used], columns)
@@ -105,7 +125,8 @@ def _goes_back(values: NDArray) -> bool:
 
 
 def _numeric(values: NDArray) -> NDArray:
-    """Return a column as numbers where it holds some, whatever stands between them; infinite ones are missing."""
+    """Return a column as numbers where it holds some, whatever stands between them; infinite ones
+    are missing."""
     if values.dtype.kind in "biu":
         return values
     if values.dtype.kind == "m":
@@ -117,16 +138,23 @@ def _numeric(values: NDArray) -> NDArray:
 
 def _dates(values: NDArray) -> NDArray | None:
     """Return a column of dates as nanoseconds; None of one that is not so written."""
-    if values.dtype.kind in "biuf" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
+    if (
+        values.dtype.kind in "biuf"
+        or not len(values)
+        or np.isnan(whole_nanoseconds(values[:1])).any()
+    ):
         return None
     stamps = whole_nanoseconds(values)
     return stamps if np.isfinite(stamps).all() else None
 
 
 def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
-    """Return the longest run of a clock's stamps (n,); None where no two of them follow each other."""
+    """Return the longest run of a clock's stamps (n,); None where no two of them follow each
+    other."""
     stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
-    runs = clock.runs((stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor, stamps, [])
+    runs = clock.runs(
+        (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor, stamps, []
+    )
     return max(runs, key=len, default=None)
 
 
@@ -135,23 +163,39 @@ def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
     if all(joint.slides for joint in joints):
         proposal.key("gravity_m_s2", 0.0, "9.81 for an axis that rises, a lift's", sure=False)
     else:
-        proposal.key("gravity_m_s2", 9.81, "0 for an axis that lies level, or turns about the vertical", sure=False)
+        proposal.key(
+            "gravity_m_s2",
+            9.81,
+            "0 for an axis that lies level, or turns about the vertical",
+            sure=False,
+        )
     if not order_is_told(joints):
         order = " carries ".join(joint.name for joint in joints)
-        proposal.doubt("joint", f"the order of their columns: {order}; no name says so. Turn their tables round if not")
+        proposal.doubt(
+            "joint",
+            f"the order of their columns: {order}; no name says so. Turn their tables round if not",
+        )
     if len(joints) > 1:
-        proposal.unknown("thigh_length_m", "axis of the first joint to that of the second", blocks=False)
+        proposal.unknown(
+            "thigh_length_m", "axis of the first joint to that of the second", blocks=False
+        )
 
 
 def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> float | None:
-    """Return the period, s, of the motion that a file holds: as it was asked for, where that was logged."""
-    names = {m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION}
+    """Return the period, s, of the motion that a file holds: as it was asked for, where that was
+    logged."""
+    names = {
+        m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION
+    }
     with about(path):
         columns = open_source(path, SourceSettings()).load([time.column, *names])
     moved = {name: _numeric(columns[name]) for name in names}
     logged = columns[time.column]
     stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
-    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved.values())):
+    if any(
+        values.dtype.kind not in "iuf" or len(values) != len(stamps)
+        for values in (stamps, *moved.values())
+    ):
         return None
     with about(path):
         run = _longest_run(stamps, time.unit)
@@ -162,14 +206,20 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
 
 
 def _motion(joint: JointColumns, columns: Mapping[str, NDArray]) -> NDArray:
-    """Return how a joint was to move, or did, (n,): as its counter would tell that was never full."""
-    joint = replace(joint, columns={quantity: m for quantity, m in joint.columns.items() if quantity in MOTION})
+    """Return how a joint was to move, or did, (n,): as its counter would tell that was never
+    full."""
+    joint = replace(
+        joint, columns={quantity: m for quantity, m in joint.columns.items() if quantity in MOTION}
+    )
     quantity = "reference" if "reference" in joint.columns else "angle"
     return countings(joint, columns)[quantity].undone(columns[joint.columns[quantity].column])
 
 
-def _write_recordings(proposal: Proposal, paths: Sequence[Path], periods: Sequence[float | None]) -> None:
-    """Propose what trains and what validates: the end of the only file, or the last third of several."""
+def _write_recordings(
+    proposal: Proposal, paths: Sequence[Path], periods: Sequence[float | None]
+) -> None:
+    """Propose what trains and what validates: the end of the only file, or the last third of
+    several."""
     if len(paths) == 1:
         for purpose, span in (("train", [0.0, TRAIN]), ("validate", [TRAIN, 1.0])):
             proposal.table("[[recording]]", "recording")
@@ -190,12 +240,18 @@ def _write_recordings(proposal: Proposal, paths: Sequence[Path], periods: Sequen
 
 def _write_period(proposal: Proposal, period_s: float | None) -> None:
     if period_s is None:
-        proposal.remark("period_s: no motion repeats here; without periods the noise is a guess, not measured")
+        proposal.remark(
+            "period_s: no motion repeats here; without periods the noise is a guess, not measured"
+        )
     else:
-        proposal.key("period_s", period_s, "the motion repeats so: what differs between periods is noise")
+        proposal.key(
+            "period_s", period_s, "the motion repeats so: what differs between periods is noise"
+        )
 
 
-def _remark_on_the_rest(proposal: Proposal, unused: Sequence[str], columns: Mapping[str, NDArray]) -> None:
+def _remark_on_the_rest(
+    proposal: Proposal, unused: Sequence[str], columns: Mapping[str, NDArray]
+) -> None:
     """Name the columns and constants that are in no table."""
     rest = [f"{name} = {columns[name][0]}" if len(columns[name]) == 1 else name for name in unused]
     if rest:

@@ -13,7 +13,10 @@ from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.sanity.consistency import integral_agreement, likeliest_integrals
 from pipelines.settings.units import UNITS
 
-TURNING, SLIDING = ("torque", "current", "force", "voltage"), ("force", "torque", "current", "voltage")
+TURNING, SLIDING = (
+    ("torque", "current", "force", "voltage"),
+    ("force", "torque", "current", "voltage"),
+)
 """What may tell what the drive of a joint delivers, the best first."""
 OBVIOUS = 0.9
 """Share of the variance by which a velocity is known whatever its name."""
@@ -39,7 +42,14 @@ class JointColumns:
     @property
     def drive(self) -> str | None:
         """The quantity that tells best what its drive delivers; None where none does."""
-        return next((quantity for quantity in (SLIDING if self.slides else TURNING) if quantity in self.columns), None)
+        return next(
+            (
+                quantity
+                for quantity in (SLIDING if self.slides else TURNING)
+                if quantity in self.columns
+            ),
+            None,
+        )
 
     @property
     def slides(self) -> bool:
@@ -51,12 +61,15 @@ class JointColumns:
 def group_joints(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray, clock: str
 ) -> list[JointColumns]:
-    """Return the joints of a log of columns (n,) at times (n,) s, in their columns' order, a limb's from the body."""
+    """Return the joints of a log of columns (n,) at times (n,) s, in their columns' order, a limb's
+    from the body."""
     usable = [
         m for m in meanings
         if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
     ]  # fmt: skip
-    switches = [m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))]
+    switches = [
+        m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))
+    ]
     told = any(found.quantity == "angle" and not found.commanded for found in usable)
     if not told:
         usable = [_counted(found, columns[found.column]) for found in usable]
@@ -66,7 +79,8 @@ def group_joints(
             by_joint.setdefault(found.joint, [])
     if not by_joint:
         return [
-            replace(one, enabled=_switch(switches, "", alone=True)) for one in _by_behaviour(usable, columns, time_s)
+            replace(one, enabled=_switch(switches, "", alone=True))
+            for one in _by_behaviour(usable, columns, time_s)
         ]
     for found in usable:
         owner = found.joint if found.joint in by_joint else "" if "" in by_joint else None
@@ -75,7 +89,10 @@ def group_joints(
         if owner is not None:
             by_joint[owner].append(found)
     joints = [
-        replace(_joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, len(by_joint) == 1))
+        replace(
+            _joint(name, members, number, len(by_joint)),
+            enabled=_switch(switches, name, len(by_joint) == 1),
+        )
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
     return sorted(joints if told else map(_told_by_counts, joints), key=_place)
@@ -83,18 +100,23 @@ def group_joints(
 
 def _place(joint: JointColumns) -> int:
     """Return where a joint stands in its limb; nought where its name does not say."""
-    return next((place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower()), 0)
+    return next(
+        (place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower()), 0
+    )
 
 
 def order_is_told(joints: Sequence[JointColumns]) -> bool:
     """Tell whether the names of joints say which carries which: places in a limb, or numbers."""
     places = [_place(joint) for joint in joints]
     numbered = [re.search(r"\d+", joint.name) for joint in joints]
-    return len(joints) == 1 or (0 not in places and len(set(places)) == len(places)) or all(numbered)
+    return (
+        len(joints) == 1 or (0 not in places and len(set(places)) == len(places)) or all(numbered)
+    )
 
 
 def _counted(found: Meaning, values: NDArray) -> Meaning:
-    """Return a column as an angle where that is what it may count; what never goes back counts events, or time."""
+    """Return a column as an angle where that is what it may count; what never goes back counts
+    events, or time."""
     known = values[np.isfinite(values)].astype(float)
     swings = are_whole(known) and np.ptp(known) > MANY and np.any(np.diff(known) < 0.0)
     return (in_counts(found) or found) if swings else found
@@ -107,7 +129,8 @@ def _told_by_counts(joint: JointColumns) -> JointColumns:
 
 
 def _switches(values: NDArray, rows: int) -> bool:
-    """Tell whether a column holds 0 and 1 alone, and not 0 alone: then it would say that the drive never was on."""
+    """Tell whether a column holds 0 and 1 alone, and not 0 alone: then it would say that the drive
+    never was on."""
     if values.dtype.kind not in "biuf" or len(values) != rows:
         return False
     known = values.astype(float)
@@ -127,7 +150,9 @@ def _moves(values: NDArray, rows: int) -> bool:
     if values.dtype.kind not in "iuf" or len(values) != rows:
         return False
     known = values[np.isfinite(values)].astype(float)
-    return bool(len(known)) and bool(np.ptp(known) > 0.0) and not bool(np.all(np.diff(known) == 1.0))
+    return (
+        bool(len(known)) and bool(np.ptp(known) > 0.0) and not bool(np.all(np.diff(known) == 1.0))
+    )
 
 
 def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> JointColumns:
@@ -141,18 +166,28 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
         others = [m.column for m in candidates[1:]]
         if others:
             twin = TWIN.sub("", others[0]) == TWIN.sub("", candidates[0].column)
-            why[quantity] = f"{'no name says which, ' if twin else ''}rather than {', '.join(others)}"
+            why[quantity] = (
+                f"{'no name says which, ' if twin else ''}rather than {', '.join(others)}"
+            )
     named = key if key and key[0].isalpha() else ""
     return JointColumns(named or (f"joint{number}" if joints > 1 else "joint"), chosen, why)
 
 
-def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray) -> list[JointColumns]:
-    """Return one joint of columns whose names tell nothing: what integrates to what, what follows the motion."""
+def _by_behaviour(
+    usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
+) -> list[JointColumns]:
+    """Return one joint of columns whose names tell nothing: what integrates to what, what follows
+    the motion."""
     # Of a single sine the angle integrates to the velocity too, but with the other sign.
     pairs = [
         (agreement.explained, angle, velocity)
         for angle, velocity in _pairs(usable, columns, time_s)
-        if (agreement := integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))) is not None
+        if (
+            agreement := integral_agreement(
+                time_s, _float(columns, angle), _float(columns, velocity)
+            )
+        )
+        is not None
         and agreement.slope > 0.0
     ]
     best = max(pairs, key=lambda pair: pair[0], default=None)
@@ -165,12 +200,23 @@ def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], tim
         "angle": f"no name says so, but {velocity.column} integrates to it ({share:.0%} of its variance)",
         "velocity": f"no name says so, but it integrates to {angle.column}",
     }
-    joint = replace(found, columns={**found.columns, "angle": angle, "velocity": velocity}, why={**found.why, **why})
-    return [joint if joint.drive else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)]
+    joint = replace(
+        found,
+        columns={**found.columns, "angle": angle, "velocity": velocity},
+        why={**found.why, **why},
+    )
+    return [
+        joint
+        if joint.drive
+        else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)
+    ]
 
 
-def _pairs(usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray) -> list[tuple[Meaning, Meaning]]:
-    """Return every pair of columns that may be angle and velocity; of many columns the likeliest pairs."""
+def _pairs(
+    usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
+) -> list[tuple[Meaning, Meaning]]:
+    """Return every pair of columns that may be angle and velocity; of many columns the likeliest
+    pairs."""
     angles = [m for m in usable if not m.quantity]
     velocities = [m for m in usable if m.quantity in ("", "velocity")]
     if len(angles) * len(velocities) <= FEW_PAIRS:
@@ -182,16 +228,26 @@ def _pairs(usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: ND
 
 
 def _with_a_torque(
-    joint: JointColumns, nameless: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
+    joint: JointColumns,
+    nameless: Sequence[Meaning],
+    columns: Mapping[str, NDArray],
+    time_s: NDArray,
 ) -> JointColumns:
-    """Return a joint with the column for its torque that follows the motion best, where one does at all."""
+    """Return a joint with the column for its torque that follows the motion best, where one does at
+    all."""
     angle = _float(columns, joint.columns["angle"])
-    fits = [(fit.explained, m) for m in nameless if (fit := fit_torque(time_s, angle, _float(columns, m))) is not None]
+    fits = [
+        (fit.explained, m)
+        for m in nameless
+        if (fit := fit_torque(time_s, angle, _float(columns, m))) is not None
+    ]
     if not fits:
         return joint
     share, torque = max(fits, key=lambda one: one[0])
     why = f"no name says so, but it follows the motion best ({share:.0%} of its variance)"
-    return replace(joint, columns={**joint.columns, "torque": torque}, why={**joint.why, "torque": why})
+    return replace(
+        joint, columns={**joint.columns, "torque": torque}, why={**joint.why, "torque": why}
+    )
 
 
 def _float(columns: Mapping[str, NDArray], meaning: Meaning) -> NDArray:

@@ -1,4 +1,5 @@
-"""Units of angle and velocity: from names, from what integrates to what, from the encoder's steps, from ranges."""
+"""Units of angle and velocity: from names, from what integrates to what, from the encoder's steps,
+from ranges."""
 
 from dataclasses import dataclass
 
@@ -19,12 +20,16 @@ CLEAR = 0.7
 LEAST_GEAR, MOST_GEAR = 1.5, 1000.0
 """Ratios that a gear has between a motor and a joint."""
 WHOLE = 0.01
-"""So near to a whole number, as its share, a ratio is taken for it: drives filter their velocities."""
+"""So near to a whole number, as its share, a ratio is taken for it: drives filter their
+velocities."""
 VELOCITY_OF = {
     "rad": "rad/s", "mrad": "mrad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "cm": "cm/s", "mm": "mm/s",
     "um": "mm/s", "in": "in/s", "counts": "counts/s",
 }  # fmt: skip
-ANGLES, VELOCITIES = ("rad", "deg", "rev", "m", "mm"), ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s")
+ANGLES, VELOCITIES = (
+    ("rad", "deg", "rev", "m", "mm"),
+    ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s"),
+)
 """Units that a log may be in without saying so."""
 TURNS = {"rad": 2.0 * np.pi, "mrad": 2000.0 * np.pi, "deg": 360.0, "rev": 1.0}
 """A full turn in each unit."""
@@ -46,16 +51,23 @@ class Units:
 
 
 def guess_units(
-    time_s: NDArray, angle: NDArray, named: str | None, velocity: NDArray | None, velocity_named: str | None
+    time_s: NDArray,
+    angle: NDArray,
+    named: str | None,
+    velocity: NDArray | None,
+    velocity_named: str | None,
 ) -> Units:
-    """Return the units of an angle and its velocity, (n,) each as logged; names say more than numbers."""
+    """Return the units of an angle and its velocity, (n,) each as logged; names say more than
+    numbers."""
     unit, why, sure = _angle_unit(angle, named)
     if velocity is None:
         return Units(unit, why, sure)
     agreement = integral_agreement(time_s, angle, velocity)
     if agreement is None or agreement.explained < CLEAR:
         share = 0.0 if agreement is None else agreement.explained
-        doubt = f"does not integrate to the angle ({share:.0%} of its variance): is it of this joint?"
+        doubt = (
+            f"does not integrate to the angle ({share:.0%} of its variance): is it of this joint?"
+        )
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
     if unit == "counts":
         return Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
@@ -72,7 +84,9 @@ def _velocity_of_counts(named: str | None, slope: float) -> tuple[str, str, bool
     return "counts/s", why, False, sign
 
 
-def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_named: str | None) -> Units:
+def _from_slope(
+    agreement: Agreement, unit: str, why: str, sure: bool, velocity_named: str | None
+) -> Units:
     """Return the pair of units that explains how much velocity integrates to a unit of angle."""
     slope, sign = abs(agreement.slope), int(np.sign(agreement.slope))
     said = f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its variance)"
@@ -86,7 +100,9 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
         of_it = sign * _turns(slope, *same[0])
-        in_units = f"integrates to {of_it:.4g} of the angle ({agreement.explained:.0%} of its variance)"
+        in_units = (
+            f"integrates to {of_it:.4g} of the angle ({agreement.explained:.0%} of its variance)"
+        )
         return Units(unit, why, sure, same[0][1], in_units, True, sign)
     if fitting and not sure:
         other, velocity = fitting[0]
@@ -96,16 +112,26 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
         if misnamed := _misnamed(slope, unit, velocity_named):
             geared += f"; or it is in {misnamed}, whatever its name says"
         return Units(unit, why, sure, velocity_named, geared, False, sign, ratio)
-    return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
+    return Units(
+        unit,
+        why,
+        sure,
+        velocity_named or VELOCITY_OF[unit],
+        f"{said}, which no units explain",
+        False,
+        sign,
+    )
 
 
 def _turns(slope: float, unit: str, velocity: str) -> float:
-    """Return how far what a velocity is of goes while what an angle is of goes one, in those units."""
+    """Return how far what a velocity is of goes while what an angle is of goes one, in those
+    units."""
     return slope * UNITS[velocity].factor / UNITS[unit].factor
 
 
 def _gear(slope: float, unit: str, velocity: str) -> float | None:
-    """Return the gear that a slope tells where both units are known, in few digits; None where it would be none."""
+    """Return the gear that a slope tells where both units are known, in few digits; None where it
+    would be none."""
     if UNITS[unit].dimension != "angle" or UNITS[velocity].dimension != "angular velocity":
         return None
     ratio = _turns(slope, unit, velocity)
@@ -114,7 +140,8 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
 
 
 def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
-    """Return the unit that a speed would be in were it no motor's; None where none makes such a slope."""
+    """Return the unit that a speed would be in were it no motor's; None where none makes such a
+    slope."""
     fitting = (
         other for other in VELOCITIES
         if other != velocity and UNITS[other].dimension == "angular velocity"
@@ -123,8 +150,11 @@ def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
     return next(fitting, None)
 
 
-def counts_in_a_turn(time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str) -> float | None:
-    """Return the counts in a turn of what the velocity is of, an angle (n,) being in counts; None where none says."""
+def counts_in_a_turn(
+    time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str
+) -> float | None:
+    """Return the counts in a turn of what the velocity is of, an angle (n,) being in counts; None
+    where none says."""
     if UNITS[velocity_unit].dimension != "angular velocity":
         return None
     agreement = integral_agreement(time_s, angle, velocity)
@@ -144,13 +174,18 @@ def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
     if by_step is not None:
         return by_step
     if reach > LARGEST_ANGLE_RAD:
-        return "deg", f"reaches {reach:.4g}, which in rad would be {reach / (2 * np.pi):.1f} turns", False
+        return (
+            "deg",
+            f"reaches {reach:.4g}, which in rad would be {reach / (2 * np.pi):.1f} turns",
+            False,
+        )
     in_degrees = f"in degrees that would be {np.radians(reach):.2g} rad"
     return "rad", f"reaches {reach:.4g}; {in_degrees}. No name says its unit", False
 
 
 def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
-    """Return the unit in which an encoder's steps divide a turn into a power of two; None where none does."""
+    """Return the unit in which an encoder's steps divide a turn into a power of two; None where
+    none does."""
     steps = np.abs(np.diff(np.unique(known)))
     steps = steps[steps > 1e-9 * np.ptp(known)] if len(steps) else steps
     if len(steps) < 5:

@@ -1,4 +1,5 @@
-"""What the name of a column says: its quantity, its joint, its unit, and whether it was measured."""
+"""What the name of a column says: its quantity, its joint, its unit, and whether it was
+measured."""
 
 import re
 import unicodedata
@@ -30,7 +31,8 @@ WORDS: dict[str, frozenset[str]] = {
         "force": "force load kraft last",
     }.items()
 }
-"""Words for each quantity, English, German and French; the first that has one of a name's is meant."""
+"""Words for each quantity, English, German and French; the first that has one of a name's is
+meant."""
 COMMANDED = _words(
     "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll sollwert consigne"
 )
@@ -65,14 +67,19 @@ SLIDES = _words("position displacement travel stroke weg hub course")
 """Words of what may be in metres; the m of ``theta_m`` is a motor's."""
 TWIN = re.compile(r"#\d+$")
 """What tells columns of one name apart."""
-UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
+UMLAUTS = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
+)
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
 AXES = _words("x y z")
 SIGNS = _words("n v w s f")
 """Formula signs, which are no joint's name where a unit says what they stand for: ``n (1/min)``."""
 DIMENSIONS = {
-    **{quantity: {dimension for dimension, of in QUANTITIES.items() if of == quantity} for quantity in WORDS},
+    **{
+        quantity: {dimension for dimension, of in QUANTITIES.items() if of == quantity}
+        for quantity in WORDS
+    },
     "reference": {"angle", "length", "counts"},
     "torque": {"torque", "force", "current", "voltage", "share"},
     "force": {"force", "share"},
@@ -97,7 +104,8 @@ class Meaning:
 
     @property
     def rank(self) -> int:
-        """How good it is as a measurement: what was measured, what may have been, what was filtered, commanded."""
+        """How good it is as a measurement: what was measured, what may have been, what was
+        filtered, commanded."""
         return 3 * self.commanded + 2 * self.filtered + (not self.measured)
 
 
@@ -123,11 +131,20 @@ def meaning(name: str) -> Meaning:
     if said & SOMETHING_ELSE or {"i", "d"} <= said:
         quantity = ""
     elif said & ENABLED or ("on" in said and said & SWITCHED):
-        quantity, words = "enabled", [word for word in words if word not in ENABLED | SWITCHED | {"on"}]
+        quantity, words = (
+            "enabled",
+            [word for word in words if word not in ENABLED | SWITCHED | {"on"}],
+        )
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
-    unit = told.unit if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ()) else None
-    return Meaning(name, quantity, _joint(words), unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
+    unit = (
+        told.unit
+        if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ())
+        else None
+    )
+    return Meaning(
+        name, quantity, _joint(words), unit, commanded, bool(said & FILTERED), bool(said & MEASURED)
+    )
 
 
 def _containers(name: str) -> set[str]:
@@ -137,7 +154,8 @@ def _containers(name: str) -> set[str]:
 
 
 def in_counts(found: Meaning) -> Meaning | None:
-    """Return a column as an angle where its name says nothing but that it is in counts; None where it says else."""
+    """Return a column as an angle where its name says nothing but that it is in counts; None where
+    it says else."""
     told = unit_in(TWIN.sub("", found.column))
     if found.quantity or told is None or told.unit != "counts":
         return None
@@ -182,18 +200,28 @@ def _confirms(told: UnitInName, quantity: str, words: set[str]) -> bool:
 def _split(name: str) -> list[str]:
     """Return the words of a name in plain small letters, compounds like Motordrehzahl apart."""
     plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)
-    plain = "".join(letter for letter in unicodedata.normalize("NFKD", plain) if not unicodedata.combining(letter))
+    plain = "".join(
+        letter
+        for letter in unicodedata.normalize("NFKD", plain)
+        if not unicodedata.combining(letter)
+    )
     words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)
     return [part for word in words for part in _apart(word.lower())]
 
 
 def _words_in(bracket: re.Match[str]) -> str:
-    """Return what stands in brackets where it is words, ``(hip)``, and nothing where it is a unit that nobody knows."""
-    return f" {bracket[1]} " if re.fullmatch(r"[^\W\d_]{3,}(\s+[^\W\d_]{3,})*|\d*", bracket[1].strip()) else " "
+    """Return what stands in brackets where it is words, ``(hip)``, and nothing where it is a unit
+    that nobody knows."""
+    return (
+        f" {bracket[1]} "
+        if re.fullmatch(r"[^\W\d_]{3,}(\s+[^\W\d_]{3,})*|\d*", bracket[1].strip())
+        else " "
+    )
 
 
 def _apart(word: str) -> list[str]:
-    """Return the parts of a compound whose last is known, and whose first is or leaves no doubt about the last."""
+    """Return the parts of a compound whose last is known, and whose first is or leaves no doubt
+    about the last."""
     if word not in KNOWN and word[:-3] in SYMBOLS | AXES and word[-3:] in COMMANDED:
         return [word[:-3], word[-3:]]  # xref
     if word in KNOWN or len(word) < 6:

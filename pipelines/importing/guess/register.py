@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FEW = 0.001
-"""Share of rows in the upper half of a register that make it a signed one; a single one may be a slip."""
+"""Share of rows in the upper half of a register that make it a signed one; a single one may be a
+slip."""
 
 
 def are_whole(values: NDArray) -> bool:
@@ -14,9 +15,11 @@ def are_whole(values: NDArray) -> bool:
 
 
 def lost_sign(values: NDArray) -> int | None:
-    """Return the bits of a signed register, (n,), that was logged as if it had none; None where it was not.
+    """Return the bits of a signed register, (n,), that was logged as if it had none; None where it
+    was not.
 
-    Its values are whole, never negative, and in the upper half as well as near zero, with next to nothing between.
+    Its values are whole, never negative, and in the upper half as well as near zero, with next to
+    nothing between.
     """
     known = values[np.isfinite(values)]
     if np.any(known < 0) or not are_whole(known):

@@ -15,7 +15,8 @@ from pipelines.settings.units import UNITS
 ADVANCES = 0.9
 """Share of the steps of a clock that go forward."""
 ALIKE, UNEVEN = 2.0, 0.1
-"""Stamps have as many rows as usual, and are as far apart, within this factor; of how many may have others."""
+"""Stamps have as many rows as usual, and are as far apart, within this factor; of how many may have
+others."""
 NEAR = 0.1
 """By so much the rates of two clocks of the same rows may differ, as a share."""
 SAID = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
@@ -40,16 +41,25 @@ class TimeGuess:
 
     def stamps(self, values: NDArray) -> NDArray:
         """Return the stamps of rows (n,) in the clock's unit, from what stands in its column."""
-        return values if self.rate_hz is None else np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
+        return (
+            values
+            if self.rate_hz is None
+            else np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
+        )
 
 
 def guess_time(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], told: Mapping[str, str]
 ) -> TimeGuess | None:
-    """Return the clock among columns (n,), in ``told`` units where the file says them; None where none is one."""
+    """Return the clock among columns (n,), in ``told`` units where the file says them; None where
+    none is one."""
     advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
     named_so = [meaning for meaning in meanings if meaning.quantity == "time"]
-    coarse = [m for m in named_so if _stands_still(columns[m.column]) and _is_even(columns[m.column].astype(float))]
+    coarse = [
+        m
+        for m in named_so
+        if _stands_still(columns[m.column]) and _is_even(columns[m.column].astype(float))
+    ]
     named = [meaning for meaning in advancing if meaning.quantity == "time"]
     candidates = named or _finer(advancing, coarse, columns, told) or coarse or advancing
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
@@ -63,40 +73,72 @@ def guess_time(
         rate_hz = _rate_hz(step, chosen)
         rate = f"{rate_hz:.4g} Hz"
         said = SAID.get(told.get(found.column, ""), "its name says so") if unit else ""
-        why = f"{said}: {rate}" if said else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
+        why = (
+            f"{said}: {rate}"
+            if said
+            else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
+        )
         called_so = found.quantity == "time"
         wraps_at, restarts = _breaks(values, chosen)
         usual = _is_usual(rate_hz)
         why += "" if called_so else "; no name says which column is the time"
-        why += "" if usual else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
+        why += (
+            ""
+            if usual
+            else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
+        )
         pause_s = _longest_pause(values) * UNITS[chosen].factor if found in coarse else 0.0
         even = rate_hz if found in coarse else None
-        return TimeGuess(found.column, chosen, why, called_so, called_so and usual, wraps_at, restarts, even, pause_s)
+        return TimeGuess(
+            found.column,
+            chosen,
+            why,
+            called_so,
+            called_so and usual,
+            wraps_at,
+            restarts,
+            even,
+            pause_s,
+        )
     return None
 
 
 def _unit(found: Meaning, told: Mapping[str, str]) -> str | None:
-    """Return the unit of a clock that is known: what the file tells goes before what its name says."""
+    """Return the unit of a clock that is known: what the file tells goes before what its name
+    says."""
     named = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
     return told.get(found.column, named)
 
 
 def _finer(
-    advancing: Sequence[Meaning], coarse: Sequence[Meaning], columns: Mapping[str, NDArray], told: Mapping[str, str]
+    advancing: Sequence[Meaning],
+    coarse: Sequence[Meaning],
+    columns: Mapping[str, NDArray],
+    told: Mapping[str, str],
 ) -> list[Meaning]:
-    """Return the clocks without a name that tell the same rate as a coarse one; what else rises has another."""
-    rates = [rate for m in coarse for _, rate in _usual_rates(m, _step(columns[m.column].astype(float), True), told)]
+    """Return the clocks without a name that tell the same rate as a coarse one; what else rises has
+    another."""
+    rates = [
+        rate
+        for m in coarse
+        for _, rate in _usual_rates(m, _step(columns[m.column].astype(float), True), told)
+    ]
     finer = []
     for found in advancing if rates else ():
         values = columns[found.column].astype(float)
         own = [] if found.quantity else _usual_rates(found, _step(values, False), told)
-        if any(abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1] for unit, hz in own for rate in rates):
+        if any(
+            abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1]
+            for unit, hz in own
+            for rate in rates
+        ):
             finer.append(found)
     return finer
 
 
 def _usual_rates(found: Meaning, step: float, told: Mapping[str, str]) -> list[tuple[str, float]]:
-    """Return the units that a clock of such a step may be in, each with its rate, Hz, where machines have such."""
+    """Return the units that a clock of such a step may be in, each with its rate, Hz, where
+    machines have such."""
     unit = _unit(found, told)
     rates = [(one, _rate_hz(step, one)) for one in ([unit] if unit else clock.usual_units(step))]
     return [(one, rate) for one, rate in rates if _is_usual(rate)]
@@ -124,7 +166,12 @@ def write_time(proposal: Proposal, found: TimeGuess) -> None:
     if found.wraps_at:
         proposal.key("wraps_at", found.wraps_at, "goes back where such a counter is full")
     elif found.restarts:
-        proposal.key("restarts", "longest", 'the clock starts over; "split" makes a recording of each run', sure=False)
+        proposal.key(
+            "restarts",
+            "longest",
+            'the clock starts over; "split" makes a recording of each run',
+            sure=False,
+        )
 
 
 def _how_it_goes(found: TimeGuess) -> str:
@@ -142,7 +189,8 @@ def _advances(values: NDArray) -> bool:
 
 
 def _stands_still(values: NDArray) -> bool:
-    """Tell whether a column (n,) is a clock that is too coarse for its rows: it never goes back, and seldom on."""
+    """Tell whether a column (n,) is a clock that is too coarse for its rows: it never goes back,
+    and seldom on."""
     if values.dtype.kind not in "iuf" or len(values) < 10:
         return False
     steps = np.diff(values.astype(float))
@@ -150,7 +198,8 @@ def _stands_still(values: NDArray) -> bool:
 
 
 def _stamps(values: NDArray) -> tuple[NDArray, NDArray]:
-    """Return how many rows each stamp of a coarse clock (n,) has, (k,), and how far it is to the next, (k,).
+    """Return how many rows each stamp of a coarse clock (n,) has, (k,), and how far it is to the
+    next, (k,).
 
     Rows before the first step and after the last are of stamps that were not seen whole.
     """
@@ -171,9 +220,12 @@ def _is_even(values: NDArray) -> bool:
 
 
 def _longest_pause(values: NDArray) -> float:
-    """Return the longest step of a coarse clock (n,) that is none of its own; 0 where there is none."""
+    """Return the longest step of a coarse clock (n,) that is none of its own; 0 where there is
+    none."""
     _, steps = _stamps(values)
-    return float(np.max(steps[steps > ALIKE * np.median(steps)], initial=0.0)) if len(steps) else 0.0
+    return (
+        float(np.max(steps[steps > ALIKE * np.median(steps)], initial=0.0)) if len(steps) else 0.0
+    )
 
 
 def _step(values: NDArray, coarse: bool) -> float:
@@ -182,9 +234,14 @@ def _step(values: NDArray, coarse: bool) -> float:
         rows, steps = _stamps(values)
         if not len(rows):
             return float((values[-1] - values[0]) / (len(values) - 1))
-        # Around the medians: these alone would round the rows of a stamp, of which there are three or four by turns.
+        # Around the medians: these alone would round the rows of a stamp, of which there are three
+        # or four by turns.
         usual = _alike(rows) & _alike(steps)
-        return float(np.sum(steps[usual]) / np.sum(rows[usual])) if usual.any() else np.median(steps) / np.median(rows)
+        return (
+            float(np.sum(steps[usual]) / np.sum(rows[usual]))
+            if usual.any()
+            else np.median(steps) / np.median(rows)
+        )
     steps = np.diff(values)
     return float(np.median(steps[steps > 0]))
 

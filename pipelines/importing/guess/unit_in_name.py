@@ -1,4 +1,5 @@
-"""The unit that a column's name tells: in brackets, ``I_q (mA)``, after a slash, ``I/mA``, or as a word, ``I_mA``."""
+"""The unit that a column's name tells: in brackets, ``I_q (mA)``, after a slash, ``I/mA``, or as a
+word, ``I_mA``."""
 
 import re
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ class UnitInName:
     unit: str | None
     """None where what stands there is a unit of something else."""
     decides: bool
-    """Whether it says by itself what the column is; a letter or a word may mean something else, and only confirms."""
+    """Whether it says by itself what the column is; a letter or a word may mean something else, and
+    only confirms."""
 
     @property
     def quantity(self) -> str:
@@ -47,12 +49,19 @@ def unit_in(name: str) -> UnitInName | None:
         return None
     unit = _written(found[-1][0])
     rest = f"{name[: found[-1].start()]} {name[found[-1].end() :]}"
-    return UnitInName(rest, unit, found[-1].re is _WORD and (unit is None or _is_plain(found[-1][0], unit)))
+    return UnitInName(
+        rest, unit, found[-1].re is _WORD and (unit is None or _is_plain(found[-1][0], unit))
+    )
 
 
 def _is_plain(text: str, unit: str) -> bool:
-    """Tell whether a word without brackets can hardly be anything but that unit: ticks are of clocks, ms of speed."""
-    return UNITS[unit].dimension not in ("time", "counts") and text.lower() not in ("rev", "turn", "turns")
+    """Tell whether a word without brackets can hardly be anything but that unit: ticks are of
+    clocks, ms of speed."""
+    return UNITS[unit].dimension not in ("time", "counts") and text.lower() not in (
+        "rev",
+        "turn",
+        "turns",
+    )
 
 
 def _written(text: str) -> str | None:
@@ -65,15 +74,23 @@ def _forms() -> dict[str, str]:
     forms = {name: name for name in UNITS if name != "iso8601"} | ALIASES
     for name, unit in list(forms.items()):
         forms |= {name.replace("/", per): unit for per in ("_", "_per_", " per ") if "/" in name}
-        forms |= {name.replace("·", times): unit for times in ("_", "*", ".", "-", " ", "") if "·" in name}
+        forms |= {
+            name.replace("·", times): unit for times in ("_", "*", ".", "-", " ", "") if "·" in name
+        }
     return forms
 
 
 _FORMS = _forms()
 _FOLDED = {text.casefold(): unit for text, unit in _FORMS.items() if len(text) > 1}
-_ALONE = [text for text in [*_FORMS, *OTHERS, *(text.replace("/", "_") for text in OTHERS)] if len(text) > 1]
+_ALONE = [
+    text
+    for text in [*_FORMS, *OTHERS, *(text.replace("/", "_") for text in OTHERS)]
+    if len(text) > 1
+]
 # `in` and `min` are words, and a minimum; in brackets they are units.
-_ANY = "|".join(re.escape(text) for text in sorted(_ALONE, key=len, reverse=True) if text not in ("in", "min"))
+_ANY = "|".join(
+    re.escape(text) for text in sorted(_ALONE, key=len, reverse=True) if text not in ("in", "min")
+)
 _BEFORE, _AFTER = r"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]))", r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
 _WORD = re.compile(rf"{_BEFORE}(?i:{_ANY}){_AFTER}")
 _LETTER = re.compile(r"(?<=[^\W_][_\s./,:-])[smAVNKC°%]$")

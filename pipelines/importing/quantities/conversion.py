@@ -21,9 +21,14 @@ def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
 
 
 def quantity(
-    reading: ReadingSettings, gain: float, columns: Mapping[str, NDArray], where: str, findings: list[Finding]
+    reading: ReadingSettings,
+    gain: float,
+    columns: Mapping[str, NDArray],
+    where: str,
+    findings: list[Finding],
 ) -> NDArray:
-    """Return the quantity (n,) in SI: sign x gain x unit(scale x raw - zero), NaN where the log has none.
+    """Return the quantity (n,) in SI: sign x gain x unit(scale x raw - zero), NaN where the log has
+    none.
 
     ``gain`` is the drive train's: counts per turn, gear ratio, torque constant.
     """
@@ -44,27 +49,37 @@ def quantity(
 
 
 def turn_of_its_counter(reading: ReadingSettings, gain: float) -> float | None:
-    """Return what the quantity is after which the counter starts anew, in SI; None of what does not."""
+    """Return what the quantity is after which the counter starts anew, in SI; None of what does
+    not."""
     unit = unit_named(reading.unit)
     assert unit is not None, "was looked at with the map"
-    return None if reading.wraps_at is None else abs(gain * unit.factor * reading.scale * reading.wraps_at)
+    return (
+        None
+        if reading.wraps_at is None
+        else abs(gain * unit.factor * reading.scale * reading.wraps_at)
+    )
 
 
 def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
-    """Return the raw reading that is a full turn of what an encoder sits on, where the reading is one's."""
+    """Return the raw reading that is a full turn of what an encoder sits on, where the reading is
+    one's."""
     counts = getattr(reading, "counts_per_turn", None) if unit.dimension == "counts" else None
     turn = 2.0 * np.pi / unit.factor if unit.dimension == "angle" else counts
     return () if turn is None else (abs(turn / reading.scale),)
 
 
-def _raw(reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, findings: list[Finding]) -> NDArray:
+def _raw(
+    reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, findings: list[Finding]
+) -> NDArray:
     if reading.column is not None:
         return numbers(columns[reading.column], where, findings)
     expression = Expression(str(reading.expression), f"{where}.expression")
     return expression({name: numbers(columns[name], where, findings) for name in expression.names})
 
 
-def _believed(raw: NDArray, limits: tuple[float, float], where: str, findings: list[Finding]) -> NDArray:
+def _believed(
+    raw: NDArray, limits: tuple[float, float], where: str, findings: list[Finding]
+) -> NDArray:
     outside = (raw < limits[0]) | (raw > limits[1])
     if outside.any():
         seen = f"{counted(int(outside.sum()), 'row')} outside {limits[0]:g} … {limits[1]:g}"

@@ -23,14 +23,16 @@ QUOTED = re.compile(r"`([^`]*)`")
 
 
 class Expression:
-    """Numbers and columns with + - * / and parentheses; a name that is no word stands in backquotes."""
+    """Numbers and columns with + - * / and parentheses; a name that is no word stands in
+    backquotes."""
 
     def __init__(self, text: str, where: str) -> None:
         self._text, self._where = text, where
         self._quoted: list[str] = []
         try:
             self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the parser's, by what it is fed
+        # The parser's, by what it is fed.
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise self._refusal() from error
         self._refuse_what_is_more(self._tree)
 
@@ -56,7 +58,9 @@ class Expression:
     def _value(self, node: Any, columns: Mapping[str, NDArray]) -> Any:
         match node:
             case ast.BinOp():
-                return OPERATORS[type(node.op)](self._value(node.left, columns), self._value(node.right, columns))
+                return OPERATORS[type(node.op)](
+                    self._value(node.left, columns), self._value(node.right, columns)
+                )
             case ast.UnaryOp():
                 return OPERATORS[type(node.op)](self._value(node.operand, columns))
             case ast.Name():
@@ -67,11 +71,16 @@ class Expression:
     def _refuse_what_is_more(self, tree: ast.expr) -> None:
         for node in ast.walk(tree):
             number = isinstance(node, ast.Constant) and _is_number(node.value)
-            known = isinstance(node, ast.BinOp | ast.UnaryOp | ast.Name | ast.Load) or type(node) in OPERATORS
+            known = (
+                isinstance(node, ast.BinOp | ast.UnaryOp | ast.Name | ast.Load)
+                or type(node) in OPERATORS
+            )
             if not (number or known) or (hasattr(node, "op") and type(node.op) not in OPERATORS):
                 raise self._refusal()
         if sum(hasattr(node, "op") for node in ast.walk(tree)) > MOST_OPERATIONS:
-            raise self._refusal(f", at most {MOST_OPERATIONS} of them; write what they make into a column of its own")
+            raise self._refusal(
+                f", at most {MOST_OPERATIONS} of them; write what they make into a column of its own"
+            )
         if not self.names:
             raise self._refusal(", one column at least")
 
@@ -80,7 +89,9 @@ class Expression:
         return SettingsError(f"{self._where}: found {text!r}, {_EXPECTED}{more}")
 
 
-_EXPECTED = "expected numbers and columns with + - * / ( ), names with blanks or signs in `backquotes`"
+_EXPECTED = (
+    "expected numbers and columns with + - * / ( ), names with blanks or signs in `backquotes`"
+)
 
 
 def _is_number(value: Any) -> bool:

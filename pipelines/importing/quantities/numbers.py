@@ -21,7 +21,8 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     """Return the values (n,) as float64, NaN where there is no number."""
     if values.dtype.kind in "biuf":
         return values.astype(float, copy=False)
-    # As text: to pandas a date is a number of nanoseconds, and to nobody who named its column for an angle.
+    # As text: to pandas a date is a number of nanoseconds, and to nobody who named its column for
+    # an angle.
     text = pd.Series(values.astype(str).astype(object) if values.dtype.kind in "mM" else values)
     if _have_thousands(text):
         findings.append(Finding(where, "commas between thousands", "read without them"))
@@ -36,22 +37,28 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
 
 
 def _have_thousands(text: pd.Series) -> bool:
-    """Tell whether numbers have commas between their thousands: all texts with a comma are such, and one has a point.
+    """Tell whether numbers have commas between their thousands: all texts with a comma are such,
+    and one has a point.
 
-    Without a point in one of them a comma may be a decimal one. What has no comma, a number or a word, says nothing.
+    Without a point in one of them a comma may be a decimal one. What has no comma, a number or a
+    word, says nothing.
     """
     written = text.dropna()
     if not pd.api.types.is_string_dtype(written):
         return False
     marked = written[written.str.contains(",", regex=False)]
-    return bool(marked.str.contains(".", regex=False).any()) and bool(marked.str.fullmatch(THOUSANDS).all())
+    return bool(marked.str.contains(".", regex=False).any()) and bool(
+        marked.str.fullmatch(THOUSANDS).all()
+    )
 
 
 def whole_nanoseconds(values: NDArray) -> NDArray:
-    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none.
+    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where
+    there is none.
 
-    ``31.01.2026 12:00:00,125`` is such a date, too: with points between them, days come first everywhere. Times of day
-    without a date are those of one day, and durations are since its beginning.
+    ``31.01.2026 12:00:00,125`` is such a date, too: with points between them, days come first
+    everywhere. Times of day without a date are those of one day, and durations are since its
+    beginning.
     """
     if values.dtype.kind in "iuf":
         return values
@@ -62,6 +69,12 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
     text = text.str.replace(DAYS_FIRST, r"\3-\2-\1", regex=True).str.replace(",", ".", regex=False)
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
     if dates.isna().all():
-        dates = pd.to_datetime("1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True)
+        dates = pd.to_datetime(
+            "1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True
+        )
     stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
-    return stamps.to_numpy() if dates.notna().all() else stamps.where(dates.notna()).to_numpy(dtype=float)
+    return (
+        stamps.to_numpy()
+        if dates.notna().all()
+        else stamps.where(dates.notna()).to_numpy(dtype=float)
+    )

@@ -1,4 +1,5 @@
-"""In which turn of its counter each log of a map begins: what starts anew tells its place within a turn, not which."""
+"""In which turn of its counter each log of a map begins: what starts anew tells its place within a
+turn, not which."""
 
 from collections.abc import Iterator, Mapping
 
@@ -14,8 +15,11 @@ class Beginnings:
     def __init__(self) -> None:
         self._first: dict[str, tuple[float, str]] = {}
 
-    def look_at(self, log: str, columns: Mapping[str, NDArray], turns: Mapping[str, float]) -> Iterator[Finding]:
-        """Yield what begins more than half a turn from where the first log did: it would be nearer in another turn.
+    def look_at(
+        self, log: str, columns: Mapping[str, NDArray], turns: Mapping[str, float]
+    ) -> Iterator[Finding]:
+        """Yield what begins more than half a turn from where the first log did: it would be nearer
+        in another turn.
 
         ``columns`` (n,) are in SI, and ``turns`` what a turn of each counter is in SI.
         """
@@ -27,7 +31,7 @@ class Beginnings:
             first, of = self._first.setdefault(name, (begins, log))
             away = round((begins - first) / turn)
             if away:
-                seen = (
-                    f"begins at {begins:.4g} and in {of} at {first:.4g}, about {abs(away)} of its counter's turns apart"
+                seen = f"begins at {begins:.4g} and in {of} at {first:.4g}, about {abs(away)} of its counter's turns apart"
+                yield Finding(
+                    name, seen, "kept; if all logs begin alike, say with begins_at at which reading"
                 )
-                yield Finding(name, seen, "kept; if all logs begin alike, say with begins_at at which reading")

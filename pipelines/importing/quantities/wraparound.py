@@ -1,4 +1,5 @@
-"""Counters: registers logged without their sign, and readings that start anew at 0 when they are full."""
+"""Counters: registers logged without their sign, and readings that start anew at 0 when they are
+full."""
 
 from collections.abc import Iterable
 
@@ -12,10 +13,11 @@ REGISTERS = tuple(2.0**bits for bits in range(8, 33))
 
 
 def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> NDArray:
-    """Return what a signed register holds, (n,), that was logged as if it had no sign (two's complement).
+    """Return what a signed register holds, (n,), that was logged as if it had no sign (two's
+    complement).
 
-    What no register of so many bits can hold is missing: 4.2949673e9 was a number near 2^32 before its last digits
-    were lost, and its sign is known but not its value.
+    What no register of so many bits can hold is missing: 4.2949673e9 was a number near 2^32 before
+    its last digits were lost, and its sign is known but not its value.
     """
     impossible = (values >= 2.0**bits) | (values < -(2.0 ** (bits - 1)))
     if impossible.any():
@@ -31,10 +33,14 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
     return np.where(impossible, np.nan, found)
 
 
-def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Finding], near: float = 0.0) -> NDArray:
-    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half of it.
+def unwrapped(
+    values: NDArray, modulus: float, where: str, findings: list[Finding], near: float = 0.0
+) -> NDArray:
+    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half
+    of it.
 
-    Which turn it begins in no counter tells: it is the one in which its first reading lies nearest to ``near``.
+    Which turn it begins in no counter tells: it is the one in which its first reading lies nearest
+    to ``near``.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -46,7 +52,9 @@ def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Findin
     found = values.copy()
     found[known] = values[known] + modulus * np.cumsum(turns)
     if wraps:
-        findings.append(Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on"))
+        findings.append(
+            Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on")
+        )
     if turns[0]:
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
@@ -58,8 +66,8 @@ def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Findin
 def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
     """Return at which reading a counter (n,) was full that nobody counted on; None where none was.
 
-    It is one of ``turns`` or, of whole numbers, of registers, and with it counted on the steps at which the counter
-    starts anew are as small as all others.
+    It is one of ``turns`` or, of whole numbers, of registers, and with it counted on the steps at
+    which the counter starts anew are as small as all others.
     """
     known = values[np.isfinite(values)]
     steps = np.abs(np.diff(known))

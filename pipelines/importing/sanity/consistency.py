@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 SPAN = 20
-"""Samples over which a velocity is integrated: long against the noise of an angle, short against drift."""
+"""Samples over which a velocity is integrated: long against the noise of an angle, short against
+drift."""
 MOST = 200_000
 """Rows that are looked at, from the middle of the log."""
 MOST_SCREENED, FEWEST_SCREENED = 2_000_000, 1_000
-"""Numbers that all columns may have together where all pairs of many are compared, and rows that each has at least."""
+"""Numbers that all columns may have together where all pairs of many are compared, and rows that
+each has at least."""
 BLOCK = 256
 LIKELY, MOST_LIKELY = 0.5, 100
 """Share of the variance above which a pair wants a second look, and how many do at most."""
@@ -28,8 +30,8 @@ class Agreement:
 def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Agreement | None:
     """Compare steps of an angle (n,) with the integral of a velocity (n,) over them, in any units.
 
-    ``slope`` is velocity's integral for a unit of angle: 1 where units and signs agree, -1 where signs differ.
-    None where nothing moves.
+    ``slope`` is velocity's integral for a unit of angle: 1 where units and signs agree, -1 where
+    signs differ. None where nothing moves.
     """
     time_s, angle, velocity = whole_rows(time_s, angle, velocity)
     if len(time_s) < 5 * SPAN:
@@ -40,10 +42,11 @@ def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Ag
 def likeliest_integrals(
     time_s: NDArray, angles: Sequence[NDArray], velocities: Sequence[NDArray]
 ) -> list[tuple[int, int]]:
-    """Return which of many angles (n,) and velocities (n,) may agree as `integral_agreement` has it, by their numbers.
+    """Return which of many angles (n,) and velocities (n,) may agree as `integral_agreement` has
+    it, by their numbers.
 
-    All are compared at once, at fewer instants and with straight lines where a column has no number: what is left
-    wants a second look.
+    All are compared at once, at fewer instants and with straight lines where a column has no
+    number: what is left wants a second look.
     """
     time_s, *columns = _middle(time_s, *angles, *velocities)
     if len(time_s) < 5 * SPAN:
@@ -54,25 +57,34 @@ def likeliest_integrals(
     ways = _of_length_one([_way(time_s, velocity)[some] for velocity in whole[len(angles) :]])
     likely: list[tuple[float, int, int]] = []
     for first in range(0, len(steps), BLOCK):  # thousands of columns have millions of pairs
-        shares = np.square(np.maximum(steps[first : first + BLOCK] @ ways.T, 0.0))  # backwards no velocity is one
+        # Backwards no velocity is one.
+        shares = np.square(np.maximum(steps[first : first + BLOCK] @ ways.T, 0.0))
         best = np.argsort(shares, axis=None)[-MOST_LIKELY:]
         rows, others = np.unravel_index(best[shares.flat[best] > LIKELY], shares.shape)
-        found = ((float(shares[i, j]), first + int(i), int(j)) for i, j in zip(rows, others, strict=True))
+        found = (
+            (float(shares[i, j]), first + int(i), int(j)) for i, j in zip(rows, others, strict=True)
+        )
         likely = sorted([*likely, *found], reverse=True)[:MOST_LIKELY]
     return sorted((angle, velocity) for _, angle, velocity in likely)
 
 
 def _on_straight_lines(values: NDArray) -> NDArray:
-    """Return values (n,) with what is between two of them where there is none; zeros where no two are known."""
+    """Return values (n,) with what is between two of them where there is none; zeros where no two
+    are known."""
     known = np.isfinite(values)
     # What moves somewhere in the log may have no number in its middle.
     if np.count_nonzero(known) < 2:
         return np.zeros_like(values)
-    return values if known.all() else np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
+    return (
+        values
+        if known.all()
+        else np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
+    )
 
 
 def _of_length_one(rows: Sequence[NDArray]) -> NDArray:
-    """Return vectors (n,) as the rows of a matrix, each divided by its length; those of no length are left."""
+    """Return vectors (n,) as the rows of a matrix, each divided by its length; those of no length
+    are left."""
     matrix = np.array(rows)
     lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
     return np.divide(matrix, lengths, out=np.zeros_like(matrix), where=lengths > 0.0)
@@ -80,7 +92,9 @@ def _of_length_one(rows: Sequence[NDArray]) -> NDArray:
 
 def _way(time_s: NDArray, velocity: NDArray) -> NDArray:
     """Return how far a velocity (n,) goes in each span of samples."""
-    travel = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))])
+    travel = np.concatenate(
+        [[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))]
+    )
     return travel[SPAN:] - travel[:-SPAN]
 
 
@@ -93,10 +107,11 @@ def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
 
 
 def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
-    """Return mean and mean magnitude, W, of torque (n,) N·m times the derivative of the angle (n,) rad at times (n,) s.
+    """Return mean and mean magnitude, W, of torque (n,) N·m times the derivative of the angle (n,)
+    rad at times (n,) s.
 
-    What a drive delivers between two instants of equal state can only have gone into friction: the mean is positive
-    where the signs of both columns agree.
+    What a drive delivers between two instants of equal state can only have gone into friction: the
+    mean is positive where the signs of both columns agree.
     """
     time_s, angle, torque = whole_rows(time_s, angle, torque)
     if len(time_s) < 5 * SPAN:
@@ -108,7 +123,8 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:
-    """Return the rows of columns (n,), from the middle of the log, in which every column has a number."""
+    """Return the rows of columns (n,), from the middle of the log, in which every column has a
+    number."""
     columns = _middle(*columns)
     known = np.all([np.isfinite(column) for column in columns], axis=0)
     return [column[known] for column in columns]

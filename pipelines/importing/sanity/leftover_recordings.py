@@ -1,4 +1,5 @@
-"""What stands in the folder after an import: what an earlier one left, and what a verdict still lacks."""
+"""What stands in the folder after an import: what an earlier one left, and what a verdict still
+lacks."""
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -16,7 +17,8 @@ Metadata = Mapping[str, Mapping[str, Any]]
 
 
 def no_longer_made(found: Metadata, made: Collection[str]) -> list[str]:
-    """Return the files found that were made of the same logs as ``made`` were, by a map that named them so."""
+    """Return the files found that were made of the same logs as ``made`` were, by a map that named
+    them so."""
     logs = {sha for name in made for sha in found[name]["imported"]["sha256"]}
     return [
         f"{name}.parquet"

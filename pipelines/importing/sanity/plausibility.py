@@ -12,15 +12,19 @@ from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
 ALIKE = 0.5
-"""Share of the variance that velocity and angle must have in common before their slope is judged."""
+"""Share of the variance that velocity and angle must have in common before their slope is
+judged."""
 OFF = 0.15
 """By so much the slope between both may be off 1: a filter in the drive, a late sample."""
 STRONGEST = {"torque": 1e3, "force": 1e5}
-"""N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in another unit."""
+"""N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in
+another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
-"""Play and bending of a gear or a screw are as much: of a joint that moves less nothing is learnt."""
+"""Play and bending of a gear or a screw are as much: of a joint that moves less nothing is
+learnt."""
 FAR = 20.0
-"""Times further off the middle than 99 % of a column's rows: no motion or load of a machine does that once."""
+"""Times further off the middle than 99 % of a column's rows: no motion or load of a machine does
+that once."""
 GIVES_BACK = 0.2
 """Share of the mean magnitude of power that a drive may take out of a motion, on the whole."""
 
@@ -36,19 +40,30 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     yield from _power(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     known = mechanisms_of(joints)
-    if any(mechanism.has_length for mechanism in known) and settings.geometry.thigh_length_m is None:
+    if (
+        any(mechanism.has_length for mechanism in known)
+        and settings.geometry.thigh_length_m is None
+    ):
         why = "later stages take that of exoid.toml, or of the paper's leg"
-        yield Finding("geometry", "no thigh_length_m, from the first joint's axis to the second's", why)
+        yield Finding(
+            "geometry", "no thigh_length_m, from the first joint's axis to the second's", why
+        )
     if not known:
         seen = f"{in_words(joints)}, and of the mechanisms that exoid knows none has these: {known_in_words()}"
-        yield Finding("joints", seen, "kept; exoid filter takes them, exoid identify and exoid diagnose do not")
+        yield Finding(
+            "joints",
+            seen,
+            "kept; exoid filter takes them, exoid identify and exoid diagnose do not",
+        )
 
 
 def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
-            yield Finding(name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it")
+            yield Finding(
+                name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it"
+            )
 
 
 def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
@@ -87,21 +102,35 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
     reach = float(np.quantile(np.abs(_thinned(columns[name])), 0.99))
     if reach > STRONGEST[quantity]:
         seen = f"reaches {reach:.4g} {unit}, and drives of legs, arms and robots at most some {STRONGEST[quantity]:g}"
-        yield Finding(name, seen, f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant")
+        yield Finding(
+            name,
+            seen,
+            f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant",
+        )
 
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     name, angle = joint.joint.column("velocity"), joint.joint.column("angle")
-    found = integral_agreement(columns["time_s"], columns[angle], columns[name]) if name in columns else None
+    found = (
+        integral_agreement(columns["time_s"], columns[angle], columns[name])
+        if name in columns
+        else None
+    )
     if found is not None and found.explained > ALIKE and abs(found.slope - 1.0) > OFF:
         seen = f"integrates to {found.slope:.3g} times the way that {angle} goes"
-        yield Finding(name, seen, "kept; check unit, sign and gear_ratio of both, and the unit of time")
+        yield Finding(
+            name, seen, "kept; check unit, sign and gear_ratio of both, and the unit of time"
+        )
 
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
     """Tell of drives that together brake: one alone may, where another moves what it carries."""
     powers = [
-        mean_power(columns["time_s"], columns[joint.joint.column("angle")], columns[joint.joint.column("torque")])
+        mean_power(
+            columns["time_s"],
+            columns[joint.joint.column("angle")],
+            columns[joint.joint.column("torque")],
+        )
         for joint in joints
     ]
     mean, size = (sum(values) for values in zip(*powers, strict=True))

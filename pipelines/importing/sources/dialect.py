@@ -1,4 +1,5 @@
-"""How a text file is written: encoding, delimiter, decimal point, comments, and where its header stands."""
+"""How a text file is written: encoding, delimiter, decimal point, comments, and where its header
+stands."""
 
 import csv
 import re
@@ -22,7 +23,8 @@ NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "
 STRAY = 0.1
 """Share of NUL bytes up to which a file may be a text with slips; of UTF-16 they are half."""
 ENOUGH = 0.5
-"""Share of a row's fields that are numbers, in a row of data; the others are dates, states and comments."""
+"""Share of a row's fields that are numbers, in a row of data; the others are dates, states and
+comments."""
 
 UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
 """What may be a unit where nobody knows it: in brackets, or short."""
@@ -68,30 +70,48 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     try:
         lines = start.decode(encoding, errors="replace").splitlines()
     except LookupError as error:
-        raise InputError(f"source.encoding: found {encoding!r}, expected one such as utf-8") from error
+        raise InputError(
+            f"source.encoding: found {encoding!r}, expected one such as utf-8"
+        ) from error
     lines = lines if whole else lines[:-1]
     skipped = settings.skip_rows or 0
-    guesses = _tables(lines[skipped:], [settings.delimiter] if settings.delimiter else DELIMITERS, settings)
+    guesses = _tables(
+        lines[skipped:], [settings.delimiter] if settings.delimiter else DELIMITERS, settings
+    )
     if not guesses and not settings.delimiter:
-        guesses = _tables(lines[skipped:], sorted(set(RARE.findall("".join(lines[skipped:])))), settings)
+        guesses = _tables(
+            lines[skipped:], sorted(set(RARE.findall("".join(lines[skipped:])))), settings
+        )
     if not guesses:
         raise InputError(_why_there_is_none(lines, settings))
     table = max(guesses, key=lambda guess: guess.fields_of_numbers)
     names = settings.columns or table.header(lines[skipped:])
     if len(names) != table.width:
-        raise InputError(f"has {table.width} columns, but source.columns names {len(names)}; name each of them")
+        raise InputError(
+            f"has {table.width} columns, but source.columns names {len(names)}; name each of them"
+        )
     notes = [f"delimiter {table.delimiter!r}, decimal {table.decimal!r}, {encoding}"]
     if names == table.numbered:
         notes.append("no header: columns are named c1, c2, ...")
     comment = settings.comment or _comment(lines)
     if twice := [name for name, times in Counter(names).items() if times > 1]:
-        notes.append(f"columns that stand twice are {', '.join(f'{name}#1, {name}#2' for name in twice)}")
+        notes.append(
+            f"columns that stand twice are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
+        )
     return Dialect(
-        encoding, table.delimiter, table.decimal, comment, skipped + table.first, _told_apart(names), tuple(notes)
+        encoding,
+        table.delimiter,
+        table.decimal,
+        comment,
+        skipped + table.first,
+        _told_apart(names),
+        tuple(notes),
     )
 
 
-def _tables(lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings) -> list["_Table"]:
+def _tables(
+    lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings
+) -> list["_Table"]:
     return [table for delimiter in delimiters if (table := _Table.of(lines, delimiter, settings))]
 
 
@@ -113,7 +133,8 @@ def _encoding(start: bytes) -> str:
 
 
 def _is_stray(nuls: int, start: bytes) -> bool:
-    """Tell whether NUL bytes are slips in a text, as where a disk was full: few, and after a header without any."""
+    """Tell whether NUL bytes are slips in a text, as where a disk was full: few, and after a header
+    without any."""
     return nuls < STRAY * len(start) and b"\0" not in start.partition(b"\n")[0]
 
 
@@ -149,13 +170,17 @@ class _Table:
     @classmethod
     def of(cls, lines: Sequence[str], delimiter: str, settings: SourceSettings) -> "_Table | None":
         """Return the table that a delimiter makes of some lines; None where there is none."""
-        decimals = [settings.decimal] if settings.decimal else ["."] if delimiter == "," else [".", ","]
+        decimals = (
+            [settings.decimal] if settings.decimal else ["."] if delimiter == "," else [".", ","]
+        )
         found = [table for decimal in decimals if (table := cls._with(lines, delimiter, decimal))]
         return max(found, key=lambda table: table.fields_of_numbers, default=None)
 
     @classmethod
     def _with(cls, lines: Sequence[str], delimiter: str, decimal: str) -> "_Table | None":
-        rows = [(k, _fields(line, delimiter)) for k, line in enumerate(lines) if not _is_comment(line)]
+        rows = [
+            (k, _fields(line, delimiter)) for k, line in enumerate(lines) if not _is_comment(line)
+        ]
         data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
         if not data:
             return None
@@ -170,22 +195,32 @@ class _Table:
         return tuple(f"c{k + 1}" for k in range(self.width))
 
     def header(self, lines: Sequence[str]) -> tuple[str, ...]:
-        """Return the names above the rows: the last line of as many fields, and if that is of units the one before."""
-        above = [_fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter) for line in lines[: self.first]]
+        """Return the names above the rows: the last line of as many fields, and if that is of units
+        the one before."""
+        above = [
+            _fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter)
+            for line in lines[: self.first]
+        ]
         fitting = [fields for fields in above if len(fields) == self.width and any(fields)]
         if not fitting:
             return self.numbered
         names, *before = reversed(fitting)
         names = [name or number for name, number in zip(names, self.numbered, strict=True)]
         if before and all(unit_named(field) or re.fullmatch(UNIT, field) for field in names):
-            names = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(before[0], names, strict=True)]
+            names = [
+                f"{name} [{unit.strip('[]()')}]"
+                for name, unit in zip(before[0], names, strict=True)
+            ]
         return tuple(names)
 
 
 def _fields(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
-    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+    return [
+        field.strip()
+        for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    ]
 
 
 def _is_comment(line: str) -> bool:
@@ -194,7 +229,9 @@ def _is_comment(line: str) -> bool:
 
 def _are_numbers(fields: list[str], decimal: str) -> bool:
     numbers = sum(_is_number(field, decimal) for field in fields)
-    return numbers >= 2 and numbers >= ENOUGH * sum(field.lower() not in NOT_A_NUMBER for field in fields)
+    return numbers >= 2 and numbers >= ENOUGH * sum(
+        field.lower() not in NOT_A_NUMBER for field in fields
+    )
 
 
 def _is_number(field: str, decimal: str) -> bool:
@@ -203,7 +240,8 @@ def _is_number(field: str, decimal: str) -> bool:
 
 
 def _told_apart(names: Sequence[str]) -> tuple[str, ...]:
-    """Give names that stand twice a number: of two ``q`` the first is ``q#1``, the other ``q#2``."""
+    """Give names that stand twice a number: of two ``q`` the first is ``q#1``, the other
+    ``q#2``."""
     times, seen = Counter(names), Counter[str]()
     apart = []
     for name in names:

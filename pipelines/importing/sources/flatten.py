@@ -10,7 +10,8 @@ from pipelines.importing.sources.source import Columns
 
 
 def flattened(content: Any, name: str = "") -> Columns:
-    """Return every array (n,) of numbers, or of text, below an object; what is something else is left out."""
+    """Return every array (n,) of numbers, or of text, below an object; what is something else is
+    left out."""
     return dict(_columns(content, name))
 
 
@@ -26,7 +27,11 @@ def _columns(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _is_list_of_records(content: Any) -> bool:
-    return isinstance(content, list) and bool(content) and all(isinstance(row, Mapping) for row in content)
+    return (
+        isinstance(content, list)
+        and bool(content)
+        and all(isinstance(row, Mapping) for row in content)
+    )
 
 
 def _transposed(records: Sequence[Mapping]) -> dict[str, list]:
@@ -37,7 +42,8 @@ def _transposed(records: Sequence[Mapping]) -> dict[str, list]:
 
 
 def _filled(values: list) -> list:
-    """Give records, and lists of numbers, where there are none, so that what is below them has as many rows."""
+    """Give records, and lists of numbers, where there are none, so that what is below them has as
+    many rows."""
     whole = next((value for value in values if isinstance(value, Mapping | list)), None)
     if whole is None:
         return values

@@ -16,7 +16,8 @@ MATLAB_CLASSES_OF_NUMBERS = (b"double", b"single", b"logical", *(f"{s}int{b}".en
 
 
 def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Source:
-    """Return the log in an HDF5 file; a data set in groups has a name with slashes, ``run1/hip/angle``.
+    """Return the log in an HDF5 file; a data set in groups has a name with slashes,
+    ``run1/hip/angle``.
 
     Raises
     ------
@@ -28,7 +29,11 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
         with h5py.File(path) as file:
             below = _group(file, settings.table)
             sets = _data_sets(below)
-            columns = {name: data for data in sets for name in flattened(_values(below[data], sample=True), data)}
+            columns = {
+                name: data
+                for data in sets
+                for name in flattened(_values(below[data], sample=True), data)
+            }
     except OSError as error:
         raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
 
@@ -36,7 +41,11 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
         with h5py.File(path) as file:
             below = _group(file, settings.table)
             wanted = dict.fromkeys(columns[name] for name in names)
-            found = {name: values for data in wanted for name, values in flattened(_values(below[data]), data).items()}
+            found = {
+                name: values
+                for data in wanted
+                for name, values in flattened(_values(below[data]), data).items()
+            }
         return {name: found[name] for name in names}
 
     return Source(path, format, tuple(columns), load)
@@ -46,7 +55,9 @@ def _group(file: Any, table: str | None) -> Any:
     if table is None:
         return file
     if table not in file:
-        raise InputError(f"has no group {table!r}, which source.table names; it has {', '.join(file)}")
+        raise InputError(
+            f"has no group {table!r}, which source.table names; it has {', '.join(file)}"
+        )
     if not hasattr(file[table], "visititems"):
         raise InputError(
             f"source.table names {table!r}, which is a data set, expected the group that holds it; leave source.table "
@@ -71,11 +82,14 @@ def _data_sets(group: Any) -> list[str]:
 def _is_of_numbers(data: Any) -> bool:
     kinds = [data.dtype[field] for field in data.dtype.names] if data.dtype.names else [data.dtype]
     matlab = data.attrs.get("MATLAB_class")
-    return all(kind.kind in "biuf" for kind in kinds) and (matlab is None or matlab in MATLAB_CLASSES_OF_NUMBERS)
+    return all(kind.kind in "biuf" for kind in kinds) and (
+        matlab is None or matlab in MATLAB_CLASSES_OF_NUMBERS
+    )
 
 
 def _values(data: Any, sample: bool = False) -> np.ndarray:
-    """Return a data set's values, of which a few rows tell the shape; MATLAB's have their axes the other way round."""
+    """Return a data set's values, of which a few rows tell the shape; MATLAB's have their axes the
+    other way round."""
     if "MATLAB_class" in data.attrs and data.ndim > 1:
         return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
     return np.empty(data.shape, dtype=data.dtype) if sample else data[()]

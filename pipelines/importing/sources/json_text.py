@@ -23,11 +23,17 @@ def open_json(path: Path, settings: SourceSettings) -> Source:
     try:
         columns = _flattened(_content(path), settings.table)
     except RecursionError as error:
-        raise InputError("nests lists or tables deeper than any log does; write it again, flatter") from error
+        raise InputError(
+            "nests lists or tables deeper than any log does; write it again, flatter"
+        ) from error
     if set(columns) == {""}:
-        raise InputError("is a list of numbers without names, expected records with keys, or lists under names")
+        raise InputError(
+            "is a list of numbers without names, expected records with keys, or lists under names"
+        )
     notes = (f"records under {settings.table}",) if settings.table else ()
-    return Source(path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
+    return Source(
+        path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes
+    )
 
 
 def _content(path: Path) -> Any:
@@ -43,11 +49,16 @@ def _content(path: Path) -> Any:
 
 
 def _flattened(content: Any, table: str | None) -> Columns:
-    """Return columns by their names below the table; where none is named, of the only one that has records."""
+    """Return columns by their names below the table; where none is named, of the only one that has
+    records."""
     if table is None:
         columns = flattened(content)
         prefixes = {name.partition(".")[0] for name, values in columns.items() if len(values) > 1}
-        if isinstance(content, Mapping) and len(prefixes) == 1 and isinstance(content[next(iter(prefixes))], list):
+        if (
+            isinstance(content, Mapping)
+            and len(prefixes) == 1
+            and isinstance(content[next(iter(prefixes))], list)
+        ):
             table = next(iter(prefixes))
         else:
             return columns
@@ -62,4 +73,6 @@ def _flattened(content: Any, table: str | None) -> Columns:
 
 
 def _has_keys(below: Any) -> bool:
-    return isinstance(below, Mapping) or (isinstance(below, list) and bool(below) and isinstance(below[0], Mapping))
+    return isinstance(below, Mapping) or (
+        isinstance(below, list) and bool(below) and isinstance(below[0], Mapping)
+    )

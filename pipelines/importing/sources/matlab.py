@@ -15,7 +15,8 @@ V73 = b"MATLAB 7.3"
 
 
 def open_matlab(path: Path, settings: SourceSettings) -> Source:
-    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a matrix numbered ones.
+    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a
+    matrix numbered ones.
 
     Raises
     ------
@@ -40,4 +41,6 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
             )
         variables = variables[settings.table]
     columns = flattened(variables)
-    return Source(path, "MATLAB", tuple(columns), lambda names: {name: columns[name] for name in names})
+    return Source(
+        path, "MATLAB", tuple(columns), lambda names: {name: columns[name] for name in names}
+    )

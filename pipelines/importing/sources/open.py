@@ -35,10 +35,15 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
         raise InputError(f"no such file; {similar_file(path) or 'check the name'}")
     if path.is_dir():
         if not (path / "metadata.yaml").exists():
-            raise InputError("is a folder, expected a log or the folder of a ROS 2 bag; name a file in it")
+            raise InputError(
+                "is a folder, expected a log or the folder of a ROS 2 bag; name a file in it"
+            )
         return _with_columns(open_rosbag(path, settings))
-    if not path.is_file():  # it is read more than once, and what nobody writes to is waited for without end
-        raise InputError("is a pipe or a device, expected a file; write what comes out of it to one, and name that")
+    # It is read more than once, and what nobody writes to is waited for without end.
+    if not path.is_file():
+        raise InputError(
+            "is a pipe or a device, expected a file; write what comes out of it to one, and name that"
+        )
     with open(path, "rb") as file:
         start = file.read(64)
     if not start:
@@ -49,7 +54,9 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
     if path.suffix == ".mat":  # v4 has no signature
         return _with_columns(open_matlab(path, settings))
     is_json = start.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
-    return _with_columns((open_json if is_json and b"\0" not in start else open_text)(path, settings))
+    return _with_columns(
+        (open_json if is_json and b"\0" not in start else open_text)(path, settings)
+    )
 
 
 def _with_columns(source: Source) -> Source:

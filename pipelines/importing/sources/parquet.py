@@ -16,7 +16,8 @@ from pipelines.settings.import_map import SourceSettings
 
 
 def open_parquet(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list numbered ones.
+    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list
+    numbered ones.
 
     Raises
     ------
@@ -30,11 +31,17 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
     if any(pa.types.is_nested(field.type) for field in empty.schema):
         with _damage_told():
             columns = flattened(_opened(path).read().to_pydict())
-        return Source(path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names})
+        return Source(
+            path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names}
+        )
 
     def load(names: Sequence[str]) -> Columns:
         file = _opened(path)
-        tops = [top for top in file.schema_arrow.names if any(f"{name}.".startswith(f"{top}.") for name in names)]
+        tops = [
+            top
+            for top in file.schema_arrow.names
+            if any(f"{name}.".startswith(f"{top}.") for name in names)
+        ]
         with _damage_told():
             table = _unnested(file.read(columns=tops))
         return {name: _numpy(table.column(name)) for name in names}
@@ -55,7 +62,9 @@ def _damage_told() -> Iterator[None]:
     except (pa.ArrowException, OSError) as error:
         if isinstance(error, OSError) and error.errno is not None:
             raise  # the system's word: no permission, no such file
-        raise InputError(f"is a damaged or truncated Parquet file ({error}); copy it again") from error
+        raise InputError(
+            f"is a damaged or truncated Parquet file ({error}); copy it again"
+        ) from error
 
 
 def _refuse_twins(names: Sequence[str]) -> None:

@@ -1,4 +1,5 @@
-"""Logs of ROS 2: sensor_msgs/JointState out of bags (.mcap, .db3, or the folder that holds them)."""
+"""Logs of ROS 2: sensor_msgs/JointState out of bags (.mcap, .db3, or the folder that holds
+them)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,8 +20,8 @@ QUANTITIES = ("position", "velocity", "effort")
 def open_rosbag(path: Path, settings: SourceSettings) -> Source:
     """Return the joint states in a bag.
 
-    Columns are ``JOINT.position``, ``.velocity`` and ``.effort``; ``stamp`` is the header's time and ``log_time``
-    when the message was recorded, both in whole nanoseconds.
+    Columns are ``JOINT.position``, ``.velocity`` and ``.effort``; ``stamp`` is the header's time
+    and ``log_time`` when the message was recorded, both in whole nanoseconds.
 
     Raises
     ------
@@ -34,14 +35,23 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
             topic = _topic(reader, settings.table)
             connections = [c for c in reader.connections if c.topic == topic]
             columns = _columns(
-                (received, reader.deserialize(raw, c.msgtype)) for c, received, raw in reader.messages(connections)
+                (received, reader.deserialize(raw, c.msgtype))
+                for c, received, raw in reader.messages(connections)
             )
     except InputError:
         raise
     except Exception as error:  # a damaged bag makes its library fail in any way
-        raise InputError(f"is no ROS 2 bag that can be read ({error}); record or copy it again") from error
+        raise InputError(
+            f"is no ROS 2 bag that can be read ({error}); record or copy it again"
+        ) from error
     notes = (f"topic {topic}",)
-    return Source(path, "ROS 2 bag", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
+    return Source(
+        path,
+        "ROS 2 bag",
+        tuple(columns),
+        lambda names: {name: columns[name] for name in names},
+        notes,
+    )
 
 
 def _topic(reader: Any, named: str | None) -> str:
@@ -52,15 +62,20 @@ def _topic(reader: Any, named: str | None) -> str:
         raise InputError(f"holds no {JOINT_STATE}, but {others}; record the joint states too")
     if named is None:
         if len(topics) > 1:
-            raise InputError(f"has joint states on {', '.join(topics)}; name one in the map: source.table")
+            raise InputError(
+                f"has joint states on {', '.join(topics)}; name one in the map: source.table"
+            )
         return topics[0]
     if named not in topics:
-        raise InputError(f"has no topic {named!r}, which source.table names; {suggestion(named, topics)}")
+        raise InputError(
+            f"has no topic {named!r}, which source.table names; {suggestion(named, topics)}"
+        )
     return named
 
 
 def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
-    """Return a column of each joint's quantity; messages may name their joints in any order, or only some."""
+    """Return a column of each joint's quantity; messages may name their joints in any order, or
+    only some."""
     stamps: list[int] = []
     received: list[int] = []
     values: dict[str, dict[int, float]] = {}

@@ -21,7 +21,9 @@ CHUNK = 2**17
 def open_text(path: Path, settings: SourceSettings) -> Source:
     """Return the log in a text file, in the dialect that was found or told."""
     dialect = find_dialect(path, settings)
-    return Source(path, "text", dialect.names, lambda names: _load(path, dialect, names), dialect.notes)
+    return Source(
+        path, "text", dialect.names, lambda names: _load(path, dialect, names), dialect.notes
+    )
 
 
 def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
@@ -37,7 +39,9 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
         with reader:
             for part in reader:
                 if part[BEYOND].notna().any():
-                    raise InputError(_too_many_fields(f"row {part[BEYOND].notna().idxmax()}", dialect))
+                    raise InputError(
+                        _too_many_fields(f"row {part[BEYOND].notna().idxmax()}", dialect)
+                    )
                 # Each column by itself: out of a table of thousands it takes long to take one.
                 parts.append({name: part[name].to_numpy().copy() for name in wanted})
     except (pd.errors.ParserError, ValueError) as error:

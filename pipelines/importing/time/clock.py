@@ -15,8 +15,8 @@ from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 
 RESTART_S, RESTART_PERIODS, RESTART_ROWS = 1.0, 20, 20
-"""A clock that steps back by more than the longer of the first two starts over, and one that stays behind for more rows
-than the third; a smaller step is of rows that arrived out of order."""
+"""A clock that steps back by more than the longer of the first two starts over, and one that stays
+behind for more rows than the third; a smaller step is of rows that arrived out of order."""
 LEAD_ROWS, LEAD_PERIODS, LEAD_S = 5, 20, 0.2
 """So few rows, so long before the rest, are no part of the run."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
@@ -49,8 +49,13 @@ class Run:
 
 
 def usual_units(step: float) -> list[str]:
-    """Return the units in which a step from one stamp to the next makes a rate that machines are sampled at."""
-    return [unit for unit in ("s", "ms", "us", "ns") if SLOWEST_HZ <= 1.0 / (step * UNITS[unit].factor) <= FASTEST_HZ]
+    """Return the units in which a step from one stamp to the next makes a rate that machines are
+    sampled at."""
+    return [
+        unit
+        for unit in ("s", "ms", "us", "ns")
+        if SLOWEST_HZ <= 1.0 / (step * UNITS[unit].factor) <= FASTEST_HZ
+    ]
 
 
 def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
@@ -63,11 +68,18 @@ def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
     """
     holds = _held(raw)
     # Dates and durations that a file tells as such are whole nanoseconds too.
-    fits = {"dates": unit == "iso8601", "durations": False, "plain numbers": unit != "iso8601", "": True}[holds]
+    fits = {
+        "dates": unit == "iso8601",
+        "durations": False,
+        "plain numbers": unit != "iso8601",
+        "": True,
+    }[holds]
     if fits or (raw.dtype.kind in "mM" and unit == "ns"):
         return
     known = raw[~pd.isna(raw)]
-    right = {"dates": ["iso8601"], "durations": ["ns"]}.get(holds) or _usual(numbers(known, column, []))
+    right = {"dates": ["iso8601"], "durations": ["ns"]}.get(holds) or _usual(
+        numbers(known, column, [])
+    )
     raise SettingsError(
         f"{column!r} holds {holds}, the first {str(known[0])[:LONGEST]!r}, and time.unit = {unit!r} in the map says "
         f"otherwise; set it to {' or '.join(right)}"
@@ -75,14 +87,16 @@ def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
 
 
 def _usual(known: NDArray) -> list[str]:
-    """Return the units in which stamps (n,) that are numbers make a usual rate; all of them where in none."""
+    """Return the units in which stamps (n,) that are numbers make a usual rate; all of them where
+    in none."""
     steps = np.diff(known)
     steps = steps[steps > 0.0]
     return (usual_units(float(np.median(steps))) if len(steps) else []) or ["s", "ms", "us", "ns"]
 
 
 def _held(raw: NDArray) -> str:
-    """Return what a column (n,) of stamps holds: dates, durations or plain numbers; nothing where it does not say."""
+    """Return what a column (n,) of stamps holds: dates, durations or plain numbers; nothing where
+    it does not say."""
     if raw.dtype.kind in "biufmM":
         return {"M": "dates", "m": "durations"}.get(raw.dtype.kind, "plain numbers")
     some = raw[~pd.isna(raw)][:FEW]
@@ -92,8 +106,8 @@ def _held(raw: NDArray) -> str:
 
 
 def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDArray:
-    """Return time stamps (n,) as numbers in the map's unit; whole numbers stay whole, for nanoseconds since 1970 are
-    more than a float64 can tell apart.
+    """Return time stamps (n,) as numbers in the map's unit; whole numbers stay whole, for
+    nanoseconds since 1970 are more than a float64 can tell apart.
 
     Raises
     ------
@@ -110,7 +124,8 @@ def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDA
 
 
 def whole(found: NDArray) -> NDArray:
-    """Return whole stamps (n,) as int64: of narrower numbers, and of those without a sign, a difference wraps round.
+    """Return whole stamps (n,) as int64: of narrower numbers, and of those without a sign, a
+    difference wraps round.
 
     Raises
     ------
@@ -125,8 +140,11 @@ def whole(found: NDArray) -> NDArray:
     return found.astype(np.int64)
 
 
-def seconds(found: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]) -> NDArray:
-    """Return stamps (n,) as seconds since ``origin``, which is a stamp too; NaN where there is none."""
+def seconds(
+    found: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]
+) -> NDArray:
+    """Return stamps (n,) as seconds since ``origin``, which is a stamp too; NaN where there is
+    none."""
     unit = unit_named(settings.unit)
     assert unit is not None, "was looked at with the map"
     since = (found - origin).astype(float)
@@ -150,11 +168,18 @@ def first_stamp(found: NDArray) -> float:
 
 
 def _counted_on(since: NDArray, modulus: float, findings: list[Finding]) -> NDArray:
-    """Undo wraps: a clock that steps back by more than half of where it is full has gone on in truth."""
+    """Undo wraps: a clock that steps back by more than half of where it is full has gone on in
+    truth."""
     known = np.isfinite(since)
     wraps = np.diff(since[known], prepend=since[known][0]) < -0.5 * modulus
     if wraps.any():
-        findings.append(Finding("time", f"wraps at {modulus:.10g}, {counted(int(wraps.sum()), 'time')}", "counted on"))
+        findings.append(
+            Finding(
+                "time",
+                f"wraps at {modulus:.10g}, {counted(int(wraps.sum()), 'time')}",
+                "counted on",
+            )
+        )
         since[known] += modulus * np.cumsum(wraps)
     return since
 
@@ -162,26 +187,37 @@ def _counted_on(since: NDArray, modulus: float, findings: list[Finding]) -> NDAr
 def uniform(rows: int, rate_hz: float, findings: list[Finding]) -> Run:
     """Return the run of a log without a clock, whose rows are known to come at a rate."""
     findings.append(
-        Finding("time", "no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, as the map says")
+        Finding(
+            "time",
+            "no clock in the log",
+            f"rows taken for uniform at {rate_hz:g} Hz, as the map says",
+        )
     )
     return Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
 
 
 def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
-    """Return the runs of a log whose stamps (n,) may repeat, go back and start over; each strictly increases.
+    """Return the runs of a log whose stamps (n,) may repeat, go back and start over; each strictly
+    increases.
 
     ``raw`` are the stamps as they stand in the file, to tell a clock that was full.
     """
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
-        findings.append(Finding("time", f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out"))
+        findings.append(
+            Finding(
+                "time", f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out"
+            )
+        )
     _refuse_backwards(time_s[rows])
     rows = _without_strays(rows, time_s, findings)
     begins = _begins(time_s[rows])
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        findings.append(Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]))))
+        findings.append(
+            Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]])))
+        )
     found = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in found if len(run) > 1]
 
@@ -211,7 +247,9 @@ def _without_strays(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> 
     time = time_s[rows]
     far = max(RESTART_S, RESTART_PERIODS * _period(time))
     step = np.diff(time)
-    stray = (np.abs(step[:-1]) > far) & (np.abs(step[1:]) > far) & (np.abs(time[2:] - time[:-2]) < far)
+    stray = (
+        (np.abs(step[:-1]) > far) & (np.abs(step[1:]) > far) & (np.abs(time[2:] - time[:-2]) < far)
+    )
     if stray.any():
         first = rows[int(np.argmax(stray)) + 1]
         seen = f"{counted(int(stray.sum()), 'stamp')} far from both neighbours, the first in row {first}"
@@ -232,7 +270,8 @@ def _begins(time: NDArray) -> list[int]:
 
 
 def _stays_behind(time: NDArray) -> int | None:
-    """Return from where on time stays behind what it was for many rows; None where it nowhere does."""
+    """Return from where on time stays behind what it was for many rows; None where it nowhere
+    does."""
     late = time < np.maximum.accumulate(time)
     edges = np.flatnonzero(np.diff(late, prepend=False, append=False))
     starts, ends = edges[::2], edges[1::2]
@@ -241,7 +280,8 @@ def _stays_behind(time: NDArray) -> int | None:
 
 
 def full_register(before: float, after: float) -> float | None:
-    """Return at how much a counter is full that goes back from one stamp to another; None where neither says so."""
+    """Return at how much a counter is full that goes back from one stamp to another; None where
+    neither says so."""
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
     if not near:
         return None
@@ -250,18 +290,27 @@ def full_register(before: float, after: float) -> float | None:
 
 def _if_full(before: float, after: float) -> str:
     full = full_register(before, after)
-    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}" if full else "another run begins"
+    return (
+        f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}"
+        if full
+        else "another run begins"
+    )
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:
-    """Return rows in the order of time, one of each stamp, without a few that stand long before the rest."""
+    """Return rows in the order of time, one of each stamp, without a few that stand long before the
+    rest."""
     findings: list[Finding] = []
     time = time_s[rows]
     back = np.count_nonzero(np.diff(time) < 0.0)
     if back:
         order = np.argsort(time, kind="stable")
         rows, time = rows[order], time[order]
-        findings.append(Finding("time", f"goes back a little, {counted(int(back), 'time')}", "rows put in order"))
+        findings.append(
+            Finding(
+                "time", f"goes back a little, {counted(int(back), 'time')}", "rows put in order"
+            )
+        )
     again = np.diff(time, prepend=-np.inf) <= 0.0
     if again.any():
         findings.append(_repeated(int(again.sum()), len(rows), int(rows[np.argmax(again)])))
@@ -276,7 +325,9 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
 def _repeated(again: int, rows: int, first: int) -> Finding:
     seen = f"{counted(again, 'row')} ({again / rows:.1%}) with the stamp of another, the first is row {first}"
     advice = (
-        "" if again < 0.05 * rows else "; if rows are uniform and the clock is coarse, set time.rate_hz in place of it"
+        ""
+        if again < 0.05 * rows
+        else "; if rows are uniform and the clock is coarse, set time.rate_hz in place of it"
     )
     return Finding("time", seen, f"the first of each kept{advice}")
 
@@ -304,9 +355,11 @@ class Sampling:
     def of(cls, clock_s: NDArray, kept_s: NDArray) -> "Sampling":
         """Look at the steps of a clock (n,), and where of its samples only some (m,) are kept.
 
-        A gap is a step half as long again as 95 % of all steps are: where steps vary, a longer one lost nothing.
+        A gap is a step half as long again as 95 % of all steps are: where steps vary, a longer one
+        lost nothing.
         """
-        # Of what was logged at several rates only a few rows are whole, and they have a rate of their own.
+        # Of what was logged at several rates only a few rows are whole, and they have a rate of
+        # their own.
         steps = np.diff(clock_s if 2 * len(kept_s) > len(clock_s) else kept_s)
         median = float(np.median(steps))
         longest = 1.5 * max(median, float(np.quantile(steps, 0.95)))

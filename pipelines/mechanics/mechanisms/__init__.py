@@ -1,1 +1,2 @@
-"""The mechanisms that there are: one file each, and nothing else to edit (docs/mechanisms.md tells what it holds)."""
+"""The mechanisms that there are: one file each, and nothing else to edit (docs/mechanisms.md tells
+what it holds)."""

@@ -1,11 +1,13 @@
-"""The leg: two revolute joints in series, two rigid links, and the paper's four inertial parameters.
+"""The leg: two revolute joints in series, two rigid links, and the paper's four inertial
+parameters.
 
-The regressor is the only place where the equations of motion stand. Angles: the first (hip) from the downward
-vertical, the second (knee) relative to the first link, flexion negative: any double pendulum is a leg. The paper
-prints several of these formulas with slips; the mended forms and a test for each are in ``docs/errata.md``.
+The regressor is the only place where the equations of motion stand. Angles: the first (hip) from
+the downward vertical, the second (knee) relative to the first link, flexion negative: any double
+pendulum is a leg. The paper prints several of these formulas with slips; the mended forms and a
+test for each are in ``docs/errata.md``.
 
-Where gravity does not act along the plane of motion, as at a planar arm, nothing depends on X4, nor on where the first
-joint stands.
+Where gravity does not act along the plane of motion, as at a planar arm, nothing depends on X4, nor
+on where the first joint stands.
 """
 
 from dataclasses import replace
@@ -26,26 +28,34 @@ INERTIAL = ("X1", "X2", "X3", "X4")
 def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
     """Rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
 
-    Paper, appendix A, row 2 renumbered as docs/errata.md gives it. ``sin_leg`` is sin(q1 + q2). The sines
-    are arguments, because whoever evaluates thousands of motions has a faster way to them. Tuples, because
-    an array made at every integration step would cost more than the equations.
+    Paper, appendix A, row 2 renumbered as docs/errata.md gives it. ``sin_leg`` is sin(q1 + q2). The
+    sines are arguments, because whoever evaluates thousands of motions has a faster way to them.
+    Tuples, because an array made at every integration step would cost more than the equations.
     """
     shank_gravity = gravity * sin_leg
     hip = (
         ddq[0],
         ddq[1],
-        thigh_length * ((2.0 * ddq[0] + ddq[1]) * cos_knee - (2.0 * dq[0] * dq[1] + dq[1] * dq[1]) * sin_knee)
+        thigh_length
+        * ((2.0 * ddq[0] + ddq[1]) * cos_knee - (2.0 * dq[0] * dq[1] + dq[1] * dq[1]) * sin_knee)
         + shank_gravity,
         gravity * sin_hip,
     )
-    knee = (0.0, ddq[0] + ddq[1], thigh_length * (ddq[0] * cos_knee + dq[0] * dq[0] * sin_knee) + shank_gravity, 0.0)
+    knee = (
+        0.0,
+        ddq[0] + ddq[1],
+        thigh_length * (ddq[0] * cos_knee + dq[0] * dq[0] * sin_knee) + shank_gravity,
+        0.0,
+    )
     return hip, knee
 
 
 @njit("UniTuple(UniTuple(f8, 4), 2)(f8[::1], f8[::1], f8[::1], f8, f8)", cache=True)
 def regressor_at(q, dq, ddq, thigh_length, gravity):
     """Rows hip and knee of A(q, dq, ddq) at one instant."""
-    return regressor_rows(sin(q[0]), sin(q[0] + q[1]), sin(q[1]), cos(q[1]), dq, ddq, thigh_length, gravity)
+    return regressor_rows(
+        sin(q[0]), sin(q[0] + q[1]), sin(q[1]), cos(q[1]), dq, ddq, thigh_length, gravity
+    )
 
 
 @njit(cache=True)
@@ -80,7 +90,9 @@ def _mass_off_axis(at, state, values, geometry, joint, out):
     """Add the column of X4 (hip) or X3 (knee) a right angle ahead."""
     q, leg = at.q, at.q[0] + at.q[1]
     # sin and cos of an angle a right angle ahead are the cos and -sin of the angle.
-    hip, knee = regressor_rows(cos(q[0]), cos(leg), cos(q[1]), -sin(q[1]), at.dq, at.ddq, geometry[0], geometry[1])
+    hip, knee = regressor_rows(
+        cos(q[0]), cos(leg), cos(q[1]), -sin(q[1]), at.dq, at.ddq, geometry[0], geometry[1]
+    )
     column = 3 - joint
     out[0] += values[0] * hip[column]
     out[1] += values[0] * knee[column]
@@ -96,7 +108,9 @@ def _payload_change(at, state, values, geometry, joint, out):
     if joint == 0:
         out[0] += moment * (hip[3] + r * hip[0])
     else:
-        out[0] += moment * (hip[2] + r * hip[1] + (r + length * length / r) * hip[0] + length / r * hip[3])
+        out[0] += moment * (
+            hip[2] + r * hip[1] + (r + length * length / r) * hip[0] + length / r * hip[3]
+        )
         out[1] += moment * (knee[2] + r * knee[1])
 
 
@@ -121,13 +135,16 @@ def _broken(X: NDArray, geometry: Geometry) -> list[str]:
 
 
 def _inertia_forms(geometry: Geometry) -> NDArray:
-    """Return symmetric B, (4, 2, 2): M(q) > 0 at every knee angle if and only if the sum of X_i B_i is.
+    """Return symmetric B, (4, 2, 2): M(q) > 0 at every knee angle if and only if the sum of X_i B_i
+    is.
 
-    The sum is [[X1 - X2, L1 X3], [L1 X3, X2]], whose determinant and last element are the conditions of
-    ``_broken``: linear in X, as a convex program wants them.
+    The sum is [[X1 - X2, L1 X3], [L1 X3, X2]], whose determinant and last element are the
+    conditions of ``_broken``: linear in X, as a convex program wants them.
     """
     L1 = geometry.thigh_length_m
-    return np.array([[[1, 0], [0, 0]], [[-1, 0], [0, 1]], [[0, L1], [L1, 0]], [[0, 0], [0, 0]]], dtype=float)
+    return np.array(
+        [[[1, 0], [0, 0]], [[-1, 0], [0, 1]], [[0, L1], [L1, 0]], [[0, 0], [0, 0]]], dtype=float
+    )
 
 
 LEG = Mechanism(
@@ -137,14 +154,25 @@ LEG = Mechanism(
     places=("hip", "knee"),
     has_gravity=True,
     parameters=(
-        Inertial("X1", "kg·m²", "inertia about the hip with the knee at a right angle", (1.0, 12.0)),
+        Inertial(
+            "X1", "kg·m²", "inertia about the hip with the knee at a right angle", (1.0, 12.0)
+        ),
         Inertial("X2", "kg·m²", "inertia of the shank about the knee", (0.2, 4.0)),
         Inertial("X3", "kg·m", "first moment of the shank about the knee", (0.5, 3.0)),
-        Inertial("X4", "kg·m", "first moment of the thigh, shank's mass at the knee, about the hip", (1.0, 8.0)),
+        Inertial(
+            "X4",
+            "kg·m",
+            "first moment of the thigh, shank's mass at the knee, about the hip",
+            (1.0, 8.0),
+        ),
     ),
     along=_along,
     bends_at=("hip", "knee"),
-    reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
+    reactions={
+        "rigid_body": _rigid_body,
+        "mass_off_axis": _mass_off_axis,
+        "payload_change": _payload_change,
+    },
     broken=_broken,
     inertia_forms=_inertia_forms,
     has_length=True,

@@ -9,8 +9,9 @@ lift         prismatic  yes      X1 ddq + X2
 slide        prismatic  no       X1 ddq
 ===========  =========  =======  ==========================================================================
 
-Gravity pulls a prismatic joint with the same force wherever it stands. Counterweights and springs of constant force
-do so too, and mostly are there where it matters; so X2 of a lift is that force, and not X1 times gravity.
+Gravity pulls a prismatic joint with the same force wherever it stands. Counterweights and springs
+of constant force do so too, and mostly are there where it matters; so X2 of a lift is that force,
+and not X1 times gravity.
 """
 
 from dataclasses import replace
@@ -86,11 +87,17 @@ def _lift(at, state, values, geometry, joint, out):
 
 
 def _broken_inertia(X: NDArray, geometry: Geometry) -> list[str]:
-    return [f"X1 = {X[0]:.4g} kg·m² is not positive: what turns would have no inertia"] if X[0] <= 0 else []
+    return (
+        [f"X1 = {X[0]:.4g} kg·m² is not positive: what turns would have no inertia"]
+        if X[0] <= 0
+        else []
+    )
 
 
 def _broken_mass(X: NDArray, geometry: Geometry) -> list[str]:
-    return [f"X1 = {X[0]:.4g} kg is not positive: what slides would have no mass"] if X[0] <= 0 else []
+    return (
+        [f"X1 = {X[0]:.4g} kg is not positive: what slides would have no mass"] if X[0] <= 0 else []
+    )
 
 
 def _inertia_forms(geometry: Geometry) -> NDArray:
@@ -104,7 +111,9 @@ def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
 _ABSORBED = {"rotor_inertia": "X1", "torque_gain": "all parameters together"}
 """What nothing but another joint, which carries the same links, could tell."""
 
-_INERTIA = Inertial("X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0))
+_INERTIA = Inertial(
+    "X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0)
+)
 _MASS = Inertial("X1", "kg", "mass along the axis, the drive's rotor included", (0.1, 200.0))
 
 PENDULUM = Mechanism(
@@ -113,10 +122,17 @@ PENDULUM = Mechanism(
     kinds=("revolute",),
     places=("joint",),
     has_gravity=True,
-    parameters=(_INERTIA, Inertial("X2", "kg·m", "first moment of mass about the joint's axis", (0.01, 10.0))),
+    parameters=(
+        _INERTIA,
+        Inertial("X2", "kg·m", "first moment of mass about the joint's axis", (0.01, 10.0)),
+    ),
     along=_pendulum_along,
     bends_at=("joint",),
-    reactions={"rigid_body": _pendulum, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
+    reactions={
+        "rigid_body": _pendulum,
+        "mass_off_axis": _mass_off_axis,
+        "payload_change": _payload_change,
+    },
     broken=_broken_inertia,
     inertia_forms=_inertia_forms_under_gravity,
     absorbs=_ABSORBED,
@@ -148,7 +164,12 @@ LIFT = replace(
     has_gravity=True,
     parameters=(
         _MASS,
-        Inertial("X2", "N", "force that holds it still: its weight less a counterweight's", (-500.0, 500.0)),
+        Inertial(
+            "X2",
+            "N",
+            "force that holds it still: its weight less a counterweight's",
+            (-500.0, 500.0),
+        ),
     ),
     along=_lift_along,
     reactions={"rigid_body": _lift, "payload_change": _mass_change},

@@ -80,7 +80,8 @@ class Chart:
         return [series for panel in self.panels for series in panel.series]
 
     def thinned(self, rows: int) -> "Chart":
-        """Return the chart with so many rows at most, each of them a row it had; every peak stays."""
+        """Return the chart with so many rows at most, each of them a row it had; every peak
+        stays."""
         if len(self.x) <= rows:
             return self
         kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)

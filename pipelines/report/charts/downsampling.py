@@ -1,4 +1,5 @@
-"""Rows of a long recording that draw the same picture: in every stretch, those where a column is lowest or highest."""
+"""Rows of a long recording that draw the same picture: in every stretch, those where a column is
+lowest or highest."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +9,13 @@ EACH = 3
 
 
 def extremes(columns: NDArray, rows: int) -> NDArray[np.intp]:
-    """Return the numbers of the rows to keep, rising, at most ``rows`` of them (two, and those that one stretch needs).
+    """Return the numbers of the rows to keep, rising, at most ``rows`` of them (two, and those that
+    one stretch needs).
 
-    Rows are cut into equal stretches. Of each the rows stay in which any column has its least or its greatest value,
-    and one in which it is missing, so that a spike or a gap of one sample survives. Every row that stays is one that
-    was measured, with all its columns: nothing is averaged or made up.
+    Rows are cut into equal stretches. Of each the rows stay in which any column has its least or
+    its greatest value, and one in which it is missing, so that a spike or a gap of one sample
+    survives. Every row that stays is one that was measured, with all its columns: nothing is
+    averaged or made up.
 
     Parameters
     ----------

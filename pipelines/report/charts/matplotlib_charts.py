@@ -19,7 +19,9 @@ ROWS = 6000
 """Of a chart, at most: more no printer resolves, and a PDF of them opens slowly."""
 COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
 WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
-TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {f"cause{n}": c for n, c in enumerate(CAUSES, 1)}
+TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {
+    f"cause{n}": c for n, c in enumerate(CAUSES, 1)
+}
 WIDE, NARROW = 7.2, 3.6
 """Inches: of two columns of a paper, and of one."""
 
@@ -36,10 +38,17 @@ def chart_figure(chart: Chart) -> Figure:
     for axis, panel in zip(axes[:, 0], chart.panels, strict=True):
         _draw(axis, chart, panel)
     axes[-1, 0].set_xlabel(chart.x_label)
-    lines = {line.get_label(): line for axis in axes[:, 0] for line in axis.get_lines() if line.get_label()[0] != "_"}
+    lines = {
+        line.get_label(): line
+        for axis in axes[:, 0]
+        for line in axis.get_lines()
+        if line.get_label()[0] != "_"
+    }
     figure.suptitle(_sentence(chart.title), x=0.01, ha="left", fontsize=9, fontweight="bold")
     if lines:
-        figure.legend(lines.values(), lines.keys(), loc="outside lower left", ncols=len(lines), fontsize=8)
+        figure.legend(
+            lines.values(), lines.keys(), loc="outside lower left", ncols=len(lines), fontsize=8
+        )
     figure.align_ylabels()
     return figure
 
@@ -58,7 +67,17 @@ def _draw(axis: Axes, chart: Chart, panel: Panel) -> None:
 def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
     colour, label = COLOURS[series.role], series.label or "_"
     if series.mark is Mark.DOTS:
-        axis.plot(chart.x, series.values, ".", ms=1.6, mew=0, alpha=0.5, color=colour, label=label, rasterized=True)
+        axis.plot(
+            chart.x,
+            series.values,
+            ".",
+            ms=1.6,
+            mew=0,
+            alpha=0.5,
+            color=colour,
+            label=label,
+            rasterized=True,
+        )
         return
     x, values = chart.x, series.values
     if series.mark is Mark.MEAN:
@@ -76,9 +95,18 @@ def budget_figure(bars: Sequence[Bar]) -> Figure:
     for axis, bar in zip(axes[:, 0], bars, strict=True):
         shown = [segment for segment in bar.segments if segment.share]
         for segment in shown:
-            axis.barh(0, segment.high - segment.low, left=segment.low, color=TONES[segment.tone], ec="white", lw=0.5)
+            axis.barh(
+                0,
+                segment.high - segment.low,
+                left=segment.low,
+                color=TONES[segment.tone],
+                ec="white",
+                lw=0.5,
+            )
         axis.set_yticks([])
-        axis.set_title(_sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms"), loc="left", fontsize=9)
+        axis.set_title(
+            _sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms"), loc="left", fontsize=9
+        )
         axis.set_xlabel(f"mean square error, ({bar.unit})²")
         axis.grid(visible=False)
         axis.legend(
@@ -102,11 +130,16 @@ def falls_figure(falls: Sequence[Fall]) -> Figure:
     axis.invert_yaxis()
     axis.set_xlabel(f"rms error on runs that no fit has seen, {units}")
     axis.grid(axis="y", visible=False)
-    legend: dict[str, Artist] = {"rigid body and friction": Patch(color=GREY), "with the causes": Patch(color=BLUE)}
+    legend: dict[str, Artist] = {
+        "rigid body and friction": Patch(color=GREY),
+        "with the causes": Patch(color=BLUE),
+    }
     if falls[0].after is None:
         del legend["with the causes"]
     legend["noise floor"] = Line2D([], [], color="black")
-    figure.legend(legend.values(), legend.keys(), loc="outside lower left", ncols=len(legend), fontsize=7)
+    figure.legend(
+        legend.values(), legend.keys(), loc="outside lower left", ncols=len(legend), fontsize=7
+    )
     return figure
 
 

@@ -55,7 +55,9 @@ def drawn_as(session: Session) -> str:
 
 def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animation:
     first = next(iter(tables.values()))
-    tables = {model: table for model, table in tables.items() if len(table.frame) == len(first.frame)}
+    tables = {
+        model: table for model, table in tables.items() if len(table.frame) == len(first.frame)
+    }
     time, off = first.frame["time_s"].to_numpy(), np.abs(first.stacked("error")).sum(axis=1)
     rows = _frames(time, off)
     angles = {"measured": first.stacked("reference")[rows]}

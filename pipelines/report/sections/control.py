@@ -1,4 +1,5 @@
-"""The adaptive loop on the model without and with the named causes: tracking, error, torque, and the sweep of Kv."""
+"""The adaptive loop on the model without and with the named causes: tracking, error, torque, and
+the sweep of Kv."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,14 +15,18 @@ from pipelines.workflow.graph import SWEEP
 
 GAIN = "feedback_gain_nm_s_rad"
 LIMIT = 4.0
-"""How many times the largest settled error a panel shows: the start, from rest, would flatten the rest."""
+"""How many times the largest settled error a panel shows: the start, from rest, would flatten the
+rest."""
 
 
 def loops(session: Session) -> dict[str, Artifact]:
-    """Return one adaptive loop of each model; where there are several, that with a person in the leg."""
+    """Return one adaptive loop of each model; where there are several, that with a person in the
+    leg."""
     found = {}
     for model, made in session.simulations_by_model("loop").items():
-        ranked = sorted(made, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human")
+        ranked = sorted(
+            made, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human"
+        )
         if ranked and model in models_of(session):
             found[model] = ranked[0]
     return found
@@ -33,7 +38,12 @@ def control_charts(session: Session) -> Iterator[Chart]:
     tables = {model: session.table(one).frame for model, one in made.items()}
     if not tables:
         return
-    settled = next(iter(made.values())).metadata.get("config", {}).get("simulate", {}).get("settled_after_s", 0.0)
+    settled = (
+        next(iter(made.values()))
+        .metadata.get("config", {})
+        .get("simulate", {})
+        .get("settled_after_s", 0.0)
+    )
     for joint in session.joints:
         yield _loop_chart(joint, tables, settled)
     sweep = _sweep_chart(session, {model: one.path.with_name(SWEEP) for model, one in made.items()})
@@ -73,7 +83,11 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
 def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     tables = {model: pd.read_csv(path) for model, path in files.items() if path.is_file()}
     columns = [GAIN, *(joint.column("error") for joint in session.joints)]
-    tables = {model: table for model, table in tables.items() if set(columns) <= set(table.columns) and len(table)}
+    tables = {
+        model: table
+        for model, table in tables.items()
+        if set(columns) <= set(table.columns) and len(table)
+    }
     if not tables:
         return None
     first = next(iter(tables.values()))
@@ -81,7 +95,10 @@ def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     for joint in session.joints:
         curves = tuple(
             Series(
-                MODELS[model][1], 1e3 * table[joint.column("error")].to_numpy(dtype=float), MODELS[model][0], Mark.MEAN
+                MODELS[model][1],
+                1e3 * table[joint.column("error")].to_numpy(dtype=float),
+                MODELS[model][0],
+                Mark.MEAN,
             )
             for model, table in tables.items()
             if table[GAIN].equals(first[GAIN])

@@ -12,7 +12,12 @@ from pipelines.errors import InputError
 from pipelines.wording.label import SHARES, cause_label, effect_told, in_words, label_in_words
 from pipelines.wording.law import LAW
 
-TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
+TONES = {
+    "noise_floor": "noise",
+    "repeatable_unexplained": "left",
+    "not_repeatable": "wanders",
+    "unexplained": "left",
+}
 """Names of the colours of what is no cause."""
 CAUSES = 3
 """Colours that there are for causes."""
@@ -101,7 +106,11 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
             words = SHARES.get(key) or told.get(key) or any_label_in_words(key)
             if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
                 words = "noise, all of it below the floor"
-            segments.append(Segment(key, words, tone, min(start, start + share), max(start, start + share), share))
+            segments.append(
+                Segment(
+                    key, words, tone, min(start, start + share), max(start, start + share), share
+                )
+            )
             right, left = (right + share, left) if share >= 0 else (right, left + share)
         found.append(Bar(joint, torque_unit(verdict, joint), tuple(segments)))
     return found
@@ -130,7 +139,8 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
 
 
 def any_label_in_words(label: str) -> str:
-    """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
+    """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its
+    name."""
     name, _, joint = label.partition("@")
     at = f" at {the(joint)}" if joint else ""
     try:
@@ -148,19 +158,27 @@ def cause_in_words(cause: Mapping[str, Any]) -> str:
 
 
 def told_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
-    """Return a verdict's causes and those that could stand in their place as sentences say them, by label."""
-    return {cause_label(one): cause_in_words(one) for cause in verdict["causes"] for one in (*ties_of(cause), cause)}
+    """Return a verdict's causes and those that could stand in their place as sentences say them, by
+    label."""
+    return {
+        cause_label(one): cause_in_words(one)
+        for cause in verdict["causes"]
+        for one in (*ties_of(cause), cause)
+    }
 
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:
     """Return a sentence with the labels that stand in it said as sentences say them."""
     known = sorted(set(labels), key=len, reverse=True)
-    any_of = re.compile(rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])") if known else None
+    any_of = (
+        re.compile(rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])") if known else None
+    )
     return any_of.sub(lambda found: any_label_in_words(found[0]), text) if any_of else text
 
 
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
-    """Return the causes of a verdict, most probable first, each with what cannot be told from it."""
+    """Return the causes of a verdict, most probable first, each with what cannot be told from
+    it."""
     told = [tied_in_words(cause) for cause in causes]
     return (", and " if any(map(ties_of, causes)) else " and ").join(told)
 

@@ -34,7 +34,11 @@ def excitations(session: Session) -> list[Excitation]:
 
 def _excitation(session: Session, artifact: Artifact) -> Excitation:
     about = artifact.metadata
-    told = [f"{words} {digits(about[key])}" for key, words in NUMBERS.items() if about.get(key) is not None]
+    told = [
+        f"{words} {digits(about[key])}"
+        for key, words in NUMBERS.items()
+        if about.get(key) is not None
+    ]
     if about.get("a") and about.get("omega_rad_s"):
         base_hz = about["omega_rad_s"] / (2 * pi)
         told.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
@@ -42,5 +46,8 @@ def _excitation(session: Session, artifact: Artifact) -> Excitation:
         session.shown(artifact.path),
         ", ".join(told),
         tuple(about.get("margins") or ()),
-        tuple((name, error, unit(session, name)) for name, error in (about.get("standard_errors") or {}).items()),
+        tuple(
+            (name, error, unit(session, name))
+            for name, error in (about.get("standard_errors") or {}).items()
+        ),
     )

@@ -12,7 +12,10 @@ from pipelines.report.charts.chart import Chart, Panel, Role, Series
 from pipelines.report.sections.standstill import moving, strays_further, torque_error_grew
 from pipelines.report.session import Artifact, Session
 
-MODELS = {"baseline": (Role.BEFORE, "rigid body and friction"), "extended": (Role.AFTER, "with the causes")}
+MODELS = {
+    "baseline": (Role.BEFORE, "rigid body and friction"),
+    "extended": (Role.AFTER, "with the causes"),
+}
 """The models of ``residuals/1``, and how charts call them."""
 
 
@@ -41,7 +44,9 @@ def torque_charts(session: Session) -> Iterator[Chart]:
             yield _torque_chart(session, run, joint, of_run, floors.get(joint.name))
 
 
-def _torque_chart(session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None) -> Chart:
+def _torque_chart(
+    session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None
+) -> Chart:
     quantity, unit = joint.effort, joint.unit("torque")
     first = frame[frame["model"] == frame["model"].iloc[0]]
     torques, errors = [], []
@@ -69,7 +74,8 @@ def _torque_chart(session: Session, run: str, joint: Joint, frame: pd.DataFrame,
 
 
 def angle_charts(session: Session) -> Iterator[Chart]:
-    """Yield a chart for each replayed run and joint: the angle in simulations of a second under the recorded torque."""
+    """Yield a chart for each replayed run and joint: the angle in simulations of a second under the
+    recorded torque."""
     for run, replays in replayed(session).items():
         tables = {model: session.table(one).frame for model, one in replays.items()}
         for joint in session.joints:
@@ -77,7 +83,8 @@ def angle_charts(session: Session) -> Iterator[Chart]:
 
 
 def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
-    """Return the replays of a kind (see ``session.simulated``), by run and model that is to be drawn."""
+    """Return the replays of a kind (see ``session.simulated``), by run and model that is to be
+    drawn."""
     found: dict[str, dict[str, Artifact]] = {}
     for model, replays in session.simulations_by_model(what).items():
         for one in replays if model in models_of(session) else ():
@@ -107,11 +114,13 @@ SCORES = {
         ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
     ),
 }
-"""Of each kind of replay: the metadata's key, what it is about, in words, and in which multiple of the unit."""
+"""Of each kind of replay: the metadata's key, what it is about, in words, and in which multiple of
+the unit."""
 
 
 def scores(session: Session, run: str) -> list[Score]:
-    """Return how far off each model is in a run: its torque, and what the replays' files say, joint by joint."""
+    """Return how far off each model is in a run: its torque, and what the replays' files say, joint
+    by joint."""
     found = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
     for what, rows in SCORES.items():
         replays = replayed(session, what).get(run, {})
@@ -136,11 +145,21 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     rows = rows[rows["file"] == run]
     floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
     grew_away = False
-    for words, chosen in (("away from reversals", rows[rows["scored"]]), ("reversals included", rows)):
-        left = [chosen.loc[chosen["model"] == model, joint.column("residual")] for model in models_of(session)]
+    for words, chosen in (
+        ("away from reversals", rows[rows["scored"]]),
+        ("reversals included", rows),
+    ):
+        left = [
+            chosen.loc[chosen["model"] == model, joint.column("residual")]
+            for model in models_of(session)
+        ]
         values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in left)
         grew = floor is not None and torque_error_grew(*values, floor=floor)
-        about = "" if grew_away or words == "away from reversals" else f"; only about reversals, where {STANDS}"
+        about = (
+            ""
+            if grew_away or words == "away from reversals"
+            else f"; only about reversals, where {STANDS}"
+        )
         yield Score(
             f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values,
             LARGER + about if grew else "",
@@ -148,8 +167,11 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         grew_away = grew
 
 
-def _while_moving(session: Session, replays: dict[str, Artifact], joint: Joint, where: str) -> Iterator[Score]:
-    """Yield the error in those seconds in which the joint never stands, where there are such and others."""
+def _while_moving(
+    session: Session, replays: dict[str, Artifact], joint: Joint, where: str
+) -> Iterator[Score]:
+    """Yield the error in those seconds in which the joint never stands, where there are such and
+    others."""
     values: list[float | None] = []
     kept = of = 0
     for model in models_of(session):

@@ -1,4 +1,5 @@
-"""The numbers of the first screen: how sure, how much, how much is left, and what simulations make of it."""
+"""The numbers of the first screen: how sure, how much, how much is left, and what simulations make
+of it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +32,9 @@ def tiles(session: Session) -> list[Tile]:
         return []
     # The tree of findings tells how probable each cause is; older verdicts have none.
     skipped = bool(verdict.get("findings"))
-    found = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]]
+    found = [
+        tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]
+    ]
     for fall in falls(verdict):
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
@@ -89,20 +92,35 @@ def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
         small = "without the causes; with them it cannot be simulated"
     elif is_worse:
         small = "worse with the causes; why is said below"
-    return [Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", small, is_worse)]
+    return [
+        Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", small, is_worse)
+    ]
 
 
 def _loop_tiles(session: Session) -> list[Tile]:
-    """Return how far the drives' simulated torque is off, of the run where naming the causes gains most."""
+    """Return how far the drives' simulated torque is off, of the run where naming the causes gains
+    most."""
     joint, key = worst_joint(session), "closed_loop_rmse_nm"
     pairs = [
         [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]
         for one in replayed(session, "drives").values()
-        if joint and len(one) == 2 and all(joint.name in made.metadata.get(key, {}) for made in one.values())
+        if joint
+        and len(one) == 2
+        and all(joint.name in made.metadata.get(key, {}) for made in one.values())
     ]
     if not joint or not pairs:
         return []
     before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
-    small = "worse with the causes" if after > before else f"rms error of the simulated {joint.effort}"
+    small = (
+        "worse with the causes" if after > before else f"rms error of the simulated {joint.effort}"
+    )
     title = f"{joint.name}, in the drives' loop"
-    return [Tile(title, f"{digits(before)} → {digits(after)}", joint.unit("torque"), small, after > before)]
+    return [
+        Tile(
+            title,
+            f"{digits(before)} → {digits(after)}",
+            joint.unit("torque"),
+            small,
+            after > before,
+        )
+    ]

@@ -37,7 +37,10 @@ class Estimate:
     @property
     def words(self) -> str:
         """Say which it is."""
-        run, own = f"({self.run})" if self.run else "", "(per run: the first training run's)" if self.each_run else ""
+        run, own = (
+            f"({self.run})" if self.run else "",
+            "(per run: the first training run's)" if self.each_run else "",
+        )
         return " ".join(filter(None, (self.joint, self.symbol, run, own)))
 
     @property
@@ -71,10 +74,18 @@ class Model:
 
 def models(session: Session) -> list[Model]:
     """Return every model of a session, those of ``exoid identify`` first."""
-    made = [(one, f"With {one.besides}" if one.besides else "Rigid body and friction") for one in session.identified]
+    made = [
+        (one, f"With {one.besides}" if one.besides else "Rigid body and friction")
+        for one in session.identified
+    ]
     if session.extended:
         named = bool(session.verdict and session.verdict["causes"])
-        made.append((session.extended, "Extended by the named causes" if named else "As the diagnosis fitted it"))
+        made.append(
+            (
+                session.extended,
+                "Extended by the named causes" if named else "As the diagnosis fitted it",
+            )
+        )
     return [_model(session, one, title) for one, title in made]
 
 
@@ -115,7 +126,10 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
         file=session.shown(artifact.path),
         title=title,
         method=_method(about.get("method")),
-        estimates=tuple(replace(e, meaning=meaning(session, e.effect, e.joint, e.name)) for e in estimates(table)),
+        estimates=tuple(
+            replace(e, meaning=meaning(session, e.effect, e.joint, e.name))
+            for e in estimates(table)
+        ),
         collinear=tuple(map(str, about.get("collinear") or ())),
         unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
         remarks=tuple(map(str, about.get("remarks") or ())),
@@ -126,7 +140,9 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
 
 def estimates(table: Table) -> list[Estimate]:
     """Return the rows of a ``parameters/1`` table."""
-    return [_estimate({str(k): v for k, v in row.items()}) for row in table.frame.to_dict("records")]
+    return [
+        _estimate({str(k): v for k, v in row.items()}) for row in table.frame.to_dict("records")
+    ]
 
 
 def _estimate(row: Mapping[str, Any]) -> Estimate:

@@ -1,4 +1,5 @@
-"""What each run has for itself of a named cause: an offset that is set anew at its start, an onset, a phase."""
+"""What each run has for itself of a named cause: an offset that is set anew at its start, an onset,
+a phase."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,26 +27,43 @@ class OwnValues:
 
 
 def own_values(cause: dict[str, Any]) -> OwnValues | None:
-    """Return what each run has of a verdict's cause; None where all share everything, or an older file lacks it."""
+    """Return what each run has of a verdict's cause; None where all share everything, or an older
+    file lacks it."""
     runs = cause.get("each_run") or []
     if not runs:
         return None
     units = {one["name"]: "" if one["unit"] == "1" else one["unit"] for one in cause["parameters"]}
     names = tuple(runs[0]["values"])
     return OwnValues(
-        tuple(", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names),
         tuple(
-            RunValues(run["file"], run["purpose"], tuple(_estimate(cause, run, name, units) for name in names))
+            ", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names
+        ),
+        tuple(
+            RunValues(
+                run["file"],
+                run["purpose"],
+                tuple(_estimate(cause, run, name, units) for name in names),
+            )
             for run in runs
         ),
     )
 
 
-def _estimate(cause: dict[str, Any], run: dict[str, Any], name: str, units: dict[str, str]) -> Estimate | None:
+def _estimate(
+    cause: dict[str, Any], run: dict[str, Any], name: str, units: dict[str, str]
+) -> Estimate | None:
     value = run["values"].get(name)
     low, high = run.get("ci95", {}).get(name) or (None, None)
     if value is None:
         return None
     return Estimate(
-        cause["effect"], name, name, cause["joint"] or "", run["file"], units.get(name, ""), value, low, high
+        cause["effect"],
+        name,
+        name,
+        cause["joint"] or "",
+        run["file"],
+        units.get(name, ""),
+        value,
+        low,
+        high,
     )

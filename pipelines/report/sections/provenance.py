@@ -1,4 +1,5 @@
-"""Where everything on the page comes from: files, hashes, settings, and the command lines that make them again."""
+"""Where everything on the page comes from: files, hashes, settings, and the command lines that make
+them again."""
 
 import shlex
 from collections.abc import Sequence
@@ -26,7 +27,8 @@ class Input:
     name: str
     sha256: str
     state: str
-    """``found`` (the same bytes are in the session), ``changed`` (other bytes of that name are), or ``elsewhere``."""
+    """``found`` (the same bytes are in the session), ``changed`` (other bytes of that name are), or
+    ``elsewhere``."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,11 @@ def _input(session: Session, told: dict[str, str]) -> Input:
     if session.found(told["name"], told["sha256"]):
         state = "found"
     else:
-        state = "changed" if any(one.path.name == told["name"] for one in session.artifacts) else "elsewhere"
+        state = (
+            "changed"
+            if any(one.path.name == told["name"] for one in session.artifacts)
+            else "elsewhere"
+        )
     return Input(told["name"], told["sha256"], state)
 
 
@@ -77,7 +83,8 @@ class Outside:
     name: str
     """Its path where a file tells one."""
     role: str
-    """What it is, as far as those made of it tell: files of one name may be an experiment's settings and a rig's."""
+    """What it is, as far as those made of it tell: files of one name may be an experiment's
+    settings and a rig's."""
     sha256: str
     made_of_it: tuple[str, ...]
 
@@ -91,17 +98,23 @@ def outside(session: Session) -> list[Outside]:
                 continue
             name, role = _role(one, told["name"])
             before = found.get(told["sha256"], Outside(name, role, told["sha256"], ()))
-            found[told["sha256"]] = replace(before, made_of_it=(*before.made_of_it, session.shown(one.path)))
+            found[told["sha256"]] = replace(
+                before, made_of_it=(*before.made_of_it, session.shown(one.path))
+            )
     return list(found.values())
 
 
 def _role(made: Artifact, name: str) -> tuple[str, str]:
-    """Return what a file that another was made of is called, with its path where that is told, and what it is."""
+    """Return what a file that another was made of is called, with its path where that is told, and
+    what it is."""
     imported = made.metadata.get("imported")
     if isinstance(imported, dict):
         which = "map" if name.endswith(".toml") else "source"
         given = (imported.get("given") or {}).get(which, name)
-        return (given if Path(given).name == name else name), {"map": "the log's map", "source": "a log"}[which]
+        return (given if Path(given).name == name else name), {
+            "map": "the log's map",
+            "source": "a log",
+        }[which]
     config = made.metadata.get("config") or {}
     if made.kind == "recording" and "rig" in config and name.endswith(".toml"):
         return name, "the rig's file"
@@ -109,7 +122,8 @@ def _role(made: Artifact, name: str) -> tuple[str, str]:
 
 
 def stale(session: Session) -> list[str]:
-    """Return a sentence for each file of which other files were made when it was not yet as it is here."""
+    """Return a sentence for each file of which other files were made when it was not yet as it is
+    here."""
     made: dict[str, list[str]] = {}
     for origin in origins(session):
         for one in origin.inputs:
@@ -129,12 +143,16 @@ def _few(files: Sequence[str]) -> str:
 
 
 def software(session: Session) -> list[tuple[str, list[str]]]:
-    """Return each set of versions that files were made with, in words, and these files; nothing where none tells."""
+    """Return each set of versions that files were made with, in words, and these files; nothing
+    where none tells."""
     found: dict[str, list[str]] = {}
     for one in session.artifacts:
         told = one.metadata.get("software")
         if isinstance(told, dict) and told:
-            words = ", ".join(f"{'Python' if name == 'python' else name} {version}" for name, version in told.items())
+            words = ", ".join(
+                f"{'Python' if name == 'python' else name} {version}"
+                for name, version in told.items()
+            )
             found.setdefault(words, []).append(session.shown(one.path))
     return list(found.items())
 
@@ -148,13 +166,15 @@ def settings(session: Session) -> dict[str, dict[str, Any]]:
 
 
 def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
-    """Return the sections that one file's ``config`` tells, by name; those that are no section are left out."""
+    """Return the sections that one file's ``config`` tells, by name; those that are no section are
+    left out."""
     config = artifact.metadata.get("config") or {}
     return {name: config[name] for name in SECTIONS if isinstance(config.get(name), dict)}
 
 
 def changed_settings(session: Session) -> list[str]:
-    """Return a sentence for each section of exoid.toml that files were made with when it was another."""
+    """Return a sentence for each section of exoid.toml that files were made with when it was
+    another."""
     if session.config is None:
         return []
     now = Experiment.load(session.config)
@@ -180,11 +200,23 @@ class Command:
     """Whether an exoid.toml is named that the session was not told of."""
 
 
-def commands(session: Session, output: Path | None = None, title: str | None = None) -> list[Command]:
-    """Return the command lines that make the session's files again, in their order, and then the page."""
+def commands(
+    session: Session, output: Path | None = None, title: str | None = None
+) -> list[Command]:
+    """Return the command lines that make the session's files again, in their order, and then the
+    page."""
     named = session.config and session.config.parent not in session.folders
-    found = [made for kind in _MADE_BY for one in session.of_kind(kind) if (made := _MADE_BY[kind](session, one))]
-    page = ["report", *map(str, session.folders), *(["--config", str(session.config)] if named else [])]
+    found = [
+        made
+        for kind in _MADE_BY
+        for one in session.of_kind(kind)
+        if (made := _MADE_BY[kind](session, one))
+    ]
+    page = [
+        "report",
+        *map(str, session.folders),
+        *(["--config", str(session.config)] if named else []),
+    ]
     page += ["--title", title] if title else []
     found.append((page + (["-o", str(output)] if output else []), False))
     lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in found)
@@ -199,7 +231,10 @@ def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Wo
     if session.config:
         return ["--config", str(session.config)], False
     defaults = Experiment()
-    usual = all(told == getattr(defaults, name).model_dump(mode="json") for name, told in resolved(artifact).items())
+    usual = all(
+        told == getattr(defaults, name).model_dump(mode="json")
+        for name, told in resolved(artifact).items()
+    )
     return ([], False) if usual and not always else (["--config", "exoid.toml"], True)
 
 
@@ -228,13 +263,24 @@ def _record(session: Session, artifact: Artifact) -> Words | None:
     if not run or not inputs:
         return None
     config, needs = _config(session, artifact, always=True)
-    return ["acquire", *config, "--run", run["name"], "--trajectory", inputs[0], "-o", str(artifact.path)], needs
+    return [
+        "acquire",
+        *config,
+        "--run",
+        run["name"],
+        "--trajectory",
+        inputs[0],
+        "-o",
+        str(artifact.path),
+    ], needs
 
 
 def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str]:
-    """Return the words that import a log: where it lies in these folders, else where the command had it."""
+    """Return the words that import a log: where it lies in these folders, else where the command
+    had it."""
     told, given = artifact.inputs, artifact.metadata["imported"].get("given") or {}
-    names = [name for name, one in zip(inputs, told, strict=True) if name == one["name"]]  # not in these folders
+    # Not in these folders.
+    names = [name for name, one in zip(inputs, told, strict=True) if name == one["name"]]
     maps = [name for name in inputs if name.endswith(".toml")]
     sources = [name for name in inputs if name not in maps]
     if any(name in names for name in sources) and given:
@@ -266,7 +312,13 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
 
 def _diagnose(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
-    return ["diagnose", *_inputs(session, artifact), *config, "--out", _folder(artifact.path)], needs
+    return [
+        "diagnose",
+        *_inputs(session, artifact),
+        *config,
+        "--out",
+        _folder(artifact.path),
+    ], needs
 
 
 def _simulate(session: Session, artifact: Artifact) -> Words | None:
@@ -276,7 +328,15 @@ def _simulate(session: Session, artifact: Artifact) -> Words | None:
         return None  # written beside the replay in windows
     config, needs = _config(session, artifact)
     if what == "windows":
-        return ["simulate", inputs[0], "--replay", inputs[-1], *config, "-o", str(artifact.path)], needs
+        return [
+            "simulate",
+            inputs[0],
+            "--replay",
+            inputs[-1],
+            *config,
+            "-o",
+            str(artifact.path),
+        ], needs
     reference = ["--reference", inputs[1]] if len(inputs) > 1 else []
     run = artifact.metadata.get("plant", {}).get("run", "with_human")
     which = [] if run == "with_human" else ["--run", run]

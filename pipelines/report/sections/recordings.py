@@ -33,7 +33,8 @@ class Run:
     abort: str
     recovered: bool
     latency: dict[str, float] | None
-    """How long answers took: ``median_ms``, ``p99_ms``, ``longest_ms``; None where the file does not say."""
+    """How long answers took: ``median_ms``, ``p99_ms``, ``longest_ms``; None where the file does
+    not say."""
     clocks: tuple[str, ...]
     imported: str
     filter: str
@@ -52,7 +53,11 @@ class Run:
     @property
     def notes(self) -> list[str]:
         """Return what else is to be said of it."""
-        told = {"imported from": self.imported, "clocks": "; ".join(self.clocks), "filtered by": self.filter}
+        told = {
+            "imported from": self.imported,
+            "clocks": "; ".join(self.clocks),
+            "filtered by": self.filter,
+        }
         return [f"{words} {what}" for words, what in told.items() if what]
 
 
@@ -101,13 +106,17 @@ def _time(artifact: Artifact) -> np.ndarray:
 
 def _clock(joint: str, clock: dict[str, Any]) -> str:
     corrected = "corrected" if clock["corrected"] else "not corrected"
-    return f"{joint} {1e3 * clock['offset_s']:+.3g} ms and {clock['rate_ppm']:+.3g} ppm, {corrected}"
+    return (
+        f"{joint} {1e3 * clock['offset_s']:+.3g} ms and {clock['rate_ppm']:+.3g} ppm, {corrected}"
+    )
 
 
 def _imported(about: Any) -> str:
     if not isinstance(about, dict):
         return ""
-    return ", ".join(str(about[key]) for key in ("source", "format") if about.get(key)) or "imported"
+    return (
+        ", ".join(str(about[key]) for key in ("source", "format") if about.get(key)) or "imported"
+    )
 
 
 def _filter(about: Any) -> str:

@@ -1,4 +1,5 @@
-"""What each model leaves of the torque, against what the residuals' table knows: angle, speed, load and time."""
+"""What each model leaves of the torque, against what the residuals' table knows: angle, speed, load
+and time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,8 +18,14 @@ DOTS = 2500
 """At most, or a cloud hides its shape."""
 TALLEST = 99.5
 """Percentile of the residual's size that a panel must show."""
-DEPENDENCES = {"angle": "angle", "velocity": "speed", "acceleration": "acceleration", "torque": "load"}
-"""Columns of the residuals' table, and the variables of the verdict's ``depends_on`` that they are."""
+DEPENDENCES = {
+    "angle": "angle",
+    "velocity": "speed",
+    "acceleration": "acceleration",
+    "torque": "load",
+}
+"""Columns of the residuals' table, and the variables of the verdict's ``depends_on`` that they
+are."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +40,8 @@ class Against:
 
 
 def against(session: Session, joint: Joint) -> list[Against]:
-    """Return what a joint's residuals can be drawn against; the other joint's motion too where there is one."""
+    """Return what a joint's residuals can be drawn against; the other joint's motion too where
+    there is one."""
     found = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
@@ -66,8 +74,11 @@ def _reach(frame: pd.DataFrame, joint: Joint) -> float | None:
     return 1.1 * float(np.percentile(size, TALLEST)) if len(size) else None
 
 
-def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None) -> Chart:
-    """Return dots and running means; every model has its dots at the same places, for they are those of the motion."""
+def _chart(
+    session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None
+) -> Chart:
+    """Return dots and running means; every model has its dots at the same places, for they are
+    those of the motion."""
     rows = {model: frame[frame["model"] == model] for model in models_of(session)}
     rows = {model: table for model, table in rows.items() if len(table)}
     x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
@@ -95,7 +106,14 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
         f"{FEWEST} blocks or more; the band is the noise floor.",
         x_label=one.label,
         x=places[order],
-        panels=(Panel(f"{joint.name} {quantity} error, {joint.unit('torque')}", (*clouds, *means), floor, reach),),
+        panels=(
+            Panel(
+                f"{joint.name} {quantity} error, {joint.unit('torque')}",
+                (*clouds, *means),
+                floor,
+                reach,
+            ),
+        ),
     )
 
 
@@ -109,15 +127,22 @@ def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def telling(session: Session, joint: Joint) -> str:
-    """Return the variable that foretold most of what naming the causes took away; of all there is, where none is named.
+    """Return the variable that foretold most of what naming the causes took away; of all there is,
+    where none is named.
 
     Shares are of the variance that each model leaves, so they count by its mean square.
     """
     verdict = session.verdict or {}
     known = {one.variable for one in against(session, joint)}
-    ranking = [one for one in verdict.get("depends_on", {}).get(joint.name, []) if one["variable"] in known]
+    ranking = [
+        one for one in verdict.get("depends_on", {}).get(joint.name, []) if one["variable"] in known
+    ]
     if not ranking:
         return "angle"
-    before, after = (verdict[f"{model}_rmse_nm"][joint.name] ** 2 for model in ("baseline", "extended"))
+    before, after = (
+        verdict[f"{model}_rmse_nm"][joint.name] ** 2 for model in ("baseline", "extended")
+    )
     taken = after if verdict["causes"] else 0.0
-    return max(ranking, key=lambda one: one["share_before"] * before - one["share_after"] * taken)["variable"]
+    return max(ranking, key=lambda one: one["share_before"] * before - one["share_after"] * taken)[
+        "variable"
+    ]

@@ -1,4 +1,5 @@
-"""Where naming the causes makes a simulation worse, and what the files tell of why: standstill, mostly."""
+"""Where naming the causes makes a simulation worse, and what the files tell of why: standstill,
+mostly."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -22,7 +23,8 @@ NOTABLE = 1.1
 
 
 def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
-    """Return (n,) whether each row of a replay is of a second in which the machine's joint never stood."""
+    """Return (n,) whether each row of a replay is of a second in which the machine's joint never
+    stood."""
     time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
     windows = frame["window"].to_numpy()
     span = max(1, round(OVER_S / float(np.median(np.diff(time)))))
@@ -32,7 +34,8 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
 
 
 def worse(session: Session) -> list[str]:
-    """Return a sentence for each way in which the causes make things worse at a joint, and why as far as is known."""
+    """Return a sentence for each way in which the causes make things worse at a joint, and why as
+    far as is known."""
     verdict = session.verdict
     if not verdict or not verdict["causes"]:
         return []
@@ -58,7 +61,9 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
     known = [
-        BY_NAME[cause["effect"]] for cause in verdict["causes"] if cause["joint"] == name and cause["effect"] in BY_NAME
+        BY_NAME[cause["effect"]]
+        for cause in verdict["causes"]
+        if cause["joint"] == name and cause["effect"] in BY_NAME
     ]
     holds = any(effect.holds for effect in known)
     grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])

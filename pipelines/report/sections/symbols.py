@@ -1,4 +1,5 @@
-"""What the symbols of a model's parameters stand for: each term with its equation, as the effects themselves say."""
+"""What the symbols of a model's parameters stand for: each term with its equation, as the effects
+themselves say."""
 
 from dataclasses import dataclass
 
@@ -21,7 +22,8 @@ class Explained:
 
 
 def terms(session: Session) -> list[Explained]:
-    """Return every kind of term in a session's models, once; of effects that are not known here, none."""
+    """Return every kind of term in a session's models, once; of effects that are not known here,
+    none."""
     rows = [
         (row["effect"], row["joint"] if isinstance(row["joint"], str) else None)
         for one in session.of_kind("parameters")
@@ -36,13 +38,15 @@ def terms(session: Session) -> list[Explained]:
 
 
 def meaning(session: Session, effect: str, joint: str, name: str) -> str:
-    """Return what one parameter is, as its effect says; nothing where the effect is not known here."""
+    """Return what one parameter is, as its effect says; nothing where the effect is not known
+    here."""
     of = bound(session, effect, joint or None)
     return next((one.meaning for one in parameters(of) if one.name == name), "") if of else ""
 
 
 def unit(session: Session, key: str) -> str:
-    """Return the unit of a parameter of rigid body or friction by its name in an excitation's file: ``hip_viscous``."""
+    """Return the unit of a parameter of rigid body or friction by its name in an excitation's file:
+    ``hip_viscous``."""
     joint = next((one for one in session.joints if key.startswith(f"{one.name}_")), None)
     of = bound(session, "friction" if joint else "rigid_body", joint.name if joint else None)
     name = key.removeprefix(f"{joint.name}_") if joint else key
@@ -51,11 +55,14 @@ def unit(session: Session, key: str) -> str:
 
 def parameters(effect: Effect) -> tuple[Parameter, ...]:
     """Return an effect's parameters in the units of the joint that it is at."""
-    return tuple(one.at(effect.on, effect.joint) if effect.joint else one for one in effect.parameters)
+    return tuple(
+        one.at(effect.on, effect.joint) if effect.joint else one for one in effect.parameters
+    )
 
 
 def bound(session: Session, name: str, joint: str | None) -> Effect | None:
-    """Return an effect at a joint of the session's machine; None where there is no such effect or machine here."""
+    """Return an effect at a joint of the session's machine; None where there is no such effect or
+    machine here."""
     try:
         return effect_named(name)(joint=joint, on=_machine(session.joints, session))
     except InputError:

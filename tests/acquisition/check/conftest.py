@@ -11,11 +11,19 @@ from pipelines.rig import server
 def checked(rig_file, serve, monkeypatch):
     """Check a rig that swings out, against a rig file; returns the report.
 
-    ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of both;
-    ``options`` are those of the check; ``on_a_line`` puts all devices on one.
+    ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of
+    both; ``options`` are those of the check; ``on_a_line`` puts all devices on one.
     """
 
-    def run(shipped="plain", believed=None, served=None, fault=None, options=None, on_a_line=False, **changes):
+    def run(
+        shipped="plain",
+        believed=None,
+        served=None,
+        fault=None,
+        options=None,
+        on_a_line=False,
+        **changes,
+    ):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
@@ -39,7 +47,8 @@ def checked(rig_file, serve, monkeypatch):
 
 @pytest.fixture
 def altered(monkeypatch):
-    """Let devices tell something else than they measured: ``change(device, values)`` alters the values in place."""
+    """Let devices tell something else than they measured: ``change(device, values)`` alters the
+    values in place."""
 
     def alter(change):
         put = server.Device._put

@@ -33,7 +33,11 @@ class Hand:
         push = np.sin(np.pi * self.left / (2 * HALF))
         speed = -np.pi / (2 * HALF) * np.cos(np.pi * self.left / (2 * HALF)) * 200.0
         self.left = max(self.left - 1, 0)
-        angle, velocity, forces = samples.angle.copy(), samples.velocity.copy(), samples.forces.copy()
+        angle, velocity, forces = (
+            samples.angle.copy(),
+            samples.velocity.copy(),
+            samples.forces.copy(),
+        )
         angle[:], velocity[:] = 0.02, 0.0
         if self.place in ("hip", "knee") and self.left:
             j, sign = (0, 0.4) if self.place == "hip" else (1, -0.5)
@@ -76,16 +80,26 @@ def test_swapped_drives_are_told_by_which_angle_moves(checked, hand):
 
 
 def test_a_wrong_sign_is_told_by_the_way_it_goes(checked, hand):
-    said = told(checked(options={"operator": hand}, believed={ANGLE: ANGLE.replace("1e-6", "-1e-6")}))
-    assert "drive hip: its angle went down (-0.4 rad) when the hip went forward; expected up" in said
-    assert re.search(r"drive knee: its angle went up \(\+0\.[45]\d* rad\) when the knee went into flexion", said)
+    said = told(
+        checked(options={"operator": hand}, believed={ANGLE: ANGLE.replace("1e-6", "-1e-6")})
+    )
+    assert (
+        "drive hip: its angle went down (-0.4 rad) when the hip went forward; expected up" in said
+    )
+    assert re.search(
+        r"drive knee: its angle went up \(\+0\.[45]\d* rad\) when the knee went into flexion", said
+    )
     assert "turn the sign of map.drive.servo.read.angle.scale" in said
     assert "velocity is negative where the angle grows" in said
 
 
 def test_radians_taken_for_degrees_are_told_by_how_far_it_goes(checked, hand):
-    said = told(checked(options={"operator": hand}, believed={ANGLE: ANGLE.replace('"rad"', '"deg"')}))
-    assert re.search(r"drive hip: its angle changed by \+0\.00[67]\d* rad when the hip was moved", said)
+    said = told(
+        checked(options={"operator": hand}, believed={ANGLE: ANGLE.replace('"rad"', '"deg"')})
+    )
+    assert re.search(
+        r"drive hip: its angle changed by \+0\.00[67]\d* rad when the hip was moved", said
+    )
     assert 'with unit = "rad" it would be plausible: correct map.drive.servo.read.angle' in said
 
 

@@ -1,4 +1,5 @@
-"""A small movement by the drives tells whether set-point, angle, torque and velocity go the same way."""
+"""A small movement by the drives tells whether set-point, angle, torque and velocity go the same
+way."""
 
 import tempfile
 
@@ -53,20 +54,25 @@ def test_a_right_rig_answers_its_set_points(checked):
 )
 def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, there, believed, words):
     report = checked(options=MOVE, served=there, believed=believed, rest_rad="[0.0, 0.0]")
-    assert [finding.device for finding in report.findings if words in finding.text] == ["drive hip", "drive knee"], (
-        told(report)
-    )
+    assert [finding.device for finding in report.findings if words in finding.text] == [
+        "drive hip",
+        "drive knee",
+    ], told(report)
 
 
 def test_a_set_point_of_another_sign_than_its_angle_is_told_and_nothing_is_moved(checked):
     report = checked(options=MOVE, believed={WRITE: WRITE.replace("1e-6", "-1e-6")})
-    assert "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle" in told(report)
+    assert "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle" in told(
+        report
+    )
     assert report.answers == []
 
 
 @pytest.mark.parametrize("scale", ["-1e-5", "3e-5"])
 def test_a_velocity_of_the_wrong_sign_or_scale_stops_the_movement(checked, scale):
-    report = checked(options=MOVE, believed={VELOCITY: VELOCITY.replace("1e-5", scale)}, rest_rad="[0.0, 0.0]")
+    report = checked(
+        options=MOVE, believed={VELOCITY: VELOCITY.replace("1e-5", scale)}, rest_rad="[0.0, 0.0]"
+    )
     assert "rig: the guided movement was stopped: " in told(report)
     assert "velocity" in told(report)
 
@@ -100,9 +106,13 @@ def test_a_movement_that_the_rigs_limits_do_not_allow_is_told_beside_all_else_an
 
 
 @pytest.mark.parametrize("named", [False, True], ids=["before the recording", "with samples"])
-def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(checked, tmp_path, monkeypatch, named):
+def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(
+    checked, tmp_path, monkeypatch, named
+):
     def stopped(rig_file, settings, excitation, output, *given, **named_too):
-        raise DeviceError(f"hip drive: no answer; the leg was stopped{f', samples are in {output}' if named else ''}")
+        raise DeviceError(
+            f"hip drive: no answer; the leg was stopped{f', samples are in {output}' if named else ''}"
+        )
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(guided, "acquire", stopped)
@@ -118,6 +128,11 @@ def test_nothing_is_moved_where_something_is_wrong(checked):
         if written:
             controls.append(written[-1])
 
-    report = checked(options=MOVE, believed={"value = 0x4653": "value = 0x4654"}, fault=note, rest_rad="[0.0, 0.0]")
+    report = checked(
+        options=MOVE,
+        believed={"value = 0x4653": "value = 0x4654"},
+        fault=note,
+        rest_rad="[0.0, 0.0]",
+    )
     assert report.findings and not report.answers
     assert set(controls) <= {0}

@@ -32,8 +32,16 @@ def test_nothing_is_said_of_a_right_rig(checked, shipped, run):
     assert [str(finding) for finding in report.findings if finding.device != "rig"] == []
     assert len(report.devices) == 6
     for device in report.devices:
-        assert device.connected and all(entry["found"] == entry["expected"] for entry in device.identity)
-        assert 0 < device.latency.least <= device.latency.median <= device.latency.p99 <= device.latency.most
+        assert device.connected and all(
+            entry["found"] == entry["expected"] for entry in device.identity
+        )
+        assert (
+            0
+            < device.latency.least
+            <= device.latency.median
+            <= device.latency.p99
+            <= device.latency.most
+        )
         assert sum(device.latency.histogram) == device.latency.count
 
 
@@ -55,14 +63,17 @@ def test_nothing_is_said_of_a_rig_whose_drives_record_faster_than_they_are_told(
     ],
 )
 def test_a_record_that_is_not_as_the_file_says_is_found(checked, was, believed, words):
-    report = checked("recorder", served=LOCKSTEP, believed={was: believed}, options={"rate_hz": 200.0})
+    report = checked(
+        "recorder", served=LOCKSTEP, believed={was: believed}, options={"rate_hz": 200.0}
+    )
     assert words in told(report)
     assert "map.drive.servo.ring" in told(report)
 
 
 def test_a_rig_file_with_which_no_run_would_begin_is_found(checked):
-    assert "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s: for so long one lost reply" in told(
-        checked("real_time")
+    assert (
+        "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s: for so long one lost reply"
+        in told(checked("real_time"))
     )
     assert "heartbeat_s" not in told(checked("real_time", watchdog_s=1.0))
 
@@ -105,7 +116,11 @@ def test_a_register_described_wrongly_is_found_by_what_it_reads(checked, was, be
 
 def test_degrees_taken_for_radians_are_found_by_the_limits(checked):
     in_degrees = ANGLE.replace("1e-6", "1e-4").replace('"rad"', '"deg"')
-    said = told(checked(served={ANGLE: in_degrees}, believed={in_degrees: in_degrees.replace('"deg"', '"rad"')}))
+    said = told(
+        checked(
+            served={ANGLE: in_degrees}, believed={in_degrees: in_degrees.replace('"deg"', '"rad"')}
+        )
+    )
     assert "outside its limits -0.35 to 1.75 rad" in said
     assert 'with unit = "deg" it would be' in said
 
@@ -118,13 +133,17 @@ def test_swapped_bytes_are_told_from_swapped_words(checked, monkeypatch):
         if isinstance(self, server.Sensor):
             start = block.address - self.first
             words = self.registers[start : start + block.count]
-            self.registers[start : start + block.count] = [(w >> 8) | ((w & 0xFF) << 8) for w in words]
+            self.registers[start : start + block.count] = [
+                (w >> 8) | ((w & 0xFF) << 8) for w in words
+            ]
 
     monkeypatch.setattr(server.Device, "_put", swapped)
     report = checked()
     about_force = [str(finding) for finding in report.findings if "force_y" in finding.quantity]
     assert len(about_force) == 4
-    assert all("with the two bytes of each register swapped it would be" in said for said in about_force)
+    assert all(
+        "with the two bytes of each register swapped it would be" in said for said in about_force
+    )
     assert not [finding for finding in report.findings if finding.device.startswith("drive")]
 
 
@@ -135,13 +154,18 @@ def test_a_counter_that_stands_still_is_found(checked, altered):
 
 def test_registers_that_are_not_latched_with_the_counter_are_found(checked, altered):
     asked = iter(range(10**9))
-    altered(lambda device, values: "angle" in values and values.update(angle=0.1 + 1e-5 * next(asked)))
+    altered(
+        lambda device, values: "angle" in values and values.update(angle=0.1 + 1e-5 * next(asked))
+    )
     assert "angle changed while the sample counter did not" in told(checked("real_time"))
 
 
 def test_a_rate_that_the_devices_do_not_have_is_found(checked):
     said = told(checked("real_time", options={"rate_hz": 80.0}))
-    assert "drive hip: its counter goes up by 4" in said or "drive hip: its counter goes up by 3" in said
+    assert (
+        "drive hip: its counter goes up by 4" in said
+        or "drive hip: its counter goes up by 3" in said
+    )
     assert "a second, expected 80" in said
 
 
@@ -179,7 +203,14 @@ def test_an_absent_device_is_said_to_be_absent_and_the_others_are_checked(checke
     report = checked(shipped, believed=believed)
     # A busy computer is a slow line, rightly.
     assert [f.device for f in report.findings if f.device != "rig"] == ["sensor thigh_back"]
-    assert [device.latency is not None for device in report.devices] == [True, True, True, False, True, True]
+    assert [device.latency is not None for device in report.devices] == [
+        True,
+        True,
+        True,
+        False,
+        True,
+        True,
+    ]
 
 
 def test_a_rig_that_is_off_is_said_to_refuse(rig_file):
@@ -191,24 +222,39 @@ def test_a_rig_that_is_off_is_said_to_refuse(rig_file):
 def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_the_other(rig_file):
     """Six TLS lines to ports that take connections and say nothing."""
     with ExitStack() as stack:
-        ports = [stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1] for _ in range(6)]
+        ports = [
+            stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1]
+            for _ in range(6)
+        ]
         rig, number = rig_file("real_time", connect_s=1.0), iter(range(6))
-        text = re.sub(r"^(map = .*)$", lambda m: f'{m[1]}\nline = "l{next(number)}"', rig.read_text(), flags=re.M)
+        text = re.sub(
+            r"^(map = .*)$",
+            lambda m: f'{m[1]}\nline = "l{next(number)}"',
+            rig.read_text(),
+            flags=re.M,
+        )
         lines = (f'[line.l{k}]\ntransport = "tls"\nport = {port}\n' for k, port in enumerate(ports))
         rig.write_text(text + "".join(lines))
         began = time.monotonic()
         report = check_rig(rig)
         took = time.monotonic() - began
-    assert [str(finding).partition(":")[2].count("no TLS connection") for finding in report.findings] == [1] * 6
+    assert [
+        str(finding).partition(":")[2].count("no TLS connection") for finding in report.findings
+    ] == [1] * 6
     assert took < 8.0, "one line takes two seconds, one after the other they would take 12"
 
 
 def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, monkeypatch):
     async def lost(probe, report):
-        raise DeviceError("line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive")
+        raise DeviceError(
+            "line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
+        )
 
     monkeypatch.setattr(look, "_meet", lost)
-    assert told(checked()) == "rig: line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
+    assert (
+        told(checked())
+        == "rig: line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
+    )
 
 
 def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
@@ -218,7 +264,11 @@ def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
 
 
 def test_a_sensor_that_is_frozen_is_found(checked, altered):
-    altered(lambda device, values: "force_x" in values and values.update(force_x=1.0, force_y=2.0, force_z=3.0))
+    altered(
+        lambda device, values: (
+            "force_x" in values and values.update(force_x=1.0, force_y=2.0, force_z=3.0)
+        )
+    )
     assert "all three forces are constant (1, 2, 3 N)" in told(checked())
 
 

@@ -34,12 +34,15 @@ class Clock:
 
 
 def watched(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s=0.005, late=0.05):
-    """Ask both drives twice in each cycle, as acquisition does, some replies being very late; yield what is found."""
+    """Ask both drives twice in each cycle, as acquisition does, some replies being very late; yield
+    what is found."""
     draw, drift = random.Random(seed), Drift(rate_hz)
     low, high = (share / rate_hz for share in SECOND_LOOK)
 
     def way():
-        return latency_s * draw.lognormvariate(0, 0.3) + (draw.expovariate(20.0) if draw.random() < late else 0.0)
+        return latency_s * draw.lognormvariate(0, 0.3) + (
+            draw.expovariate(20.0) if draw.random() < late else 0.0
+        )
 
     bounds = [Bounds(1 / rate_hz) for _ in range(2)]
     now, ends = 1000.0, 1000.0 + BUCKET_S
@@ -91,7 +94,8 @@ def motion(instants):
 
 
 def aligned(position, knee, rows=200, batch=1):
-    """Feed a drive that samples at integers and another with its own samples; return the rows that come."""
+    """Feed a drive that samples at integers and another with its own samples; return the rows that
+    come."""
     alignment, found = Alignment([position]), []
     hip = [reading(n, n / 200, motion(n / 200)) for n in range(rows)]
     for start in range(0, rows, batch):
@@ -101,7 +105,8 @@ def aligned(position, knee, rows=200, batch=1):
 
 @pytest.mark.parametrize("batch", [1, 7])
 def test_a_drives_samples_are_brought_to_the_first_ones_instants(batch):
-    # The knee's sample m is taken at (m + 0.3) / 200 (1 + 1e-3): it is in its sample 0.999 n - 0.3 at the hip's n.
+    # The knee's sample m is taken at (m + 0.3) / 200 (1 + 1e-3): it is in its sample 0.999 n - 0.3
+    # at the hip's n.
     def at(m):
         return (m + 0.3) / 200 * (1 + 1e-3)
 
@@ -150,25 +155,44 @@ def moved():
     plant = Plant(PlantSettings(), "exo_alone", seed=1, sample_rate_hz=1000.0)
     instants = (np.arange(round((LEAD_S + RUN_S) * 1000)) + 0.5) / 1000
     share = np.minimum(instants / 3.0, 1.0)[:, np.newaxis] ** 2
-    return plant.run(plant.reference + share * (RICH.at(instants)[0] - plant.reference), np.ones(2, bool))
+    return plant.run(
+        plant.reference + share * (RICH.at(instants)[0] - plant.reference), np.ones(2, bool)
+    )
 
 
 def readings_of(moved, joint, ppm, offset_s):
     """Return what a drive with a clock of its own tells."""
     told = OwnClock(ppm, offset_s, RATE, 1000.0).sampled(moved)
     return [
-        Reading(int(n), float(t), float(q[joint]), float(tau[joint]), 0.0, float(v[joint]), 20.0, float(r[joint]))
+        Reading(
+            int(n),
+            float(t),
+            float(q[joint]),
+            float(tau[joint]),
+            0.0,
+            float(v[joint]),
+            20.0,
+            float(r[joint]),
+        )
         for n, t, q, tau, v, r in zip(
-            told.sequence, told.time, told.angle, told.torque, told.velocity, told.reference, strict=True
+            told.sequence,
+            told.time,
+            told.angle,
+            told.torque,
+            told.velocity,
+            told.reference,
+            strict=True,
         )
     ]
 
 
 def recorded(moved, ppm, offset_s):
-    """Return a recording of a hip and a knee whose clock drifts against the hip's, brought to the hip's instants."""
+    """Return a recording of a hip and a knee whose clock drifts against the hip's, brought to the
+    hip's instants."""
     hip, knee = readings_of(moved, 0, 0.0, 0.0), readings_of(moved, 1, ppm, offset_s)
     began = knee[0].sequence
-    # Sample n of a drive's n is taken half a period after the n-th began; the host's clock starts at 1000 s.
+    # Sample n of a drive's n is taken half a period after the n-th began; the host's clock starts
+    # at 1000 s.
     clocks = [Clock(RATE, of, 1000.0 + 0.5 / RATE / (1 + 1e-6 * of)) for of in (0.0, ppm)]
     clocks[1].origin -= began * clocks[1].period
     found, rows = [None], []
@@ -206,7 +230,8 @@ def test_drives_whose_clocks_drift_identify_the_parameters_of_those_whose_clocks
 
 
 def test_uncorrected_the_same_drift_would_spoil_them(moved):
-    """Sample by sample, as counters tell it: after 20 s the knee's is 0.16 samples off, its offset is any."""
+    """Sample by sample, as counters tell it: after 20 s the knee's is 0.16 samples off, its offset
+    is any."""
     common, metadata = recorded(moved, 0.0, 0.0)
     late = common.copy()
     for column in ("knee_angle_rad", "knee_torque_nm"):

@@ -1,4 +1,5 @@
-"""A cuff sensor whose counter goes back or leaps was restarted, and its zero may be another: the run stops."""
+"""A cuff sensor whose counter goes back or leaps was restarted, and its zero may be another: the
+run stops."""
 
 import asyncio
 
@@ -54,7 +55,9 @@ def test_a_counter_that_wraps_goes_on(told):
 
 @pytest.mark.parametrize("rig", ["real_time", "plain"])
 def test_a_counter_that_goes_back_stops_the_run(told, rig):
-    with pytest.raises(DeviceError, match=r"sensor thigh_front .*went back from 500 to 3; was it restarted\?"):
+    with pytest.raises(
+        DeviceError, match=r"sensor thigh_front .*went back from 500 to 3; was it restarted\?"
+    ):
         told([*range(400, 501), 3], rig)
 
 

@@ -1,4 +1,5 @@
-"""Nobody's torque is taken by a second exoid, or by one that finds another program at the drives."""
+"""Nobody's torque is taken by a second exoid, or by one that finds another program at the
+drives."""
 
 import os
 import subprocess
@@ -40,11 +41,14 @@ def told(monkeypatch):
     return words
 
 
-def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first(rig_file, excitation, tmp_path):
+def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first(
+    rig_file, excitation, tmp_path
+):
     path = rig_file(port=free_port())
     settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
     with alone(load_rig(path)), pytest.raises(DeviceError) as caught:
-        acquire(path, settings, excitation, tmp_path / "test.parquet")  # there is no rig to connect to
+        # There is no rig to connect to.
+        acquire(path, settings, excitation, tmp_path / "test.parquet")
     assert str(caught.value).endswith(
         f"another exoid (process {os.getpid()}) uses the devices there; wait for it to end, or end it; nothing "
         "was moved"
@@ -60,7 +64,10 @@ def test_a_check_beside_a_run_is_refused_before_it_connects(rig_file, monkeypatc
         raise AssertionError("connected")
 
     monkeypatch.setattr("pipelines.acquisition.check.check._check", connect)
-    with alone(load_rig(path)), pytest.raises(DeviceError, match=rf"another exoid \(process {os.getpid()}\) uses"):
+    with (
+        alone(load_rig(path)),
+        pytest.raises(DeviceError, match=rf"another exoid \(process {os.getpid()}\) uses"),
+    ):
         check_rig(path, 200.0, move=move)
 
 
@@ -69,7 +76,10 @@ def test_who_is_killed_holds_no_line_any_more(rig_file):
     holder = subprocess.Popen([sys.executable, "-c", HOLD, path], stdout=subprocess.PIPE, text=True)
     with holder:
         assert holder.stdout.readline() == "held\n"
-        with pytest.raises(DeviceError, match=rf"another exoid \(process {holder.pid}\)"), alone(load_rig(path)):
+        with (
+            pytest.raises(DeviceError, match=rf"another exoid \(process {holder.pid}\)"),
+            alone(load_rig(path)),
+        ):
             raise AssertionError("the line is held")
         holder.kill()
         holder.wait()
@@ -83,7 +93,9 @@ def test_a_line_is_the_same_however_it_is_written(rig_file, tmp_path, kind):
     (tmp_path / "by-id").symlink_to(tmp_path / "tty")
     first, second = {
         "host": (TcpLine(host="127.0.0.1", port=number), TcpLine(host="localhost", port=number)),
-        "port": [RtuLine(transport="rtu", serial_port=str(tmp_path / name)) for name in ("tty", "by-id")],
+        "port": [
+            RtuLine(transport="rtu", serial_port=str(tmp_path / name)) for name in ("tty", "by-id")
+        ],
     }[kind]
 
     def on(line):
@@ -106,13 +118,18 @@ def left_enabled(monkeypatch):
 
 
 @pytest.mark.parametrize("drops", [(), ("enabled_",)])
-def test_a_drive_that_somebody_else_sends_set_points_is_told_nothing(record, told, left_enabled, drops):
+def test_a_drive_that_somebody_else_sends_set_points_is_told_nothing(
+    record, told, left_enabled, drops
+):
     def goes_on(device, function, written):
         if isinstance(device, Drive) and device.registers:
             device.registers[device.write.address - device.first + 1] += 1
 
     served = []
-    with pytest.raises(DeviceError, match=r"^drive hip .* and drive knee .*: driven by somebody else, since angle or"):
+    with pytest.raises(
+        DeviceError,
+        match=r"^drive hip .* and drive knee .*: driven by somebody else, since angle or",
+    ):
         record(fault=goes_on, served_as=served, drop=drops)
     assert not told
     assert served[0].enabled == [True, True]

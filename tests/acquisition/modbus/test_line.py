@@ -33,7 +33,8 @@ TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")
 
 @pytest.fixture(scope="session")
 def certificates(tmp_path_factory):
-    """A certificate of this computer's own with its key, PEM; and another that nobody has signed either."""
+    """A certificate of this computer's own with its key, PEM; and another that nobody has signed
+    either."""
     if shutil.which("openssl") is None:
         pytest.skip("needs the openssl command to make a certificate")
     folder = tmp_path_factory.mktemp("certificates")
@@ -44,7 +45,17 @@ def certificates(tmp_path_factory):
              f"{name}.pem"],
             cwd=folder, check=True, capture_output=True,
         )  # fmt: skip
-    locked = ["openssl", "pkey", "-in", "own.key", "-aes256", "-passout", "pass:secret", "-out", "locked.key"]
+    locked = [
+        "openssl",
+        "pkey",
+        "-in",
+        "own.key",
+        "-aes256",
+        "-passout",
+        "pass:secret",
+        "-out",
+        "locked.key",
+    ]
     subprocess.run(locked, cwd=folder, check=True, capture_output=True)
     return folder
 
@@ -57,7 +68,12 @@ def line_of(tmp_path, request):
         keys = {"transport": transport}
         if transport == "rtu":
             # Without silence, which would only make the tests long.
-            keys |= {"serial_port": str(tmp_path / "port"), "baud_rate": 115200, "parity": "none", "silence_s": 0.0}
+            keys |= {
+                "serial_port": str(tmp_path / "port"),
+                "baud_rate": 115200,
+                "parity": "none",
+                "silence_s": 0.0,
+            }
         else:
             keys |= {"port": free_port()}
         if transport == "tls":
@@ -83,7 +99,10 @@ def on_line(rig_file):
         return rig_file(
             ramp_s=ramp_s,
             watchdog_s=watchdog_s,
-            replace={**devices, "[map.drive.servo]\n": f"[line.{name}]\n{table}\n[map.drive.servo]\n"},
+            replace={
+                **devices,
+                "[map.drive.servo]\n": f"[line.{name}]\n{table}\n[map.drive.servo]\n",
+            },
             **changes,
         )
 
@@ -155,7 +174,9 @@ def on(path, ask):
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
-def test_devices_on_one_line_asked_all_at_once_each_get_their_own_answer(serve, on_line, line_of, transport):
+def test_devices_on_one_line_asked_all_at_once_each_get_their_own_answer(
+    serve, on_line, line_of, transport
+):
     path = on_line(line_of(transport))
 
     async def identities(machine):
@@ -167,7 +188,9 @@ def test_devices_on_one_line_asked_all_at_once_each_get_their_own_answer(serve, 
     assert found == ([[0x4558]] * 2 + [[0x4653]] * 4) * 5
 
 
-def test_a_line_is_quiet_before_each_request_for_as_long_as_the_rig_file_says(serve, on_line, line_of):
+def test_a_line_is_quiet_before_each_request_for_as_long_as_the_rig_file_says(
+    serve, on_line, line_of
+):
     path = on_line(line_of("rtu", silence_s=0.02))
 
     async def ask(machine):
@@ -181,14 +204,18 @@ def test_a_line_is_quiet_before_each_request_for_as_long_as_the_rig_file_says(se
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
-def test_a_lost_line_is_one_error_that_names_it_and_all_who_are_on_it(serve, on_line, line_of, transport):
+def test_a_lost_line_is_one_error_that_names_it_and_all_who_are_on_it(
+    serve, on_line, line_of, transport
+):
     path = on_line(line_of(transport))
     with serve(path, None) as served:
 
         async def ask(machine):
             began = time.monotonic()
             served.stop()
-            answers = await asyncio.gather(*(d.device.read(0, 1) for d in machine.drives), return_exceptions=True)
+            answers = await asyncio.gather(
+                *(d.device.read(0, 1) for d in machine.drives), return_exceptions=True
+            )
             return time.monotonic() - began, answers
 
         waited, answers = on(path, ask)
@@ -216,7 +243,9 @@ def test_a_line_lost_in_a_run_stops_it_and_is_told_once(on_line, line_of, record
     assert str(caught.value).count("no such serial port") == 1
 
 
-def test_after_a_broken_connection_the_drives_are_disabled_on_a_new_one(on_line, line_of, record_on):
+def test_after_a_broken_connection_the_drives_are_disabled_on_a_new_one(
+    on_line, line_of, record_on
+):
     served, left = [], [200]
 
     def hang_up(device, function, written):
@@ -258,7 +287,9 @@ def test_a_serial_port_without_permission_says_how_to_get_it():
 
 def test_a_path_that_is_no_serial_port_is_refused(on_line, line_of, tmp_path):
     (tmp_path / "port").write_text("")
-    assert connecting(on_line(line_of("rtu"))).startswith(f"line leg ({tmp_path}/port): no connection (")
+    assert connecting(on_line(line_of("rtu"))).startswith(
+        f"line leg ({tmp_path}/port): no connection ("
+    )
 
 
 def test_settings_that_a_serial_port_does_not_take_are_told(serve, on_line, line_of):
@@ -267,17 +298,26 @@ def test_settings_that_a_serial_port_does_not_take_are_told(serve, on_line, line
         assert "cannot be set up like that" in connecting(path)
 
 
-def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(serve, on_line, line_of, certificates):
+def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(
+    serve, on_line, line_of, certificates
+):
     path = on_line(line_of("tls"))
     with serve(path, None):
         believed = path.with_name("believed.toml")
-        believed.write_text(path.read_text().replace(f"ca = '{certificates}/own", f"ca = '{certificates}/other"))
-        assert "its certificate is not to be trusted (self-signed certificate" in connecting(believed)
+        believed.write_text(
+            path.read_text().replace(f"ca = '{certificates}/own", f"ca = '{certificates}/other")
+        )
+        assert "its certificate is not to be trusted (self-signed certificate" in connecting(
+            believed
+        )
 
 
 @pytest.mark.parametrize(
     ("days", "found", "advice"),
-    [(-2, "certificate has expired", "renew it at the rig"), (2, "certificate is not yet valid", "set the clocks")],
+    [
+        (-2, "certificate has expired", "renew it at the rig"),
+        (2, "certificate is not yet valid", "set the clocks"),
+    ],
 )
 def test_a_certificate_out_of_its_time_is_told_as_that(
     serve, on_line, line_of, certificates, tmp_path, days, found, advice
@@ -303,14 +343,19 @@ def test_a_certificate_out_of_its_time_is_told_as_that(
 
 
 @pytest.mark.parametrize("shown", ["", r"\1 = '\2other.\3'\n"], ids=["none", "another's"])
-def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(serve, on_line, line_of, shown):
+def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(
+    serve, on_line, line_of, shown
+):
     path = on_line(line_of("tls"))
     with serve(path, None):
         nobody = path.with_name("nobody.toml")
         pattern = r"^(certificate|key) = '(.*)own\.(.*)'\n"
         nobody.write_text(re.sub(pattern, shown, path.read_text(), flags=re.MULTILINE))
         why = connecting(nobody)
-    assert re.match(r"line leg .*: (the other end closed the line before its first answer, .*does not trust|no )", why)
+    assert re.match(
+        r"line leg .*: (the other end closed the line before its first answer, .*does not trust|no )",
+        why,
+    )
     assert "certificate and key" in why
 
 
@@ -325,7 +370,9 @@ def test_a_port_that_does_not_speak_tls_is_told(serve, on_line, line_of):
     path = on_line(line_of("tcp"), connect_s=1.0)
     port = re.search(r"port = (\d+)", path.read_text())[1]
     with serve(path, None):
-        assert "no TLS connection" in connecting(on_line(f"transport = 'tls'\nport = {port}\n", connect_s=1.0))
+        assert "no TLS connection" in connecting(
+            on_line(f"transport = 'tls'\nport = {port}\n", connect_s=1.0)
+        )
 
 
 def test_a_certificate_that_is_none_is_refused(on_line, tmp_path):
@@ -334,20 +381,29 @@ def test_a_certificate_that_is_none_is_refused(on_line, tmp_path):
     assert why.startswith(f"{tmp_path}/ca.pem: is no certificate that can be used")
 
 
-def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(on_line, line_of, certificates):
-    locked, expected = str(certificates / "locked.key"), f"{certificates}/locked.key: is protected by a passphrase, "
+def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(
+    on_line, line_of, certificates
+):
+    locked, expected = (
+        str(certificates / "locked.key"),
+        f"{certificates}/locked.key: is protected by a passphrase, ",
+    )
     assert connecting(on_line(line_of("tls", key=locked))).startswith(expected)
     with pytest.raises(SettingsError) as refused:
         _tls_context(load_rig(on_line(line_of("tls", rig_key=locked))).line["leg"])
     assert str(refused.value).startswith(expected)
 
 
-def test_a_line_that_does_not_come_back_reads_no_certificates_in_the_middle_of_a_stop(on_line, line_of, monkeypatch):
+def test_a_line_that_does_not_come_back_reads_no_certificates_in_the_middle_of_a_stop(
+    on_line, line_of, monkeypatch
+):
     rig = load_rig(on_line(line_of("tls")))
 
     async def come_back():
         line = lines_of(rig)(rig.drive[0])
-        monkeypatch.setattr(ssl, "create_default_context", lambda **files: pytest.fail("reads files"))
+        monkeypatch.setattr(
+            ssl, "create_default_context", lambda **files: pytest.fail("reads files")
+        )
         await line.connect()
 
     with pytest.raises(DeviceError, match=r"^line leg .*: no connection \("):
@@ -356,7 +412,11 @@ def test_a_line_that_does_not_come_back_reads_no_certificates_in_the_middle_of_a
 
 def test_what_is_written_to_one_end_of_a_null_modem_comes_out_of_the_other():
     async def talk():
-        with null_modem() as (left, right), serial.Serial(left) as a, serial.Serial(right, timeout=0) as b:
+        with (
+            null_modem() as (left, right),
+            serial.Serial(left) as a,
+            serial.Serial(right, timeout=0) as b,
+        ):
             for one, other, said in ((a, b, b"\x01\x03\r\n"), (b, a, b"\x00\xff\x11\x13")):
                 other.timeout = 0
                 one.write(said)
@@ -374,7 +434,8 @@ def test_a_line_too_slow_for_the_rate_is_refused_before_anything_moves(on_line, 
     path = on_line(line_of("rtu", baud_rate=9600, silence_s=0.004), shipped="real_time")
     with pytest.raises(SettingsError) as caught:
         record_on(path, "exo_alone", lambda device, function, written: touched.append(function))
-    # 52 + 52 characters of two exchanges and 17 of a look at the counter, 10 bits each, and 6 times 4 ms of silence.
+    # 52 + 52 characters of two exchanges and 17 of a look at the counter, 10 bits each, and 6 times
+    # 4 ms of silence.
     assert 1 / (121 * 10 / 9600 + 0.024) == pytest.approx(6.7, abs=0.05)
     assert str(caught.value) == (
         f"{path}: line leg ({path.with_name('port')}): 200 samples a second are asked for, at most 6 fit through; "
@@ -384,7 +445,8 @@ def test_a_line_too_slow_for_the_rate_is_refused_before_anything_moves(on_line, 
 
 
 @pytest.mark.parametrize(
-    ("baud_rate", "silence"), [(9600, 3.5 * 11 / 9600), (19200, 3.5 * 11 / 19200), (38400, 0.00175), (921600, 0.00175)]
+    ("baud_rate", "silence"),
+    [(9600, 3.5 * 11 / 9600), (19200, 3.5 * 11 / 19200), (38400, 0.00175), (921600, 0.00175)],
 )
 def test_silence_is_what_the_standard_says_where_the_rig_file_says_nothing(baud_rate, silence):
     line = RtuLine(transport="rtu", serial_port="x", baud_rate=baud_rate)
@@ -393,7 +455,8 @@ def test_silence_is_what_the_standard_says_where_the_rig_file_says_nothing(baud_
 
 
 class Slow:
-    """A device behind a serial device server: its n-th answer's words are all n, and come after ``delays[n]``."""
+    """A device behind a serial device server: its n-th answer's words are all n, and come after
+    ``delays[n]``."""
 
     def __init__(self, *delays):
         self.delays, self.asked, self.writers = delays, 0, []
@@ -417,7 +480,12 @@ class Slow:
             await line.connect()
             try:
                 return await ask(
-                    Device("sensor thigh_front", 11, line, SafetySettings(watchdog_s=5.0, reply_s=reply_s))
+                    Device(
+                        "sensor thigh_front",
+                        11,
+                        line,
+                        SafetySettings(watchdog_s=5.0, reply_s=reply_s),
+                    )
                 )
             finally:
                 line.close()
@@ -439,7 +507,8 @@ def test_a_reply_that_comes_too_late_on_a_serial_line_is_not_taken_for_the_next_
                 found.append(None)
         return found
 
-    # Without waiting for it, the second would be told [0, 0, 0, 0], and the third be refused for its length.
+    # Without waiting for it, the second would be told [0, 0, 0, 0], and the third be refused for
+    # its length.
     assert Slow(0.55, 0.0, 0.0, 0.0).at_work(ask) == [None, [1] * 4, [2] * 7, [3] * 4]
     assert Slow(0.0, 0.55, 0.0, 0.0).at_work(ask) == [[0] * 4, None, [2] * 7, [3] * 4]
 

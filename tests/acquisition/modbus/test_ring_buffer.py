@@ -21,7 +21,13 @@ RECORD = {
     "current": {"address": 4, "type": "int16", "scale": 10.0, "unit": "mA"},
 }
 RING = RingSettings.model_validate(
-    {"newest": {"address": 10, "type": "uint16"}, "address": 1000, "capacity": CAPACITY, "words": 8, "record": RECORD}
+    {
+        "newest": {"address": 10, "type": "uint16"},
+        "address": 1000,
+        "capacity": CAPACITY,
+        "words": 8,
+        "record": RECORD,
+    }
 )
 QUEUE = RingSettings.model_validate({"fifo": 50, "words": 8, "record": RECORD})
 
@@ -43,7 +49,12 @@ class Drive:
     def sample(self, count):
         for _ in range(count):
             self.number += 1
-            values = {"sequence": self.number % 65536, "time": 0.0, "angle": angle(self.number), "current": 0.0}
+            values = {
+                "sequence": self.number % 65536,
+                "time": 0.0,
+                "angle": angle(self.number),
+                "current": 0.0,
+            }
             self.ring.append(self.number, values)
 
     async def read(self, address, count, *, in_motion):
@@ -69,7 +80,9 @@ def numbered():
 
 
 def drained(ring, newest):
-    return [(number, round(record["angle"], 6)) for number, record in asyncio.run(ring.drain(newest))]
+    return [
+        (number, round(record["angle"], 6)) for number, record in asyncio.run(ring.drain(newest))
+    ]
 
 
 def truth(numbers):
@@ -195,12 +208,18 @@ def test_a_ring_that_cannot_be_is_refused_with_its_key(rig_file, old, new, words
 
 
 def test_a_set_point_rate_that_does_not_divide_the_rings_is_refused(rig_file):
-    with pytest.raises(SettingsError, match="record_rate_hz: found 1000 with set-points at 300 Hz, expected a whole"):
+    with pytest.raises(
+        SettingsError,
+        match="record_rate_hz: found 1000 with set-points at 300 Hz, expected a whole",
+    ):
         load_rig(rig_file("recorder")).samples_per_cycle(300.0)
 
 
 def test_a_ring_that_is_overwritten_from_one_set_point_to_the_next_is_refused(rig_file):
     small = rig_file("recorder", replace={"capacity = 2048": "capacity = 16"})
     assert load_rig(small).samples_per_cycle(200.0) == 5
-    with pytest.raises(SettingsError, match=r"ring\.capacity: found 16 with 10 records from one set-point to the next"):
+    with pytest.raises(
+        SettingsError,
+        match=r"ring\.capacity: found 16 with 10 records from one set-point to the next",
+    ):
         load_rig(small).samples_per_cycle(100.0)

@@ -7,7 +7,10 @@ import pytest
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.check import unfit
-from pipelines.acquisition.preconditions.drive_watchdog import refuse_short_heartbeat, replies_waited_for
+from pipelines.acquisition.preconditions.drive_watchdog import (
+    refuse_short_heartbeat,
+    replies_waited_for,
+)
 from pipelines.errors import SettingsError
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
@@ -27,7 +30,9 @@ def with_line(rig_file):
 
     def write(table, *devices, **changes):
         tables = {"[map.drive.servo]\n": f"[line.leg]\n{table}\n[map.drive.servo]\n"}
-        return rig_file("real_time", replace={d: f'{d}line = "leg"\n' for d in devices} | tables, **changes)
+        return rig_file(
+            "real_time", replace={d: f'{d}line = "leg"\n' for d in devices} | tables, **changes
+        )
 
     return write
 
@@ -35,11 +40,17 @@ def with_line(rig_file):
 @pytest.mark.parametrize("line", LINES)
 @pytest.mark.parametrize("kind", ["lost", "no answer"])
 @pytest.mark.parametrize("at", range(125, 240, 7))
-def test_a_lost_reply_leaves_its_drive_without_a_set_point_for_as_long_as_is_stated(tmp_path, line, kind, at):
+def test_a_lost_reply_leaves_its_drive_without_a_set_point_for_as_long_as_is_stated(
+    tmp_path, line, kind, at
+):
     run = run_with(tmp_path, Event(at, kind), line=line, trajectory=times(0.1))
     rig = RIGS["real_time", True, FINE_RAD, line]
     for joint, drive in enumerate(rig.drive):
-        heard = [told.time for told in run.rig.told if told.joint == joint and told.control and told.arrived]
+        heard = [
+            told.time
+            for told in run.rig.told
+            if told.joint == joint and told.control and told.arrived
+        ]
         waits = replies_waited_for(rig, drive, with_sensors=False)
         assert np.diff(heard).max() <= waits * rig.safety.longest_reply_s + 2 / RATE + SOON_S
 
@@ -54,7 +65,9 @@ def test_a_drive_is_left_alone_for_twice_as_long_on_a_line_that_it_shares_or_whe
     with_line, table, devices, with_sensors, waits
 ):
     rig = load_rig(with_line(table, *devices))
-    assert [replies_waited_for(rig, drive, with_sensors=with_sensors) for drive in rig.drive] == waits
+    assert [
+        replies_waited_for(rig, drive, with_sensors=with_sensors) for drive in rig.drive
+    ] == waits
 
 
 def test_a_drive_that_would_let_go_after_a_lost_reply_is_refused_before_anything_is_connected(
@@ -72,14 +85,19 @@ def test_a_drive_that_would_let_go_after_a_lost_reply_is_refused_before_anything
     )
 
 
-def test_what_the_rig_file_says_of_the_drives_own_watchdogs_counts_and_nothing_else_is_refused(with_line, rig_file):
+def test_what_the_rig_file_says_of_the_drives_own_watchdogs_counts_and_nothing_else_is_refused(
+    with_line, rig_file
+):
     both = "unit = 1\n", "unit = 2\n"
     shared = load_rig(with_line(TCP, *both))
     for heartbeat_s, is_refused in ((0.6, True), (0.61, True), (0.62, False)):
         safety = shared.safety.model_copy(update={"heartbeat_s": heartbeat_s})
         told = shared.model_copy(update={"safety": safety})
         if is_refused:
-            with pytest.raises(SettingsError, match=re.escape(f"safety.heartbeat_s: found {heartbeat_s:g}, expected")):
+            with pytest.raises(
+                SettingsError,
+                match=re.escape(f"safety.heartbeat_s: found {heartbeat_s:g}, expected"),
+            ):
                 refuse_short_heartbeat(told, 200.0, with_sensors=False)
         else:
             refuse_short_heartbeat(told, 200.0, with_sensors=False)
@@ -87,12 +105,16 @@ def test_what_the_rig_file_says_of_the_drives_own_watchdogs_counts_and_nothing_e
     refuse_short_heartbeat(load_rig(rig_file("real_time")), 200.0, with_sensors=True)  # a line each
 
 
-@pytest.mark.parametrize("path", sorted((datasets() / "rigs").glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((datasets() / "rigs").glob("*.toml")), ids=lambda path: path.stem
+)
 def test_no_shipped_rig_lets_go_after_a_lost_reply(path):
     refuse_short_heartbeat(load_rig(path), 100.0, with_sensors=True)
 
 
-def test_a_watchdog_that_would_bite_between_two_samples_is_refused_before_anything_is_connected(rig_file, excitation):
+def test_a_watchdog_that_would_bite_between_two_samples_is_refused_before_anything_is_connected(
+    rig_file, excitation
+):
     path = rig_file("real_time", free_port(), watchdog_s=0.01)
     run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
     with pytest.raises(SettingsError) as refused:

@@ -44,14 +44,17 @@ def test_a_limit_that_is_an_empty_machines_is_refused(lab, line, key):
 
 def test_a_cuff_that_is_hardly_ever_read_is_refused(lab):
     with pytest.raises(
-        SettingsError, match=r"sensor\[0\]\.every: found 100, which is 0\.5 s at 200 Hz; expected a force"
+        SettingsError,
+        match=r"sensor\[0\]\.every: found 100, which is 0\.5 s at 200 Hz; expected a force",
     ):
         refuse_unguarded(lab(("every = 4", "every = 100")), 200.0)
 
 
 def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
     assert unnoticed(lab()) == []
-    (warning,) = unnoticed(lab(("enabled_mask = 0x006F", "enabled_mask = 0x0000"), ("enabled_value = 0x0027", "")))
+    (warning,) = unnoticed(
+        lab(("enabled_mask = 0x006F", "enabled_mask = 0x0000"), ("enabled_value = 0x0027", ""))
+    )
     assert "no enabled_mask for the drive of hip and knee" in warning
     assert "0.1 rad" in warning
 

@@ -13,7 +13,8 @@ EXCHANGE = 23
 
 @pytest.fixture
 def slowly(record):
-    """Record at 50 Hz on a rig that takes its time; returns why that was refused, and which devices were told."""
+    """Record at 50 Hz on a rig that takes its time; returns why that was refused, and which devices
+    were told."""
 
     def run(takes_s, who, run):
         told, seen = set(), []
@@ -35,8 +36,13 @@ def slowly(record):
 
 def test_a_rate_that_drives_are_too_slow_for_is_refused_before_any_is_told_anything(slowly):
     why, told = slowly(0.011, "drives", "exo_alone")
-    assert "cycles in which every device was asked took longer than the 20 ms from one set-point to the next" in why
-    assert why.endswith("lower acquire.sample_rate_hz, or close what else this computer does; nothing was moved")
+    assert (
+        "cycles in which every device was asked took longer than the 20 ms from one set-point to the next"
+        in why
+    )
+    assert why.endswith(
+        "lower acquire.sample_rate_hz, or close what else this computer does; nothing was moved"
+    )
     assert not told
 
 

@@ -14,7 +14,9 @@ from pipelines.settings.rig import load_rig
 COARSE = {'scale = 1e-6, unit = "rad" }\ncontrol': 'scale = 0.19, unit = "deg" }\ncontrol'}
 
 
-def test_set_points_that_would_leap_a_count_are_refused_at_the_rate_at_which_they_would(rig_file, excitation, tmp_path):
+def test_set_points_that_would_leap_a_count_are_refused_at_the_rate_at_which_they_would(
+    rig_file, excitation, tmp_path
+):
     path = rig_file(replace=COARSE)
     refuse_coarse_set_points(load_rig(path).in_force("with_human"), 100.0)
     run = RunSettings(name="test", run="with_human", purpose="train", duration_s=1.0)

@@ -1,4 +1,5 @@
-"""A journal that is damaged anywhere, in any way a disk damages a file, never gives wrong numbers for right ones."""
+"""A journal that is damaged anywhere, in any way a disk damages a file, never gives wrong numbers
+for right ones."""
 
 import numpy as np
 import pytest
@@ -49,7 +50,8 @@ class Written:
         return {BATCH * k + i for k in kept for i in range(BATCH)}
 
     def recovered(self, damaged, output):
-        """Recover a damaged journal; return its samples' numbers after it was found that no value is wrong."""
+        """Recover a damaged journal; return its samples' numbers after it was found that no value
+        is wrong."""
         self.path.write_bytes(damaged)
         try:
             made = recover(self.path, output)
@@ -63,7 +65,11 @@ class Written:
         found = frame["sequence"].to_numpy() - 7000
         assert np.array_equal(frame[COLUMNS].to_numpy(), [row(k) for k in found])
         account = made.account
-        assert len(found) == account.samples == SAMPLES - account.missed - (account.cut_off - (200 - SAMPLES))
+        assert (
+            len(found)
+            == account.samples
+            == SAMPLES - account.missed - (account.cut_off - (200 - SAMPLES))
+        )
         if account.damaged:
             assert self.path.read_bytes() == damaged
         else:
@@ -96,7 +102,9 @@ HOW = ("zeroed", "erased", "random", "left out", "twice", "stale", "inserted", "
 
 
 @pytest.mark.parametrize("how", HOW)
-def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(written, tmp_path, how):
+def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(
+    written, tmp_path, how
+):
     (tmp_path / "other").mkdir()
     stale = Written(tmp_path / "other", ended=True, run="with_human").bytes
     rng = np.random.default_rng(5)
@@ -107,7 +115,9 @@ def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_r
         assert written.untouched(begin, end) <= found, (how, begin)
 
 
-def test_whatever_bytes_are_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(written, tmp_path):
+def test_whatever_bytes_are_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(
+    written, tmp_path
+):
     (tmp_path / "other").mkdir()
     stale = Written(tmp_path / "other", ended=True, run="with_human").bytes
     rng = np.random.default_rng(6)
@@ -115,14 +125,18 @@ def test_whatever_bytes_are_damaged_each_row_recovered_is_one_recorded_and_the_r
         begin = int(rng.integers(len(written.bytes)))
         end = min(begin + int(2 ** rng.uniform(0, 11)), len(written.bytes))
         damaged = spoil(written.bytes, rng, rng.choice(HOW), begin, end, stale)
-        assert written.untouched(begin, end) <= written.recovered(damaged, tmp_path / "made.parquet")
+        assert written.untouched(begin, end) <= written.recovered(
+            damaged, tmp_path / "made.parquet"
+        )
 
 
 def flipped(whole, at, bit):
     return whole[:at] + bytes([whole[at] ^ 1 << bit]) + whole[at + 1 :]
 
 
-def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other_batch(written, tmp_path):
+def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other_batch(
+    written, tmp_path
+):
     begin, end = written.places[3]
     for at in range(begin, end, 7):
         found = written.recovered(flipped(written.bytes, at, at % 8), tmp_path / "made.parquet")
@@ -150,7 +164,9 @@ def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_
 
 @pytest.mark.parametrize("why", ["stopped by Ctrl-C; the leg was stopped", None])
 @pytest.mark.parametrize("lost", [3, 8])
-def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_and_where(tmp_path, why, lost):
+def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_and_where(
+    tmp_path, why, lost
+):
     """Eight batches are all that it had: then there is no recording, and none is named."""
     written, output = Written(tmp_path, ended=True, why=why), tmp_path / "one.parquet"
     begin, end = written.places[0][0], written.places[lost - 1][1]

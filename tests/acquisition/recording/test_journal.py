@@ -140,7 +140,9 @@ def test_a_disk_that_gives_an_error_is_no_end_of_a_journal(three_batches, monkey
 
     journal = JournalFile(path)
     monkeypatch.setattr("pipelines.acquisition.recording.journal.open", Failing, raising=False)
-    with pytest.raises(InputError, match=r"cannot be read \(Input/output error\); nothing was changed"):
+    with pytest.raises(
+        InputError, match=r"cannot be read \(Input/output error\); nothing was changed"
+    ):
         list(journal.batches())
 
 
@@ -216,4 +218,6 @@ def test_a_run_that_is_killed_before_its_first_sample_has_said_no_last_word(tmp_
 
 
 def test_other_readers_of_arrow_read_a_journal_as_it_is(three_batches):
-    assert pa.ipc.open_stream(three_batches[0]).read_all()["sequence"].to_pylist() == list(range(150))
+    assert pa.ipc.open_stream(three_batches[0]).read_all()["sequence"].to_pylist() == list(
+        range(150)
+    )

@@ -1,4 +1,5 @@
-"""Recorder mode: the drives sample by themselves, faster than set-points come, and every sample is drained."""
+"""Recorder mode: the drives sample by themselves, faster than set-points come, and every sample is
+drained."""
 
 import asyncio
 import time
@@ -32,13 +33,19 @@ QUEUE = {
 
 @pytest.fixture
 def record_in_real_time(tmp_path, excitation, rig_file):
-    """Record two seconds at 1 kHz, told 50 times a second, the rig in a process of its own: a busy computer can too."""
+    """Record two seconds at 1 kHz, told 50 times a second, the rig in a process of its own: a busy
+    computer can too."""
 
     def run(run="exo_alone", **replace):
-        # So slow a motion that set-points which are left out do not jerk the leg; that is not the point here.
-        excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
+        # So slow a motion that set-points which are left out do not jerk the leg; that is not the
+        # point here.
+        excitation.write_text(
+            excitation.read_text().replace("6.283185307179586", "1.2566370614359172")
+        )
         changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "cuff_force_n": 1e4, "speed_rad_s": 30.0}
-        rig = rig_file("recorder", replace={"embedded = false": "embedded = true", **replace}, **changes)
+        rig = rig_file(
+            "recorder", replace={"embedded = false": "embedded = true", **replace}, **changes
+        )
         settings = RunSettings(name="test", run=run, purpose="train", duration_s=2.0)
         acquire(rig, settings, excitation, tmp_path / "test.parquet", 50.0)
         return RECORDING.read(tmp_path / "test.parquet")
@@ -50,7 +57,11 @@ def record_in_real_time(tmp_path, excitation, rig_file):
 def test_a_set_point_every_fifth_sample_records_every_sample_of_the_run(record, excitation, drain):
     table = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | drain)
     frame = table.frame
-    assert (len(frame), table.metadata["sample_rate_hz"], table.metadata["gaps"]) == (1000, 1000.0, [])
+    assert (len(frame), table.metadata["sample_rate_hz"], table.metadata["gaps"]) == (
+        1000,
+        1000.0,
+        [],
+    )
     assert np.diff(frame["sequence"]).tolist() == [1] * 999
     assert_allclose(frame["time_s"], np.arange(1000) / 1000, atol=2e-6)
     # In straight lines from one set-point to the next.
@@ -62,7 +73,9 @@ def test_a_set_point_every_fifth_sample_records_every_sample_of_the_run(record, 
 @pytest.mark.parametrize("drain", [{}, QUEUE], ids=["ring", "queue"])
 def test_a_set_point_every_fiftieth_sample_records_them_all_too(record, drain):
     rate = {"seed = 1 ": "sample_rate_hz = 20.0\nseed = 1 "}
-    frame = record(shipped="recorder", rate_hz=20.0, watchdog_s=20.0, replace=LOCKSTEP | rate | drain).frame
+    frame = record(
+        shipped="recorder", rate_hz=20.0, watchdog_s=20.0, replace=LOCKSTEP | rate | drain
+    ).frame
     assert np.diff(frame["sequence"]).tolist() == [1] * 999
 
 
@@ -82,8 +95,12 @@ def test_cuff_forces_stand_at_the_cycles_samples_and_nowhere_between(record):
     assert set(np.diff(np.flatnonzero(read))) == {5}
 
 
-def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_right(record, monkeypatch):
-    whole = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP).frame.set_index("sequence")
+def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_right(
+    record, monkeypatch
+):
+    whole = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP).frame.set_index(
+        "sequence"
+    )
     rows, asleep = sampling.Streams.rows, []
 
     async def sleepy(streams, row):
@@ -93,7 +110,9 @@ def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_r
         return await rows(streams, row)
 
     monkeypatch.setattr(sampling.Streams, "rows", sleepy)
-    table = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | {"capacity = 2048": "capacity = 64"})
+    table = record(
+        shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | {"capacity = 2048": "capacity = 64"}
+    )
     assert asleep
     ((time, missed),) = table.metadata["gaps"]
     assert 100 < missed < 200
@@ -101,7 +120,9 @@ def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_r
     found = table.frame.set_index("sequence")
     assert_allclose(found, whole.loc[found.index], atol=2e-6)
     assert np.diff(found["time_s"]).max() == pytest.approx((missed + 1) / 1000, abs=2e-6)
-    assert found["time_s"].to_numpy()[np.argmax(np.diff(found["time_s"]))] == pytest.approx(time - 1e-3, abs=2e-6)
+    assert found["time_s"].to_numpy()[np.argmax(np.diff(found["time_s"]))] == pytest.approx(
+        time - 1e-3, abs=2e-6
+    )
 
 
 def test_a_glitch_between_two_cycles_which_no_exchange_sees_ends_the_run(record, monkeypatch):
@@ -119,7 +140,8 @@ def test_a_glitch_between_two_cycles_which_no_exchange_sees_ends_the_run(record,
 
 
 def recorded_with(monkeypatch, record, damage, queue=False, watchdog_s=20.0):
-    """Record a run in which the knee's own record holds something else than what it measured; return why it ends."""
+    """Record a run in which the knee's own record holds something else than what it measured;
+    return why it ends."""
     append = Ring.append
 
     def damaged(ring, sequence, values):
@@ -130,7 +152,9 @@ def recorded_with(monkeypatch, record, damage, queue=False, watchdog_s=20.0):
 
     monkeypatch.setattr(Ring, "append", damaged)
     with pytest.raises(DeviceError) as caught:
-        record(shipped="recorder", watchdog_s=watchdog_s, replace=LOCKSTEP | (QUEUE if queue else {}))
+        record(
+            shipped="recorder", watchdog_s=watchdog_s, replace=LOCKSTEP | (QUEUE if queue else {})
+        )
     return str(caught.value)
 
 
@@ -149,7 +173,10 @@ def at(number, **change):
     ("damage", "words"),
     [
         (at(1502, angle=0.1), "its angle leapt from"),
-        (at(1502, time=0.005), "its clock went on by 0.006000 s while its counter went on by 1 samples"),
+        (
+            at(1502, time=0.005),
+            "its clock went on by 0.006000 s while its counter went on by 1 samples",
+        ),
         (at(1502, time=-0.5), "its clock went from"),
         (at(1502, current=100.0), "knee torque"),
     ],
@@ -164,14 +191,22 @@ def test_a_record_that_cannot_be_true_ends_the_run_and_all_before_it_is_a_record
     assert np.diff(frame["sequence"]).tolist() == [1] * (len(frame) - 1)
 
 
-@pytest.mark.parametrize(("bit", "words"), [(2**30, "its sample counter"), (2, "one of the two leapt")])
-def test_a_record_of_a_queue_under_another_number_ends_the_run(record, tmp_path, monkeypatch, bit, words):
+@pytest.mark.parametrize(
+    ("bit", "words"), [(2**30, "its sample counter"), (2, "one of the two leapt")]
+)
+def test_a_record_of_a_queue_under_another_number_ends_the_run(
+    record, tmp_path, monkeypatch, bit, words
+):
     damage = at(1500, sequence=bit)
     assert words in recorded_with(monkeypatch, record, damage, queue=True)
-    assert 1480 < RECORDING.read(tmp_path / "test.aborted.parquet").frame["sequence"].iloc[-1] < 1500
+    assert (
+        1480 < RECORDING.read(tmp_path / "test.aborted.parquet").frame["sequence"].iloc[-1] < 1500
+    )
 
 
-def test_a_ring_that_stands_still_while_the_drive_counts_on_ends_the_run(record, tmp_path, monkeypatch):
+def test_a_ring_that_stands_still_while_the_drive_counts_on_ends_the_run(
+    record, tmp_path, monkeypatch
+):
     def stands_still(sequence, values):
         return sequence, values if sequence <= 1500 else {}
 
@@ -189,12 +224,22 @@ def test_in_real_time_no_sample_is_lost_though_cycles_are(record_in_real_time):
 
 @pytest.fixture
 def with_full_queues(rig_file, serve, excitation, monkeypatch):
-    """Serve drives in real time whose queues nobody has read since they were switched on; do something with them."""
+    """Serve drives in real time whose queues nobody has read since they were switched on; do
+    something with them."""
     excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
     monkeypatch.setattr(ring, "QUEUE_RECORDS", 500)
     # Slow, for a busy computer.
-    slow = {"record_rate_hz = 1000.0": "record_rate_hz = 200.0", "[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
-    changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "speed_rad_s": 30.0, "rest_rad": "[0.4, -0.6]", "control_s": 9.0}
+    slow = {
+        "record_rate_hz = 1000.0": "record_rate_hz = 200.0",
+        "[plant]\n": "[plant]\nsample_rate_hz = 40.0\n",
+    }
+    changes = {
+        "watchdog_s": 1.0,
+        "torque_nm": 300.0,
+        "speed_rad_s": 30.0,
+        "rest_rad": "[0.4, -0.6]",
+        "control_s": 9.0,
+    }
 
     def run(do):
         port = free_port()
@@ -212,7 +257,9 @@ def with_full_queues(rig_file, serve, excitation, monkeypatch):
 def recorded_from_queues(with_full_queues, excitation, tmp_path):
     def run():
         settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=2.0)
-        with_full_queues(lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 40.0))
+        with_full_queues(
+            lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 40.0)
+        )
         return RECORDING.read(tmp_path / "test.parquet")
 
     return run
@@ -251,12 +298,16 @@ def test_a_check_empties_full_queues_first(with_full_queues):
     assert with_full_queues(lambda path: asyncio.run(checked(path))) == []
 
 
-def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_are_enabled(record, monkeypatch):
+def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_are_enabled(
+    record, monkeypatch
+):
     served = []
     monkeypatch.setattr(drive, "EMPTYING_S", 0.2)
     monkeypatch.setattr(Ring, "taken", lambda ring: [0] * 30)
     monkeypatch.setattr(Servo, "hear", lambda servo, reference, control: served.append(control))
-    with pytest.raises(DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"):
+    with pytest.raises(
+        DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"
+    ):
         record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | QUEUE)
     assert set(served) == {0}  # disabled
 
@@ -271,14 +322,18 @@ def test_clocks_that_drift_are_found_corrected_and_told(record_in_real_time):
     assert np.diff(table.frame["sequence"]).tolist() == [1] * 1999
     knee = table.metadata["clocks"]["knee"]
     assert knee["corrected"]
-    # The knee's clock gains on the hip's from the rig's start on, which is seconds away at most: 1 ms is 25 s of it.
+    # The knee's clock gains on the hip's from the rig's start on, which is seconds away at most: 1
+    # ms is 25 s of it.
     assert abs(knee["offset_s"] - 9.345) < 3 * knee["offset_error_s"] + 1e-3
     assert abs(knee["rate_ppm"] - 40.0) < 3 * knee["rate_error_ppm"]
 
 
 @pytest.mark.parametrize(
     "replace",
-    [{'clock = "lockstep"': 'clock = "lockstep"\nclocks = "own"'}, {"seed = 1 ": "clock_ppm = [0.0, 1.0]\nseed = 1 "}],
+    [
+        {'clock = "lockstep"': 'clock = "lockstep"\nclocks = "own"'},
+        {"seed = 1 ": "clock_ppm = [0.0, 1.0]\nseed = 1 "},
+    ],
 )
 def test_clocks_that_drift_while_no_time_goes_by_are_refused(rig_file, replace):
     with pytest.raises(SettingsError, match='clock: found "lockstep", in which no time goes by'):
@@ -304,7 +359,10 @@ def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
         drive, brought = SlowRecord(), []
         recorded = sampling.Recorded(drive)
         for newest in range(0, 100, 10):
-            brought += [sample.sequence for sample in await recorded.samples(SimpleNamespace(sequence=newest))]
+            brought += [
+                sample.sequence
+                for sample in await recorded.samples(SimpleNamespace(sequence=newest))
+            ]
             await asyncio.sleep(0.001)
         recorded.beside.end()
         return drive.begun, brought
@@ -324,6 +382,8 @@ RING_ANGLE = 'angle = { address = 4, type = "int32", scale = 1e-6'
      (RING_CURRENT, RING_CURRENT.replace("1.0", "0.5"), "torque"),
      (RING_ANGLE, f"{RING_ANGLE}, offset = 0.05", "angle")],
 )  # fmt: skip
-def test_a_record_that_contradicts_the_exchanges_of_its_samples_ends_the_run(record, right, wrong, what):
+def test_a_record_that_contradicts_the_exchanges_of_its_samples_ends_the_run(
+    record, right, wrong, what
+):
     with pytest.raises(DeviceError, match=rf"tells {what} .* while its own record holds"):
         record(shipped="recorder", replace=LOCKSTEP, believed={right: wrong})

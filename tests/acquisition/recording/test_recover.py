@@ -16,7 +16,11 @@ from pipelines.errors import InputError
 from tests.conftest import Outcome
 
 RATE = 200.0
-COLUMNS = ["time_s", *(f"{joint}_{q}" for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")), "sequence"]
+COLUMNS = [
+    "time_s",
+    *(f"{joint}_{q}" for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")),
+    "sequence",
+]
 METADATA = {
     "run": "exo_alone", "purpose": "train", "sample_rate_hz": RATE, "config": {"run": {"duration_s": 1.0}},
 }  # fmt: skip
@@ -39,7 +43,8 @@ def journal_with(output, indices, flush_every=20):
 
 @pytest.fixture
 def killed(tmp_path):
-    """The journal of a run of 200 samples that was killed before sample 150, and nobody knows it."""
+    """The journal of a run of 200 samples that was killed before sample 150, and nobody knows
+    it."""
     output = tmp_path / "one.parquet"
     journal = journal_with(output, [*range(40), *range(43, 150)])
     journal.flush()
@@ -54,7 +59,10 @@ def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path
     assert (made.account.samples, made.account.missed, made.account.cut_off) == (147, 3, 50)
     assert table.frame["sequence"].tolist() == [7000 + k for k in (*range(40), *range(43, 150))]
     assert table.metadata["gaps"] == [[0.2, 3]]
-    assert table.metadata["abort"] == "ended 0.750 s into 1 s without a word: killed, or its disk was full"
+    assert (
+        table.metadata["abort"]
+        == "ended 0.750 s into 1 s without a word: killed, or its disk was full"
+    )
     assert table.metadata["recovered"] is True
     assert not killed.exists()
 
@@ -81,9 +89,12 @@ def test_samples_that_were_missed_before_the_first_one_kept_are_a_gap(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("abort", "name", "gaps"), [(None, "one.parquet", [[0.95, 10]]), ("the cat came", "one.aborted.parquet", [])]
+    ("abort", "name", "gaps"),
+    [(None, "one.parquet", [[0.95, 10]]), ("the cat came", "one.aborted.parquet", [])],
 )
-def test_a_run_that_ended_but_could_not_be_written_is_recovered_with_its_own_reason(tmp_path, abort, name, gaps):
+def test_a_run_that_ended_but_could_not_be_written_is_recovered_with_its_own_reason(
+    tmp_path, abort, name, gaps
+):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(190))
     journal.end(abort)
@@ -128,10 +139,16 @@ sys.stdin.read()
 def test_a_journal_that_another_process_writes_is_left_alone_until_that_is_killed(tmp_path):
     path = tmp_path / "one.parquet.journal"
     process = subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", HOLD, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout.readline() == "recording\n"
-    for refuse, words in ((recover, "a run is recording there now"), (refuse_leftover, "another run is recording")):
+    for refuse, words in (
+        (recover, "a run is recording there now"),
+        (refuse_leftover, "another run is recording"),
+    ):
         with pytest.raises(InputError, match=words):
             refuse(path)
     process.kill()
@@ -147,11 +164,15 @@ def test_a_folder_stands_for_the_journals_below_it(killed, tmp_path):
     assert journals_in(tmp_path) == []
 
 
-def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(exoid, monkeypatch, tmp_path):
+def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(
+    exoid, monkeypatch, tmp_path
+):
     (tmp_path / "exoid.toml").touch()
     monkeypatch.chdir(tmp_path)
     for words in ([], ["."]):
-        assert exoid("recover", *words) == Outcome(0, "no killed run left a journal; nothing to recover\n", "")
+        assert exoid("recover", *words) == Outcome(
+            0, "no killed run left a journal; nothing to recover\n", ""
+        )
     assert exoid("recover", "no.journal").code == 2
 
 
@@ -161,10 +182,14 @@ def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(e
      ("hip_angle_rad", np.nan), ("hip_angle_rad", 1e3), ("knee_torque_nm", np.inf)],
 )  # fmt: skip
 @pytest.mark.parametrize("at", [100, 119, 120])
-def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(tmp_path, column, value, at):
+def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(
+    tmp_path, column, value, at
+):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(at))
-    journal.append([value if name == column else told for name, told in zip(COLUMNS, row(at), strict=True)])
+    journal.append(
+        [value if name == column else told for name, told in zip(COLUMNS, row(at), strict=True)]
+    )
     for index in range(at + 1, 200):
         journal.append(row(index))
     journal.end(None)
@@ -214,7 +239,9 @@ class FullAfter:
         return self._file.write(data[:taken])
 
 
-def test_a_disk_that_fills_up_half_way_through_a_batch_costs_no_earlier_and_no_later_sample(tmp_path):
+def test_a_disk_that_fills_up_half_way_through_a_batch_costs_no_earlier_and_no_later_sample(
+    tmp_path,
+):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(40))
     file = journal._file
@@ -233,7 +260,9 @@ def test_a_disk_that_fills_up_half_way_through_a_batch_costs_no_earlier_and_no_l
 def test_the_values_survive_to_the_last_bit(killed, tmp_path):
     recover(killed)
     frame = RECORDING.read(tmp_path / "one.aborted.parquet").frame
-    assert np.array_equal(frame["hip_angle_rad"], [0.001 * k for k in (*range(40), *range(43, 150))])
+    assert np.array_equal(
+        frame["hip_angle_rad"], [0.001 * k for k in (*range(40), *range(43, 150))]
+    )
 
 
 MEASURE = """\
@@ -260,14 +289,19 @@ print(most_held() - written)
 
 
 def memory_of_recovery(output, samples):
-    """Return by how much the most memory that was ever held grows, MiB, when a journal is made a recording."""
+    """Return by how much the most memory that was ever held grows, MiB, when a journal is made a
+    recording."""
     command = [sys.executable, "-c", MEASURE, str(output), str(samples)]
     return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc to tell the most memory held")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="needs /proc to tell the most memory held"
+)
 @pytest.mark.parametrize("seconds", [300, pytest.param(3600, marks=pytest.mark.slow)])
-def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_recording(tmp_path, seconds):
+def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_recording(
+    tmp_path, seconds
+):
     grown = memory_of_recovery(tmp_path / "long.parquet", 1000 * seconds)
     print(f"\n{seconds} s at 1 kHz: {grown:.0f} MiB")
     assert 1.0 < grown < 64.0  # an hour of these columns is 165 MiB, and as a frame twice that
@@ -276,13 +310,31 @@ def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_r
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("one.parquet", b"PAR1 and so on", "is no journal of a run but a Parquet file, of which nothing is to be"),
-        ("one.parquet.journal", b"PAR1 and so on", "is no journal of a run but a Parquet file, of which nothing is"),
-        ("t.toml", b"unit = 'rad'", "is no journal of a run, nothing was changed; name the *.journal that a killed"),
-        ("one.parquet.journal", b"", "is no journal of a run, or not even its head was written and so no sample; del"),
+        (
+            "one.parquet",
+            b"PAR1 and so on",
+            "is no journal of a run but a Parquet file, of which nothing is to be",
+        ),
+        (
+            "one.parquet.journal",
+            b"PAR1 and so on",
+            "is no journal of a run but a Parquet file, of which nothing is",
+        ),
+        (
+            "t.toml",
+            b"unit = 'rad'",
+            "is no journal of a run, nothing was changed; name the *.journal that a killed",
+        ),
+        (
+            "one.parquet.journal",
+            b"",
+            "is no journal of a run, or not even its head was written and so no sample; del",
+        ),
     ],
 )
-def test_only_what_is_left_of_a_journal_without_a_sample_is_to_be_deleted(tmp_path, name, content, words):
+def test_only_what_is_left_of_a_journal_without_a_sample_is_to_be_deleted(
+    tmp_path, name, content, words
+):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(InputError) as refused:
@@ -319,13 +371,17 @@ def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path,
         for refuse in (recover, refuse_leftover):
             with pytest.raises(InputError) as refused:
                 refuse(killed)
-            assert str(refused.value).startswith(f"{killed}: the head of its {len(content)} bytes, which names the")
+            assert str(refused.value).startswith(
+                f"{killed}: the head of its {len(content)} bytes, which names the"
+            )
             assert "keep it, samples may be in it" in str(refused.value)
             assert "delete" not in str(refused.value)
     assert killed.read_bytes() == content
 
 
-def test_whatever_bit_of_a_head_without_a_copy_is_flipped_what_is_refused_is_named_and_kept(killed, tmp_path):
+def test_whatever_bit_of_a_head_without_a_copy_is_flipped_what_is_refused_is_named_and_kept(
+    killed, tmp_path
+):
     without_copies(killed)
     whole, output = killed.read_bytes(), tmp_path / "made.parquet"
     for at in range(0, len(JournalFile(killed)._head), 7):
@@ -342,18 +398,36 @@ def test_whatever_bit_of_a_head_without_a_copy_is_flipped_what_is_refused_is_nam
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"config": None}, "config.run.duration_s of its metadata is missing, expected a number above 0"),
-        ({"config": {"run": 3}}, "config.run.duration_s of its metadata is missing, expected a number above 0"),
+        (
+            {"config": None},
+            "config.run.duration_s of its metadata is missing, expected a number above 0",
+        ),
+        (
+            {"config": {"run": 3}},
+            "config.run.duration_s of its metadata is missing, expected a number above 0",
+        ),
         ({"sample_rate_hz": 0}, "sample_rate_hz of its metadata is 0, expected a number above 0"),
-        ({"sample_rate_hz": "x"}, "sample_rate_hz of its metadata is 'x', expected a number above 0"),
-        ({"sample_rate_hz": True}, "sample_rate_hz of its metadata is True, expected a number above 0"),
+        (
+            {"sample_rate_hz": "x"},
+            "sample_rate_hz of its metadata is 'x', expected a number above 0",
+        ),
+        (
+            {"sample_rate_hz": True},
+            "sample_rate_hz of its metadata is True, expected a number above 0",
+        ),
         ([1, 2], "its metadata are [1, 2], expected a table of keys and values"),
     ],
 )
-def test_metadata_of_which_no_recording_can_be_made_are_named(tmp_path, monkeypatch, changed, words):
+def test_metadata_of_which_no_recording_can_be_made_are_named(
+    tmp_path, monkeypatch, changed, words
+):
     path = journal_of(tmp_path / "one.parquet")
-    monkeypatch.setattr("pipelines.acquisition.recording.journal.to_json", lambda metadata, _: json.dumps(metadata))
-    with Journal(path, COLUMNS, METADATA | changed if isinstance(changed, dict) else changed) as journal:
+    monkeypatch.setattr(
+        "pipelines.acquisition.recording.journal.to_json", lambda metadata, _: json.dumps(metadata)
+    )
+    with Journal(
+        path, COLUMNS, METADATA | changed if isinstance(changed, dict) else changed
+    ) as journal:
         journal.append(row(0))
     with pytest.raises(InputError) as refused:
         recover(path)
@@ -370,7 +444,9 @@ def test_a_journal_without_a_counter_is_named(tmp_path):
         recover(path)
 
 
-@pytest.mark.parametrize(("word", "instead"), [(b"found", b"fo\x00nd"), (b"rows", b"rowz"), (b"{}", b"{{")])
+@pytest.mark.parametrize(
+    ("word", "instead"), [(b"found", b"fo\x00nd"), (b"rows", b"rowz"), (b"{}", b"{{")]
+)
 def test_last_words_that_are_damaged_are_none_and_cost_no_sample(tmp_path, word, instead):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(190))

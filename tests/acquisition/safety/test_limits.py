@@ -1,4 +1,5 @@
-"""What stops a run: the leg slows down, the drives are disabled, the record is kept, one line says why."""
+"""What stops a run: the leg slows down, the drives are disabled, the record is kept, one line says
+why."""
 
 import json
 import re
@@ -39,7 +40,8 @@ class After:
 
 @pytest.fixture
 def stopped(record):
-    """Record a run that is stopped; whatever the cause, every drive that can be reached is disabled at its end."""
+    """Record a run that is stopped; whatever the cause, every drive that can be reached is disabled
+    at its end."""
 
     def run(within_reach=(0, 1), raises=DeviceError, **arguments):
         served = arguments.setdefault("served_as", [])
@@ -59,13 +61,23 @@ def aborted(tmp_path):
 
 def reading(**changes):
     at_rest = dict(
-        sequence=0, time=0.0, angle=0.0, torque=0.0, current=0.0, velocity=0.0, temperature=20.0, reference=0.0
+        sequence=0,
+        time=0.0,
+        angle=0.0,
+        torque=0.0,
+        current=0.0,
+        velocity=0.0,
+        temperature=20.0,
+        reference=0.0,
     )
     return Reading(**{**at_rest, **changes})
 
 
 def row(hip=None, knee=None, forces=None):
-    return Row((reading(**hip or {}), reading(**knee or {})), np.zeros((4, 3)) if forces is None else forces)
+    return Row(
+        (reading(**hip or {}), reading(**knee or {})),
+        np.zeros((4, 3)) if forces is None else forces,
+    )
 
 
 @pytest.mark.parametrize(
@@ -92,7 +104,9 @@ def test_a_drive_that_tells_no_speed_is_judged_by_its_angles(rig_file):
     limits = Limits(load_rig(rig_file()), RATE)
     still, moved = {"velocity": np.nan}, {"velocity": np.nan, "angle": 0.1, "sequence": 1}
     assert limits.violation(row(hip=still)) is None
-    assert limits.violation(row(hip=moved)) == "hip speed 20.000 rad/s is above its limit of 3 rad/s"
+    assert (
+        limits.violation(row(hip=moved)) == "hip speed 20.000 rad/s is above its limit of 3 rad/s"
+    )
 
 
 @pytest.mark.parametrize("speed", [1.3, -1.3, 0.0])
@@ -110,7 +124,9 @@ def test_a_stop_slows_down_no_faster_than_told_to_rest(speed):
     ("changes", "run", "words"),
     [({"torque_nm": 5.0}, "exo_alone", "torque"), ({"cuff_force_n": 25.0}, "with_human", "force")],
 )
-def test_a_broken_limit_ends_the_run_safely_and_keeps_the_record(stopped, tmp_path, changes, run, words):
+def test_a_broken_limit_ends_the_run_safely_and_keeps_the_record(
+    stopped, tmp_path, changes, run, words
+):
     # The ramp may break the limit too; then there is nothing to keep, and that is said.
     why = stopped(run=run, **changes)
     assert words in why
@@ -139,7 +155,9 @@ def test_a_drive_that_still_answers_is_disabled_when_the_other_is_lost(stopped):
     def knee_fails(device, function):
         return ExcCodes.DEVICE_FAILURE if isinstance(device, Drive) and device.joint == 1 else None
 
-    assert "and could not be disabled: drive knee" in stopped(fault=After(300, knee_fails), within_reach=[0])
+    assert "and could not be disabled: drive knee" in stopped(
+        fault=After(300, knee_fails), within_reach=[0]
+    )
 
 
 def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch):
@@ -156,7 +174,9 @@ def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch
     assert len(tried) == 2 + 4
 
 
-def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_other(stopped, monkeypatch):
+def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_other(
+    stopped, monkeypatch
+):
     encode, disable = Line.exchange, Line.write
 
     async def fails(line, *arguments, **how):
@@ -172,14 +192,18 @@ def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_othe
     broken = []
     monkeypatch.setattr(Line, "write", fails)
     monkeypatch.setattr(Line, "exchange", exchange)
-    why = stopped(fault=After(300, lambda *_: broken.append(True)), within_reach=[1], raises=ExoidError)
+    why = stopped(
+        fault=After(300, lambda *_: broken.append(True)), within_reach=[1], raises=ExoidError
+    )
     assert "a fault of exoid's own (ValueError('no number'))" in why
     assert "and could not be disabled: drive hip (127.0.0.1:" in why
     assert why.startswith("USE THE EMERGENCY STOP: ")
 
 
 @pytest.mark.parametrize("still_pressed", [True, False])
-def test_where_a_cuff_still_presses_the_drives_are_disabled_without_slowing_down(stopped, still_pressed):
+def test_where_a_cuff_still_presses_the_drives_are_disabled_without_slowing_down(
+    stopped, still_pressed
+):
     exchanges, pressed = [], []
 
     def press(device, function):
@@ -188,14 +212,18 @@ def test_where_a_cuff_still_presses_the_drives_are_disabled_without_slowing_down
         force = 500.0 if still_pressed or len(pressed) < 1 else 0.0
         if isinstance(device, Sensor):
             pressed.append(force)
-            device.show = lambda true: Sensor.show(device, replace(true, forces=np.full((1, 4, 3), force)))
+            device.show = lambda true: Sensor.show(
+                device, replace(true, forces=np.full((1, 4, 3), force))
+            )
 
     assert "force x 500 N is above the limit" in stopped(run="with_human", fault=After(300, press))
     # An exchange is a write and a read of each of two drives.
     assert (len(exchanges) < 4 * HOLD_SAMPLES) == still_pressed
 
 
-def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stopped(stopped, tmp_path, monkeypatch):
+def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stopped(
+    stopped, tmp_path, monkeypatch
+):
     def freeze(device, function):
         device.rig.catch_up = lambda: None
 
@@ -206,7 +234,10 @@ def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stoppe
     why = stopped(fault=After(300, freeze), watchdog_s=0.3, duration_s=3.0)
     journal = journal_of(tmp_path / "test.parquet")
     assert why.startswith("watchdog: no new sample from drive hip")
-    assert f"its samples are in {journal}, but could not be written as a recording: [Errno 28] No space left" in why
+    assert (
+        f"its samples are in {journal}, but could not be written as a recording: [Errno 28] No space left"
+        in why
+    )
     assert len(read_journal(journal)[0]) > 50
 
 
@@ -224,7 +255,9 @@ def test_a_register_that_tells_no_number_ends_the_run_before_that_is_recorded(st
     assert np.isfinite(aborted(tmp_path).frame["hip_temperature_c"]).all()
 
 
-def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_traceback(stopped, tmp_path, monkeypatch):
+def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_traceback(
+    stopped, tmp_path, monkeypatch
+):
     def fails(limits, told):
         if told.drives[0].sequence > 300:
             raise ZeroDivisionError("a bug")
@@ -238,7 +271,9 @@ def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_tr
         f"its {samples} samples so far are in {tmp_path / 'test.aborted.parquet'}"
     )
     assert 'raise ZeroDivisionError("a bug")' in log.read_text()
-    assert aborted(tmp_path).metadata["abort"] == "a fault of exoid's own (ZeroDivisionError('a bug'))"
+    assert (
+        aborted(tmp_path).metadata["abort"] == "a fault of exoid's own (ZeroDivisionError('a bug'))"
+    )
     assert ExoidError.exit_code == 1
 
 
@@ -249,7 +284,10 @@ def test_a_full_disk_stops_the_leg_and_is_told(stopped, monkeypatch):
 
     monkeypatch.setattr("pipelines.acquisition.recording.journal.Journal.flush", full)
     why = stopped(watchdog_s=0.5, duration_s=4.0)
-    assert "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room, then" in why
+    assert (
+        "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room, then"
+        in why
+    )
 
 
 def test_a_rig_that_stops_half_way_leaves_the_record(stopped, tmp_path):
@@ -269,7 +307,9 @@ def test_a_counter_that_stands_still_trips_the_watchdog(stopped, tmp_path):
         device.rig.catch_up = lambda: None
 
     began = time.monotonic()
-    assert "watchdog: no new sample from drive hip" in stopped(fault=After(300, freeze), watchdog_s=0.3)
+    assert "watchdog: no new sample from drive hip" in stopped(
+        fault=After(300, freeze), watchdog_s=0.3
+    )
     assert time.monotonic() - began < 30
     assert "watchdog" in aborted(tmp_path).metadata["abort"]
 
@@ -278,7 +318,9 @@ def test_a_fault_bit_ends_the_run(stopped):
     def complain(device, function):
         device.rig.drives[1].servo.fault = True
 
-    assert "reports a fault (status bits 0x0008); see the drive's manual" in stopped(fault=After(10, complain))
+    assert "reports a fault (status bits 0x0008); see the drive's manual" in stopped(
+        fault=After(10, complain)
+    )
     named = {"fault_mask = 0x0008": 'faults = { 3 = "over-current" }\nfault_mask = 0x0008'}
     why = stopped(fault=After(10, complain), replace=named)
     assert "reports a fault (status bits 0x0008: over-current); see the drive's manual" in why
@@ -290,7 +332,9 @@ def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(stopped):
 
 
 @pytest.mark.parametrize("rate_hz", [80.0, 100.0, 400.0])
-def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(stopped, monkeypatch, rate_hz):
+def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(
+    stopped, monkeypatch, rate_hz
+):
     words, hear = set(), Servo.hear
 
     def remember(servo, reference, control):
@@ -328,7 +372,9 @@ def shows(device, sample):
     [(lambda count: 0 * count, "its sample counter went back from"),
      (lambda count: count + 900, "its sample counter leapt from")],
 )  # fmt: skip
-def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows_it(stopped, shipped, counter, words):
+def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows_it(
+    stopped, shipped, counter, words
+):
     served, sent = [], []
 
     def leap(device, function):
@@ -341,18 +387,25 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
         speed_rad_s=50.0, replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
     )  # fmt: skip
     assert words in why
-    assert np.abs(np.diff(sent)).max() < 3.0 * 3 / 50  # what the speed limit allows, and some missed samples
+    # What the speed limit allows, and some missed samples.
+    assert np.abs(np.diff(sent)).max() < 3.0 * 3 / 50
 
 
 def test_a_clock_that_stands_still_ends_the_run_and_what_was_recorded_is_kept(stopped, tmp_path):
-    why = stopped(fault=After(300, lambda device, _: shows(device, lambda true: replace(true, time=0 * true.time + 1))))
+    why = stopped(
+        fault=After(
+            300, lambda device, _: shows(device, lambda true: replace(true, time=0 * true.time + 1))
+        )
+    )
     assert "drive hip (127.0.0.1:" in why
     assert "its clock went from 1." in why
     assert len(aborted(tmp_path).frame) > 50
 
 
 def test_a_glitch_of_the_encoder_is_told_and_is_not_in_the_record(stopped, tmp_path):
-    fault = After(300, lambda device, _: shows(device, lambda true: replace(true, angle=true.angle + 100.0)))
+    fault = After(
+        300, lambda device, _: shows(device, lambda true: replace(true, angle=true.angle + 100.0))
+    )
     assert "hip angle 100." in stopped(fault=fault)
     table = aborted(tmp_path)
     assert "is outside its limits" in table.metadata["abort"]
@@ -366,9 +419,15 @@ def test_a_cuff_sensor_that_falls_silent_ends_the_run(stopped, silence):
     def fall_silent(device, function):
         if not began:
             began.append(device.rig.sample.sequence)
-            nothing = {"sequence": began[0]} if silence == "counter" else {"forces": np.full((1, 4, 3), np.nan)}
+            nothing = (
+                {"sequence": began[0]}
+                if silence == "counter"
+                else {"forces": np.full((1, 4, 3), np.nan)}
+            )
             for sensor in device.rig.sensors:
-                sensor.show = lambda true, sensor=sensor: Sensor.show(sensor, replace(true, **nothing))
+                sensor.show = lambda true, sensor=sensor: Sensor.show(
+                    sensor, replace(true, **nothing)
+                )
 
     why = stopped(run="with_human", fault=After(300, fall_silent), watchdog_s=0.2)
     assert "watchdog: no new sample from sensor thigh_front (127.0.0.1:" in why
@@ -376,7 +435,9 @@ def test_a_cuff_sensor_that_falls_silent_ends_the_run(stopped, silence):
 
 
 @pytest.mark.parametrize("angle", [np.nan, 1.8, 0.52])
-def test_no_set_point_is_sent_that_is_no_number_or_beyond_a_limit_or_too_far_from_the_last(rig_file, angle):
+def test_no_set_point_is_sent_that_is_no_number_or_beyond_a_limit_or_too_far_from_the_last(
+    rig_file, angle
+):
     drive = load_rig(rig_file()).drive[0]
     refuse_leap(drive, 0.5, 0.514, 1 / RATE)
     with pytest.raises(DeviceError, match="it was not sent"):
@@ -391,7 +452,9 @@ def test_a_leg_that_moves_before_the_drives_are_enabled_is_left_alone(stopped, m
         return planned(*arguments)
 
     monkeypatch.setattr("pipelines.acquisition.acquire.make_plan", plan_while_it_moves)
-    assert "the hip moved from 0.000 to 0.100 rad before its drive was enabled" in stopped(served_as=served)
+    assert "the hip moved from 0.000 to 0.100 rad before its drive was enabled" in stopped(
+        served_as=served
+    )
     assert served[0].rig.sample.sequence[0] == 0
 
 
@@ -400,7 +463,9 @@ def test_a_trajectory_outside_the_limits_is_refused_before_anything_moves(record
     with pytest.raises(InputError) as caught:
         record(served_as=served, replace={"angle_rad = [-0.35, 1.75]": "angle_rad = [-0.35, 0.6]"})
     assert "excitation.toml: the hip would be at 0.58" in str(caught.value)
-    assert "but the rig allows -0.33 to 0.58 rad (its limits less angle_margin_rad)" in str(caught.value)
+    assert "but the rig allows -0.33 to 0.58 rad (its limits less angle_margin_rad)" in str(
+        caught.value
+    )
     assert served[0].rig.sample.sequence[0] == 0
 
 
@@ -418,7 +483,10 @@ def test_a_leg_that_stands_outside_its_limits_is_not_moved(record):
 def test_another_device_than_the_rig_file_describes_is_refused(record):
     with pytest.raises(DeviceError) as caught:
         record(believed={"address = 0, value = 0x4558": "address = 0, value = 0x4559"})
-    assert "unit 1): identity register 0 holds 0x4558, expected 0x4559: it is another device" in str(caught.value)
+    assert (
+        "unit 1): identity register 0 holds 0x4558, expected 0x4559: it is another device"
+        in str(caught.value)
+    )
 
 
 def test_a_rig_that_is_not_there_is_named_with_its_address(record):
@@ -437,12 +505,23 @@ def test_nothing_sealed_is_in_a_recording_of_a_rig_that_hides_something(record, 
     )
     table = record(replace={"[plant]": '[plant]\nsealed = "secret_file.toml"'})
     told = json.dumps(table.metadata) + " ".join(table.frame.columns)
-    for secret in ("secret_file", "987654", "encoder_offset", "inertial", "coulomb", "sealed", "plant"):
+    for secret in (
+        "secret_file",
+        "987654",
+        "encoder_offset",
+        "inertial",
+        "coulomb",
+        "sealed",
+        "plant",
+    ):
         assert secret not in told
 
 
 def test_a_drive_that_would_be_sent_to_the_mirror_image_of_where_it_stands_is_refused(record):
-    served, written = [], 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
+    served, written = (
+        [],
+        'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }',
+    )
     with pytest.raises(SettingsError) as caught:
         record(served_as=served, replace={written: written.replace("1e-6", "-1e-6")})
     assert "write.reference.scale: found -1e-06 with 1e-06 of read.angle" in str(caught.value)
@@ -466,13 +545,16 @@ def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_un
     rig_file, written, found
 ):
     with pytest.raises(
-        SettingsError, match=f"map.drive.servo.write.reference.{found} of read.angle, expected the same"
+        SettingsError,
+        match=f"map.drive.servo.write.reference.{found} of read.angle, expected the same",
     ):
         refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))
     meant = {WRITTEN: written, "enable = 0x000F": "own_scale = true\nenable = 0x000F"}
     refuse_misplaced_set_points(load_rig(rig_file(replace=meant)))
 
 
-def test_set_points_may_be_told_in_another_unit_than_angles_where_a_count_is_the_same_angle(rig_file):
+def test_set_points_may_be_told_in_another_unit_than_angles_where_a_count_is_the_same_angle(
+    rig_file,
+):
     written = WRITTEN.replace("1e-6", "5.72957795e-5").replace('"rad"', '"deg"')
     refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))

@@ -1,4 +1,5 @@
-"""What exchanges bring and what a drive's own record holds of the same samples must not contradict each other."""
+"""What exchanges bring and what a drive's own record holds of the same samples must not contradict
+each other."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ RIG = load_rig(datasets() / "rigs" / "recorder.toml")
 
 
 def reading(k, angle=0.0, torque=0.0, velocity=0.0):
-    return Reading(k, k / RATE_HZ, angle, torque, torque / 12.0, velocity, 20.0, np.nan, enabled=True)
+    return Reading(
+        k, k / RATE_HZ, angle, torque, torque / 12.0, velocity, 20.0, np.nan, enabled=True
+    )
 
 
 def judged(recorded_torque, exchanged_torque=lambda k: 10.0 * np.sin(0.1 * k), count=3 * COMPARED):
@@ -49,6 +52,8 @@ def test_an_angle_of_another_zero_ends_the_run_and_one_that_was_latched_a_sample
     agreement.tell(reading(1, angle=0.3, velocity=2.0))
     agreement.judge(reading(1, angle=0.302))
     agreement.tell(reading(2, angle=0.3))
-    with pytest.raises(DeviceError, match=r"tells angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"):
+    with pytest.raises(
+        DeviceError, match=r"tells angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"
+    ):
         agreement.judge(reading(2, angle=0.35))
     agreement.judge(reading(3, angle=1.0))  # of which no exchange told

@@ -1,4 +1,5 @@
-"""What one drive tells is held against what it told before, whether an exchange brought it or its own record."""
+"""What one drive tells is held against what it told before, whether an exchange brought it or its
+own record."""
 
 from dataclasses import replace
 
@@ -26,7 +27,8 @@ def moved(number):
 
 @pytest.fixture
 def hip():
-    """The stream of a hip's records, 1000 a second beside 200 set-points, and what it was told until now."""
+    """The stream of a hip's records, 1000 a second beside 200 set-points, and what it was told
+    until now."""
     told = Told()
     for number in range(BEGINS, BEGINS + 2000, 5):
         told.tell(number, moved(number).angle)
@@ -53,8 +55,14 @@ def test_a_motion_within_limits_contradicts_nothing_and_each_sample_is_new_once(
         ({"angle": 0.7}, r"hip .*: its angle leapt from 0\.\d+ to 0\.7000 rad within 0\.0010 s"),
         ({"angle": moved(BEGINS + 400).angle + 0.004}, "faster than its limit of 3 rad/s"),
         ({"time": 3.0}, "its clock went from"),
-        ({"time": 7.41}, "its clock went on by 0.011000 s while its counter went on by 1 samples of 0.001000 s"),
-        ({"sequence": BEGINS + 402}, "its clock went on by 0.001000 s while its counter went on by 3 samples"),
+        (
+            {"time": 7.41},
+            "its clock went on by 0.011000 s while its counter went on by 1 samples of 0.001000 s",
+        ),
+        (
+            {"sequence": BEGINS + 402},
+            "its clock went on by 0.001000 s while its counter went on by 3 samples",
+        ),
         ({"sequence": BEGINS + 300}, "its sample counter went back"),
         ({"sequence": BEGINS + 400 + 2**16}, "its sample counter leapt"),
         ({"torque": 151.0}, "hip torque 151.0 N·m is above its limit"),
@@ -79,24 +87,27 @@ REGISTERS = "check the encoder, or the "
     [(0, "before it", {"angle": 0.9}), (35, "0.035 s before it", {"angle": 0.7}),
      (35, "0.035 s before it", {"velocity": -2.0})],
 )  # fmt: skip
-def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(hip, after, when, damage):
+def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(
+    hip, after, when, damage
+):
     swing(hip, BEGINS + 400)
     again = BEGINS + 420
     take(hip, *(moved(number) for number in range(again, again + after)))
     with pytest.raises(DeviceError) as raised:
         take(hip, replace(moved(again + after), **damage))
-    told = (
-        f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
-    )
+    told = f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
     assert f"{told}make the motion slower; else {REGISTERS}" in str(raised.value)
 
 
-def test_a_limit_that_is_broken_after_set_points_were_left_out_is_told_with_them_though_no_sample_is_missing(hip):
+def test_a_limit_that_is_broken_after_set_points_were_left_out_is_told_with_them_though_no_sample_is_missing(
+    hip,
+):
     swing(hip, BEGINS + 400)
     hip.leave_out(BEGINS + 380, BEGINS + 400)
     take(hip, *(moved(number) for number in range(BEGINS + 400, BEGINS + 435)))
     with pytest.raises(
-        DeviceError, match=r"torque 900.0 N·m is above .*; samples or set-points were missed 0.035 s bef"
+        DeviceError,
+        match=r"torque 900.0 N·m is above .*; samples or set-points were missed 0.035 s bef",
     ):
         take(hip, replace(moved(BEGINS + 435), torque=900.0))
 
@@ -110,20 +121,28 @@ def test_samples_that_were_missed_long_before_are_no_reason(hip):
 
 
 @pytest.mark.parametrize("name", ["angle", "velocity", "current"])
-def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_move_is_frozen(hip, name):
+def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_move_is_frozen(
+    hip, name
+):
     # Slower than a quarter of the limit, or angle and speed would contradict each other before.
     swing(hip, BEGINS + 1250)
     held = {name: getattr(moved(BEGINS + 1250), name)}
-    with pytest.raises(DeviceError, match=f"tells {name} .*; its register is frozen, or the joint is blocked"):
+    with pytest.raises(
+        DeviceError, match=f"tells {name} .*; its register is frozen, or the joint is blocked"
+    ):
         for number in range(BEGINS + 1250, BEGINS + 1450):
             take(hip, replace(moved(number), **held))
 
 
 def test_a_joint_that_sticks_to_its_friction_is_left_to_the_following_error(hip):
-    """Its angle stands still and so does its speed, at nought: neither contradicts the other, and its current rises."""
+    """Its angle stands still and so does its speed, at nought: neither contradicts the other, and
+    its current rises."""
     swing(hip, BEGINS + 1250)
     stuck = replace(moved(BEGINS + 1250), velocity=0.0)
-    sticking = [replace(moved(k), angle=stuck.angle, velocity=0.0) for k in range(BEGINS + 1250, BEGINS + 1450)]
+    sticking = [
+        replace(moved(k), angle=stuck.angle, velocity=0.0)
+        for k in range(BEGINS + 1250, BEGINS + 1450)
+    ]
     assert abs(moved(BEGINS + 1450).angle - stuck.angle) > 0.06
     assert all(take(hip, *sticking))
 
@@ -132,7 +151,10 @@ def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not(hi
     still = Told()
     still.tell(BEGINS, 0.0)
     hip._told = still
-    at_rest = [replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0) for k in range(500)]
+    at_rest = [
+        replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
+        for k in range(500)
+    ]
     assert all(take(hip, *at_rest))
 
 
@@ -142,14 +164,19 @@ def test_a_late_record_is_held_against_what_the_joint_was_told_then_and_not_sinc
     for number in range(BEGINS, BEGINS + 1000, 5):
         told.tell(number, 0.0 if number < BEGINS + 500 else 0.3)
     hip._told = told
-    at_rest = [replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0) for k in range(490)]
+    at_rest = [
+        replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
+        for k in range(490)
+    ]
     assert all(take(hip, *at_rest))
 
 
 def test_a_record_that_stands_still_while_the_counter_goes_on_ends_the_run(hip):
     swing(hip, BEGINS + 100)
     hip.refuse_to_fall_behind(BEGINS + 300)
-    with pytest.raises(DeviceError, match=r"is at sample 5\d\d\d, but its record brought none after 5099"):
+    with pytest.raises(
+        DeviceError, match=r"is at sample 5\d\d\d, but its record brought none after 5099"
+    ):
         hip.refuse_to_fall_behind(BEGINS + 600)
 
 
@@ -163,7 +190,8 @@ def test_silence_is_borne_for_the_watchdogs_time_and_its_last_reason_told(hip):
     hip.begin(moved(BEGINS), 10.0)
     hip.refuse_silence(10.24)
     with pytest.raises(
-        DeviceError, match=r"watchdog: no new sample from drive hip .* for 0\.260 s, allowed are 0\.25 s"
+        DeviceError,
+        match=r"watchdog: no new sample from drive hip .* for 0\.260 s, allowed are 0\.25 s",
     ):
         hip.refuse_silence(10.26)
     hip.miss(Unanswered("drive hip: did not answer"))
@@ -172,7 +200,8 @@ def test_silence_is_borne_for_the_watchdogs_time_and_its_last_reason_told(hip):
 
 
 def test_a_cycle_that_brings_a_sample_more_than_usual_is_no_jerk(hip):
-    """Where drives record themselves, the host's cycle takes one of their samples more now and then."""
+    """Where drives record themselves, the host's cycle takes one of their samples more now and
+    then."""
     swing(hip, BEGINS + 100)
     take(hip, moved(BEGINS + 105))
     assert hip.after_jerk("too much") == "too much"

@@ -25,7 +25,9 @@ RATE = 200.0
 
 
 def test_the_drawing_has_the_transitions_of_the_code_and_no_others():
-    chain, branches, bottom = re.search(r"```text\n(.+)\n(.+)\n(.+)\n```", DRAWING.read_text()).groups()
+    chain, branches, bottom = re.search(
+        r"```text\n(.+)\n(.+)\n(.+)\n```", DRAWING.read_text()
+    ).groups()
     names = [(match[0].strip(), match.span()) for match in re.finditer(r"[a-z]+( [a-z]+)*", chain)]
 
     def above(place):
@@ -39,7 +41,9 @@ def test_the_drawing_has_the_transitions_of_the_code_and_no_others():
 
 
 def test_the_page_on_safety_names_the_setting_that_bounds_each_control_word_that_is_read_back():
-    rows = re.findall(r"^\| `(\w+)` \|.*within `safety\.(\w+)`", DRAWING.read_text(), flags=re.MULTILINE)
+    rows = re.findall(
+        r"^\| `(\w+)` \|.*within `safety\.(\w+)`", DRAWING.read_text(), flags=re.MULTILINE
+    )
     assert dict(rows) == dict.fromkeys(("enable", "disable", "fault_reset"), "control_s")
 
 
@@ -53,12 +57,16 @@ def test_every_state_leads_to_rest():
 def supervisor():
     supervisor = Supervisor(load_rig(datasets() / "rigs" / "real_time.toml"), RATE)
     supervisor.check()
-    supervisor.take(Plan(np.linspace(0.0, 0.5, 200)[:, np.newaxis] * [1.0, -1.0], 50, 150), np.zeros(2))
+    supervisor.take(
+        Plan(np.linspace(0.0, 0.5, 200)[:, np.newaxis] * [1.0, -1.0], 50, 150), np.zeros(2)
+    )
     return supervisor
 
 
 def row(sequence, angle=0.0):
-    at_rest = Reading(sequence, sequence / RATE, angle, angle, angle, angle, 20.0, np.nan, enabled=True)
+    at_rest = Reading(
+        sequence, sequence / RATE, angle, angle, angle, angle, 20.0, np.nan, enabled=True
+    )
     return Row((at_rest, at_rest), np.full((4, 3), np.nan))
 
 
@@ -80,11 +88,15 @@ def answers(row):
 LOST = Unanswered("drive knee: did not answer an exchange")
 
 
-def test_what_one_drive_and_the_cuffs_told_is_judged_though_the_other_drive_did_not_answer(supervisor):
+def test_what_one_drive_and_the_cuffs_told_is_judged_though_the_other_drive_did_not_answer(
+    supervisor,
+):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     step(supervisor, 101, 10.005)
-    assert supervisor.judge(Answers((row(101).drives[0], LOST), row(101).forces, None), 10.006) is None
+    assert (
+        supervisor.judge(Answers((row(101).drives[0], LOST), row(101).forces, None), 10.006) is None
+    )
     step(supervisor, 102, 10.01)
     pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
     with pytest.raises(DeviceError, match="thigh_front force x 401 N is above the limit"):
@@ -98,7 +110,9 @@ def test_the_drive_that_is_silent_for_too_long_is_named_though_the_other_one_ans
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     for k in range(1, 20):
-        supervisor.judge(Answers((row(100 + k).drives[0], LOST), row(100).forces, None), 10.0 + k / RATE)
+        supervisor.judge(
+            Answers((row(100 + k).drives[0], LOST), row(100).forces, None), 10.0 + k / RATE
+        )
     with pytest.raises(Unanswered, match="drive knee: did not answer"):
         too_late = 10.001 + supervisor.rig.safety.watchdog_s
         supervisor.judge(Answers((row(120).drives[0], LOST), row(100).forces, None), too_late)
@@ -127,7 +141,9 @@ def test_after_an_abort_no_set_point_of_the_plan_follows_and_the_first_reason_st
 
 
 def test_many_small_leaps_of_a_counter_do_not_add_up_to_a_speed_above_the_limit(supervisor):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.5 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [2.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     with pytest.raises(DeviceError, match=r"faster than its limit of 3 rad/s; it was not sent"):
@@ -152,8 +168,12 @@ def told(reference, velocity=np.nan, enabled=True, sequence=0):
 
 
 @pytest.mark.parametrize("gone_on", [0.0, 0.01, 0.03])
-def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where_the_drive_is(supervisor, gone_on):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where_the_drive_is(
+    supervisor, gone_on
+):
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
@@ -162,7 +182,9 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where
     sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 220))])
     speed, plan = RATE * np.diff(sent), np.arange(106, 220) * 1.5 / RATE - 150 / RATE
     a = supervisor.rig.safety.deceleration_rad_s2
-    assert np.abs(np.diff([supervisor_speed_before(before, gone_on), *speed])).max() <= a / RATE + 1e-9
+    assert (
+        np.abs(np.diff([supervisor_speed_before(before, gone_on), *speed])).max() <= a / RATE + 1e-9
+    )
     assert speed.max() <= 0.8 * 3.0 + 1e-9  # short of the speed limit
     assert (sent[1:] - plan).max() <= 2.0 * a / RATE**2, "it does not overshoot"
     assert sent[-1] == pytest.approx(plan[-1], abs=1e-12), "the plan again"
@@ -186,30 +208,44 @@ def test_a_drive_that_went_on_with_the_plan_through_a_silence_is_led_on_though_i
     assert sent == pytest.approx(path[113 - 101 : 120 - 101, 0], abs=1e-9)
 
 
-def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_is_broken_then(supervisor):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_is_broken_then(
+    supervisor,
+):
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     follow(supervisor, 101)
     assert supervisor.left_out == 0
     supervisor.next(105, 10.0 + 5 / RATE)
     assert supervisor.left_out == 3
-    assert "set-points were missed before it" in supervisor._streams[0].after_jerk("too much", row(105).drives[0])
+    assert "set-points were missed before it" in supervisor._streams[0].after_jerk(
+        "too much", row(105).drives[0]
+    )
 
 
-def test_a_cuff_that_is_pressed_after_one_drive_was_told_nothing_is_told_so_whichever_drive_it_was(supervisor):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+def test_a_cuff_that_is_pressed_after_one_drive_was_told_nothing_is_told_so_whichever_drive_it_was(
+    supervisor,
+):
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     follow(supervisor, 101)
     supervisor._streams[1].leave_out(98, 100)
     pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
-    with pytest.raises(DeviceError, match=r"thigh_front force x 401 N .*; samples or set-points were missed"):
+    with pytest.raises(
+        DeviceError, match=r"thigh_front force x 401 N .*; samples or set-points were missed"
+    ):
         supervisor.judge(Answers((LOST, LOST), pressed, None), 10.0 + 1 / RATE)
 
 
 def test_what_is_due_at_a_sample_is_due_no_more_once_the_next_one_is_there(supervisor):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     assert not supervisor.is_late(10.0), "nothing is followed yet"
     supervisor.begin(row(100), 10.0)
@@ -225,7 +261,9 @@ def supervisor_speed_before(before, gone_on):
 
 def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_faster(supervisor):
     """For the drive both fall into one of its samples."""
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.0 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [2.0 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
@@ -238,7 +276,9 @@ def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_
 
 
 @pytest.mark.parametrize("tells", [True, False])
-def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_where_it_is(tmp_path, tells):
+def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_where_it_is(
+    tmp_path, tells
+):
     """The plan stands, so that nothing is left to be slowed down; the drive moves all the same."""
     text = (datasets() / "rigs" / "real_time.toml").read_text()
     register = 'reference = { address = 110, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -261,16 +301,22 @@ def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_
 
 
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.take(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    with pytest.raises(DeviceError, match=r"hip: its set-points are 0\.\d+ rad behind .* allowed are 0\.750 rad"):
+    with pytest.raises(
+        DeviceError, match=r"hip: its set-points are 0\.\d+ rad behind .* allowed are 0\.750 rad"
+    ):
         for k in range(110, 300, 10):
             follow(supervisor, k)
 
 
 @pytest.mark.parametrize(("velocity", "moves"), [(0.0, False), (1.5, True), (np.nan, True)])
-def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(supervisor, velocity, moves):
+def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(
+    supervisor, velocity, moves
+):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     supervisor.sent[:], supervisor.base[:], supervisor._speed = 0.2, 0.2, np.array([2.0, 0.0])
@@ -288,7 +334,9 @@ def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(s
 def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    with pytest.raises(DeviceError, match=r"hip angle 0\.000 rad is 0\.15\d rad from its set-point of 0\.15\d rad"):
+    with pytest.raises(
+        DeviceError, match=r"hip angle 0\.000 rad is 0\.15\d rad from its set-point of 0\.15\d rad"
+    ):
         for k in range(101, 200):  # the leg hangs and trembles, the plan goes on
             step(supervisor, k, 10.0 + (k - 100) / RATE)
             supervisor.judge(answers(row(k, 1e-4 * (k % 2))), 10.0 + (k - 100) / RATE)
@@ -306,7 +354,9 @@ def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervis
 
 
 @pytest.mark.parametrize("word", [{"enabled": False}, {"enabled": True, "fault": "overheated"}])
-def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_is_enabled_again(supervisor, word):
+def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_is_enabled_again(
+    supervisor, word
+):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     supervisor.heed(0, Condition(enabled=True))
@@ -327,7 +377,12 @@ def test_of_two_counters_that_part_the_one_that_did_it_is_named(tmp_path, kind, 
     at = 100 + joint
     events = [Event(at, kind, what)]
     simulated = simulate(
-        RIGS["lockstep", True, FINE_RAD, None], run, TRAJECTORY, tmp_path / "x.parquet", events, REST_RAD
+        RIGS["lockstep", True, FINE_RAD, None],
+        run,
+        TRAJECTORY,
+        tmp_path / "x.parquet",
+        events,
+        REST_RAD,
     )
     why = simulated.supervisor.why
     assert why.startswith(f"drive {('hip', 'knee')[joint]} (127.0.0.1:502, unit {joint + 1}): ")

@@ -1,4 +1,5 @@
-"""The figures of a diagnosis. Their names alone are here: a diagnosis without figures starts without matplotlib."""
+"""The figures of a diagnosis. Their names alone are here: a diagnosis without figures starts
+without matplotlib."""
 
 FIGURES = ("decision", "verdict", "error-budget", "simulation", "dependence")
 """Names of their files."""

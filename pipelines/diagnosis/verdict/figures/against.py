@@ -1,4 +1,5 @@
-"""A joint's residual against one variable: dots, and the mean of what stands above the same value."""
+"""A joint's residual against one variable: dots, and the mean of what stands above the same
+value."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +34,8 @@ class Against:
     x: NDArray
     """(n,)."""
     parts: tuple[NDArray, ...]
-    """(n,) bool each: what has a mean of its own, as the two directions of motion, or each run over time."""
+    """(n,) bool each: what has a mean of its own, as the two directions of motion, or each run over
+    time."""
     before: NDArray
     """(n,) N·m that the baseline leaves."""
     after: NDArray
@@ -41,7 +43,8 @@ class Against:
 
 
 def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Against:
-    """Return a joint's residuals of the validation runs of some kinds along the variable of a name, or ``tone``."""
+    """Return a joint's residuals of the validation runs of some kinds along the variable of a name,
+    or ``tone``."""
     j = d.baseline.joints.index(joint)
     variable = next((v for v in VARIABLES if v.name == name), None)
     chosen = [i for i, run in enumerate(d.validate)
@@ -49,7 +52,9 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
     runs = [d.validate[i] for i in chosen]
     before, after = ([e.residuals[i][:, j] for i in chosen] for e in (d.before, d.after))
     if variable is None:
-        label, x = _along_tone(runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j)
+        label, x = _along_tone(
+            runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j
+        )
     else:
         label = f"{_title(variable, d.baseline.joints, j)}, {unit_at(d.baseline.machine.joints[j].kind, variable.unit)}"
         x = [np.asarray(variable.of(run, j)) for run in runs]
@@ -84,8 +89,11 @@ def _title(variable: Variable, joints: Sequence[str], j: int) -> str:
     return titles.get(variable.name, f"{joint} {variable.name.removeprefix('other_')}")
 
 
-def _along_tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[str, list[NDArray]]:
-    """Fold time at the frequency of the strongest tone in residuals (m,), each run from its own tone's crest."""
+def _along_tone(
+    runs: Sequence[Run], residuals: Sequence[NDArray], j: int
+) -> tuple[str, list[NDArray]]:
+    """Fold time at the frequency of the strongest tone in residuals (m,), each run from its own
+    tone's crest."""
     wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
     frequency, _ = tone(runs, wide, j)
     x = []
@@ -99,11 +107,14 @@ def _along_tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tu
 
 def reach(*residuals: NDArray) -> float:
     """Return how tall a panel must be to show residuals (m,), N·m either side of nought."""
-    return 1.1 * max((float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0)
+    return 1.1 * max(
+        (float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0
+    )
 
 
 def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) -> None:
-    """Draw before (grey) and, where a cause was named, after (blue), on the band of the noise floor."""
+    """Draw before (grey) and, where a cause was named, after (blue), on the band of the noise
+    floor."""
     axis.axhspan(-floor, floor, color=NOISE, alpha=0.5, lw=0)
     axis.axhline(0, color="black", lw=0.6)
     step = max(1, len(seen.x) // DOTS)
@@ -112,7 +123,16 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
         axis.set_xlim(low - 0.02 * (high - low) - 1e-9, high + 0.02 * (high - low) + 1e-9)
     kinds = [(seen.before, BEFORE, 0.6)] + [(seen.after, AFTER, 0.4)] * changed
     for residual, colour, alpha in kinds:
-        axis.plot(seen.x[::step], residual[::step], ".", ms=1.8, mew=0, color=colour, alpha=alpha, rasterized=True)
+        axis.plot(
+            seen.x[::step],
+            residual[::step],
+            ".",
+            ms=1.8,
+            mew=0,
+            color=colour,
+            alpha=alpha,
+            rasterized=True,
+        )
     for residual, colour, _ in kinds:
         for part, line in zip(seen.parts, cycle(LINES)):
             if part.any():

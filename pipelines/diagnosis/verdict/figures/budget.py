@@ -1,4 +1,5 @@
-"""The error budget: one bar for each joint, as long as its mean square error, cut into what it is made of."""
+"""The error budget: one bar for each joint, as long as its mean square error, cut into what it is
+made of."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,7 +27,10 @@ NEGLIGIBLE = 0.005
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     """Draw a bar for each joint, and beside it every share in N·m, at a prismatic joint in N."""
-    budget, units = said["error_budget"], {joint: of["torque"] for joint, of in said["units"].items()}
+    budget, units = (
+        said["error_budget"],
+        {joint: of["torque"] for joint, of in said["units"].items()},
+    )
     drawn, axes = plt.subplots(len(budget), 1, figsize=(9, 0.6 + 1.5 * len(budget)), squeeze=False)
     colours = colours_of(budget)
     for axis, (joint, shares) in zip(axes[:, 0], budget.items(), strict=True):
@@ -34,14 +38,20 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         stack(axis, 0.0, shares, colours)
         axis.set_yticks([])
         axis.set_xlim(min(lowest(shares), 0.0) * 1.05, 1.02 * highest(shares))
-        axis.set_title(f"{joint}: {rms(total)} {units[joint]} rms with rigid body and friction", loc="left", fontsize=9)
+        axis.set_title(
+            f"{joint}: {rms(total)} {units[joint]} rms with rigid body and friction",
+            loc="left",
+            fontsize=9,
+        )
         axis.legend(
             [Patch(color=colours[key]) for key in shares],
             [_line(words_of(key, d), share, total, units[joint]) for key, share in shares.items()],
             loc="center left", bbox_to_anchor=(1.01, 0.5),
         )  # fmt: skip
     last = d.baseline.machine.joints[-1]
-    axes[-1, 0].set_xlabel(f"mean square of the {last.effort} error on runs no fit has seen, ({last.unit('torque')})²")
+    axes[-1, 0].set_xlabel(
+        f"mean square of the {last.effort} error on runs no fit has seen, ({last.unit('torque')})²"
+    )
     drawn.suptitle("What the error is made of", x=0.02, ha="left", fontweight="bold")
     drawn.tight_layout()
     return drawn
@@ -58,8 +68,15 @@ def words_of(key: str, d: Diagnosis) -> str:
     return SHARES.get(key) or in_words(d.effects[key])
 
 
-def stack(axis: Axes, row: float, shares: Mapping[str, float], colours: Mapping[str, str], scale: float = 1.0) -> None:
-    """Lay the shares end to end; those below zero, of causes that raise a joint's error, go to the left."""
+def stack(
+    axis: Axes,
+    row: float,
+    shares: Mapping[str, float],
+    colours: Mapping[str, str],
+    scale: float = 1.0,
+) -> None:
+    """Lay the shares end to end; those below zero, of causes that raise a joint's error, go to the
+    left."""
     right = left = 0.0
     whole = highest(shares) * scale
     for key, share in shares.items():
@@ -88,7 +105,11 @@ def lowest(shares: Mapping[str, float]) -> float:
 def rms(share: float) -> str:
     """Return a mean square as root mean square; minus where it is taken from the others."""
     root = np.sqrt(abs(share))
-    return f"{'−' if share < 0 else ''}{root:.2f}" if root > SMALL else f"{'−' if share < 0 else ''}{root:.2g}"
+    return (
+        f"{'−' if share < 0 else ''}{root:.2f}"
+        if root > SMALL
+        else f"{'−' if share < 0 else ''}{root:.2g}"
+    )
 
 
 def _line(words: str, share: float, total: float, unit: str) -> str:

@@ -169,7 +169,11 @@ def _bars(d: Diagnosis) -> list[Bar]:
     if rest >= 0.5 * LEAST:
         others = ranked[len(shown) :]
         words = f"{len(others)} other set{'s' * (len(others) > 1)}"
-        if shown and shown[0][0] and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest:
+        if (
+            shown
+            and shown[0][0]
+            and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest
+        ):
             words += ", mostly the first and more"
         bars.append(Bar(rest, ((fill(words, LABEL), None, False, False),)))
     return bars

@@ -14,9 +14,7 @@ SHOWN = ("angle", "speed", "load", "time", "phase")
 """Always; another variable only where it predicts something."""
 SOMETHING, MOST = 0.05, 6
 """Share from which a variable predicts something, and most variables beside the phase."""
-EXPLAINED = (
-    "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward, or another run."
-)
+EXPLAINED = "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward, or another run."
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
@@ -24,7 +22,11 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     ranked = {joint: _shown(ranking) for joint, ranking in said["depends_on"].items()}
     columns = max(len(ranking) for ranking in ranked.values())
     drawn, axes = plt.subplots(
-        len(ranked), columns, figsize=(2.2 * columns, 2.5 * len(ranked) + 0.3), squeeze=False, sharey="row"
+        len(ranked),
+        columns,
+        figsize=(2.2 * columns, 2.5 * len(ranked) + 0.3),
+        squeeze=False,
+        sharey="row",
     )
     for j, (row, (joint, ranking)) in enumerate(zip(axes, ranked.items(), strict=True)):
         seen = [against(one["variable"], d, joint, said["runs"]) for one in ranking]
@@ -48,7 +50,8 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
 
 
 def _shown(ranking: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return what is drawn, the phase last: it can imitate whatever repeats, and says only that something does."""
+    """Return what is drawn, the phase last: it can imitate whatever repeats, and says only that
+    something does."""
     chosen = [one for one in ranking if one["share_before"] > SOMETHING or one["variable"] in SHOWN]
     phase = [one for one in chosen if one["variable"] == "phase"]
     others = [one for one in chosen if one["variable"] != "phase"]

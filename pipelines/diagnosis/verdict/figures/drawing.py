@@ -1,4 +1,5 @@
-"""The figures of a diagnosis: what the simulation gets wrong, and what naming the cause makes of it."""
+"""The figures of a diagnosis: what the simulation gets wrong, and what naming the cause makes of
+it."""
 
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,8 @@ ON_SCREEN = ("simulation", "dependence")
 
 
 def draw(d: Diagnosis, said: dict[str, Any], folder: Path) -> None:
-    """Write every figure as PNG, and what is to be printed as PDF too; ``said`` is the diagnosis's verdict."""
+    """Write every figure as PNG, and what is to be printed as PDF too; ``said`` is the diagnosis's
+    verdict."""
     with plt.rc_context(STYLE):
         for name, figure in DRAWN_BY.items():
             save(figure(d, said), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf"))

@@ -37,8 +37,12 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for j, (joint, column) in enumerate(zip(joints, axes.T, strict=True)):
         _measured(column[0], column[2], d, stretch, j)
         column[1].axhline(0, color="black", lw=0.6)
-        column[3].axhspan(-d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor")
-        column[0].set_title(f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9)
+        column[3].axhspan(
+            -d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor"
+        )
+        column[0].set_title(
+            f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9
+        )
         column[2].set_title(
             f"{joint}: {d.baseline.machine.joint(joint).effort} is off by {_off(d, said, joint)}",
             loc="left",
@@ -51,10 +55,18 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for error in axes[1]:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
-    angle, torque = (either(said["units"][joint][quantity] for joint in joints) for quantity in ("angle", "torque"))
+    angle, torque = (
+        either(said["units"][joint][quantity] for joint in joints)
+        for quantity in ("angle", "torque")
+    )
     where = either(joint.place for joint in d.baseline.machine.joints)
     push = either(joint.effort for joint in d.baseline.machine.joints)
-    words = (f"{where}, {angle}", f"{where} error, m{angle}", f"{push}, {torque}", f"{push} error, {torque}")
+    words = (
+        f"{where}, {angle}",
+        f"{where} error, m{angle}",
+        f"{push}, {torque}",
+        f"{push} error, {torque}",
+    )
     for row, label in zip(axes, words, strict=True):
         row[0].set_ylabel(label)
     lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
@@ -71,12 +83,16 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
 
 
 def _strayed(said: dict[str, Any], joint: str) -> str:
-    before, after = (said[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended"))
+    before, after = (
+        said[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended")
+    )
     if before is None:
         return "no one can tell: these parameters move no leg"
     words = f"{1e3 * before:.1f}"
     if said["causes"]:
-        words += f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
+        words += (
+            f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
+        )
     return f"{words} m{said['units'][joint]['angle']} rms"
 
 
@@ -93,12 +109,25 @@ def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int)
     run = d.validate[stretch.run]
     motion, blocks = run.motion, stretch.within(run.time)
     samples = stretch.within(motion.time)
-    angle.plot(motion.time[samples], motion.q[samples, j], color=MEASURED, lw=0.8, zorder=3, label="measured")
+    angle.plot(
+        motion.time[samples],
+        motion.q[samples, j],
+        color=MEASURED,
+        lw=0.8,
+        zorder=3,
+        label="measured",
+    )
     torque.plot(run.time[blocks], run.measured[blocks, j], color=MEASURED, lw=0.8, zorder=3)
 
 
 def _angles(
-    angles: list[Axes], errors: list[Axes], made: Validated, d: Diagnosis, stretch: Stretch, name: str, colour: str
+    angles: list[Axes],
+    errors: list[Axes],
+    made: Validated,
+    d: Diagnosis,
+    stretch: Stretch,
+    name: str,
+    colour: str,
 ) -> None:
     simulated = simulated_error(made, d, stretch)
     motion = d.validate[stretch.run].motion
@@ -113,7 +142,12 @@ def _angles(
 
 
 def _torques(
-    torques: list[Axes], errors: list[Axes], made: Validated, d: Diagnosis, stretch: Stretch, colour: str
+    torques: list[Axes],
+    errors: list[Axes],
+    made: Validated,
+    d: Diagnosis,
+    stretch: Stretch,
+    colour: str,
 ) -> None:
     run = d.validate[stretch.run]
     blocks = stretch.within(run.time)

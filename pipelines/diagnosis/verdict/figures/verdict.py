@@ -1,4 +1,5 @@
-"""The one figure beside the summary: what the torque error is made of, and what the cause made of it."""
+"""The one figure beside the summary: what the torque error is made of, and what the cause made of
+it."""
 
 import textwrap
 from typing import Any
@@ -12,7 +13,14 @@ from matplotlib.patches import Patch
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, knows, tone, variable_share
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
-from pipelines.diagnosis.verdict.figures.budget import colours_of, highest, lowest, rms, stack, words_of
+from pipelines.diagnosis.verdict.figures.budget import (
+    colours_of,
+    highest,
+    lowest,
+    rms,
+    stack,
+    words_of,
+)
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 from pipelines.effects import RUNS
 from pipelines.model import effect_named
@@ -26,7 +34,8 @@ LINE_IN, BODY_IN = 0.19, 3.5
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
-    """Draw the error budget, and the residual against the variable that shows best what is wrong."""
+    """Draw the error budget, and the residual against the variable that shows best what is
+    wrong."""
     summary = textwrap.wrap(said["summary"], WIDTH)
     head = 0.1 + LINE_IN * len(summary)
     height = head + BODY_IN
@@ -47,7 +56,10 @@ def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
         stack(axis, row, shares, colours, scale=100.0 / totals[joint])
     axis.set_yticks(
         range(len(budget)),
-        [f"{joint}\n{rms(total)} {said['units'][joint]['torque']}" for joint, total in totals.items()],
+        [
+            f"{joint}\n{rms(total)} {said['units'][joint]['torque']}"
+            for joint, total in totals.items()
+        ],
         fontsize=9,
     )
     axis.set_ylim(len(budget) - 0.5, -0.5)
@@ -69,24 +81,35 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     if d.causes:
         joint, variable, kinds = _shown_best(d, said)
     else:
-        joint = max(said["noise_floor_nm"], key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j])
+        joint = max(
+            said["noise_floor_nm"],
+            key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j],
+        )
         # When a fault of acquisition sets in tells more than what it goes with.
-        variable, kinds = "time" if d.data.spoilt else said["depends_on"][joint][0]["variable"], RUNS
+        variable, kinds = (
+            "time" if d.data.spoilt else said["depends_on"][joint][0]["variable"],
+            RUNS,
+        )
     j = d.baseline.joints.index(joint)
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
-    axis.set_ylabel(f"{joint} {d.baseline.machine.joint(joint).effort} error, {said['units'][joint]['torque']}")
+    axis.set_ylabel(
+        f"{joint} {d.baseline.machine.joint(joint).effort} error, {said['units'][joint]['torque']}"
+    )
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
     lines += [(f"with {named}", AFTER)] if d.causes else []
-    handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [Patch(color=NOISE, alpha=0.5)]
+    handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [
+        Patch(color=NOISE, alpha=0.5)
+    ]
     axis.legend(handles, [words for words, _ in lines] + ["noise floor"], loc="upper left",
                 bbox_to_anchor=(-0.02, -0.2), fontsize=8)  # fmt: skip
 
 
 def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
-    """Return joint, variable and kinds of run: what the first cause adds goes with the variable most."""
+    """Return joint, variable and kinds of run: what the first cause adds goes with the variable
+    most."""
     first = said["causes"][0]
     joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
     runs = [(run, b - a) for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
@@ -94,5 +117,7 @@ def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str
     j = d.baseline.joints.index(joint)
     moved, by = [run for run, _ in runs], [change for _, change in runs]
     known = [v for v in VARIABLES if v.name != "phase" and knows(v, moved, j)]
-    shares = {v.name: variable_share(v, moved, by, j) for v in known} | {"tone": tone(moved, by, j)[1]}
+    shares = {v.name: variable_share(v, moved, by, j) for v in known} | {
+        "tone": tone(moved, by, j)[1]
+    }
     return joint, max(shares, key=lambda name: shares[name]), effect.acts_in
