@@ -26,7 +26,7 @@ from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
 from pipelines.settings.rig import SafetySettings, load_rig
 
-from .conftest import free_port
+from tests.acquisition.conftest import free_port
 
 TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")
 
