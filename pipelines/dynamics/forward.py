@@ -110,30 +110,22 @@ def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, 
 
     The mass matrix is the torque at unit acceleration less that at none (Walker and Orin, 1982).
     """
-    rest[:] = 0.0
-    _react(
-        a,
-        first,
-        last,
-        Instant(t, angle, speed, w.zero, direction, load, a.temperature),
-        memory,
-        rest,
-    )
     w.ddq[:] = 0.0
-    for k in range(a.joints):
-        w.ddq[k] = 1.0
+    at = Instant(t, angle, speed, w.ddq, direction, load, a.temperature)
+    for k in range(
+        -1, a.joints
+    ):  # first without acceleration: one copy of the call compiles faster
+        if k >= 0:
+            w.ddq[k] = 1.0
         w.column[:] = 0.0
-        _react(
-            a,
-            first,
-            last,
-            Instant(t, angle, speed, w.ddq, direction, load, a.temperature),
-            memory,
-            w.column,
-        )
-        w.ddq[k] = 0.0
+        _react(a, first, last, at, memory, w.column)
+        if k >= 0:
+            w.ddq[k] = 0.0
         for row in range(a.joints):
-            M[row, k] = w.column[row] - rest[row]
+            if k < 0:
+                rest[row] = w.column[row]
+            else:
+                M[row, k] = w.column[row] - rest[row]
 
 
 @njit(cache=True, inline="always")

@@ -127,6 +127,13 @@ def read_torque(a, t, torque, sensed):
 
 
 @njit(cache=True)
+def _copy(source, out):
+    """Copy an array (J,); ``out[:] = source`` takes seconds to compile, for its error's message."""
+    for j in range(out.shape[0]):
+        out[j] = source[j]
+
+
+@njit(cache=True)
 def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth):
     """Advance the loop by one sample period that begins at ``t``.
 
@@ -150,9 +157,8 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     period = d.step_s * SUBSTEPS
     middle = d.periods * SUBSTEPS // 2
     done = 0
-    before = loop.state
     for c in range(d.periods):
-        counted[:] = loop.state[THETA]
+        _copy(loop.state[THETA], counted)
         read_encoders(a, counted)
         for j in range(j_count):
             if d.rad_per_count[j] > 0.0:
@@ -165,15 +171,17 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             loop.torque[j] = min(d.limit[j], max(-d.limit[j], command)) if enabled[j] else 0.0
         for _ in range(SUBSTEPS):
             if done == middle:
-                angle[:] = loop.state[THETA]
+                _copy(loop.state[THETA], angle)
                 read_encoders(a, angle)
                 for j in range(j_count):
                     if d.rad_per_count[j] > 0.0:
                         angle[j] = (
                             np.floor(angle[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
                         )
-                speed[:] = loop.speed
-                before = loop.state.copy()
+                _copy(loop.speed, speed)
+                _copy(loop.state[Q], truth[0])
+                _copy(loop.state[DQ], truth[1])
+                _copy(loop.state[THETA], truth[3])
             step(
                 a,
                 w,
@@ -186,13 +194,12 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
                 loop.torque,
             )
             if done == middle:
-                truth[0], truth[1] = before[Q], before[DQ]
-                truth[2], truth[3] = s.rates[0, DQ], before[THETA]
+                _copy(s.rates[0, DQ], truth[2])
             done += 1
         for j in range(j_count):
             torque[j] += loop.torque[j] / d.periods
     read_torque(a, t + middle * d.step_s, torque, loop.sensed)
-    loop.reference[:] = reference
+    _copy(reference, loop.reference)
 
 
 def follow(

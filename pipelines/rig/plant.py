@@ -205,8 +205,9 @@ def _first_order(wanted, share, state):
     sample."""
     out = np.empty_like(wanted)
     for k in range(len(wanted)):
-        state += share * (wanted[k] - state)
-        out[k] = state
+        for j in range(len(state)):
+            state[j] += share * (wanted[k, j] - state[j])
+            out[k, j] = state[j]
     return out
 
 
@@ -228,14 +229,15 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
         np.zeros((n, joints)),
         np.empty((n, joints)),
     )
+    direction = np.empty(joints)
     for k in range(n):
         t = (first + k) * period
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
-        temperature[k] = a.temperature
         for j in range(joints):
+            temperature[k, j] = a.temperature[j]
             final = ambient + heating * torque[k, j] ** 2
             a.temperature[j] += period / time_constant * (final - a.temperature[j])
-        direction = np.sign(truth[k, DQ])
+            direction[j] = np.sign(truth[k, DQ, j])
         at = Instant(
             t + 0.5 * period, truth[k, Q], truth[k, DQ], truth[k, 2], direction, loop.load, temperature[k]
         )  # fmt: skip
