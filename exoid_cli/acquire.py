@@ -80,9 +80,12 @@ def acquire(
             *(("--reset-faults",) if reset_faults else ()),
         )
         only(
-            context, place, "acquire", again=again,
+            context,
+            place,
+            "acquire",
+            again=again,
             before=lambda step: (*ask_before(place.experiment, step, yes=yes), *told),
-        )  # fmt: skip
+        )
         return
     place.experiment.run_named(run)
     if trajectory is None or output is None:
@@ -148,17 +151,26 @@ def _record(
             reports[0](progress)
 
         outcome = record(
-            experiment.file(experiment.acquire.rig), settings, trajectory, output, rate, experiment.mechanism,
-            report, reset_faults=reset_faults, begin=begin, claim=claim,
-        )  # fmt: skip
+            experiment.file(experiment.acquire.rig),
+            settings,
+            trajectory,
+            output,
+            rate,
+            experiment.mechanism,
+            report,
+            reset_faults=reset_faults,
+            begin=begin,
+            claim=claim,
+        )
     if outcome.missed:
         console.warn(
             f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps"
         )
     if outcome.left_out > outcome.missed:  # else they are those of the samples
         console.warn(
-            f"{outcome.path}: {outcome.left_out} set-points were left out, since cycles took longer than "
-            f"{1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower acquire.sample_rate_hz"
+            f"{outcome.path}: {outcome.left_out} set-points were left out, since cycles took longer"
+            f" than {1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower"
+            " acquire.sample_rate_hz"
         )
     console.emit(
         {

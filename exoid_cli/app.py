@@ -50,8 +50,10 @@ from pipelines.errors import ExoidError
 
 app = typer.Typer(
     name="exoid",
-    help="Identification experiments on an exoskeleton leg: what the model gets wrong, and why.\n\n"
-    "\b\nExample:\n  exoid init my_experiment\n  cd my_experiment\n  exoid run\n  exoid status",
+    help=(
+        "Identification experiments on an exoskeleton leg: what the model gets wrong, and why.\n\n"
+        "\b\nExample:\n  exoid init my_experiment\n  cd my_experiment\n  exoid run\n  exoid status"
+    ),
     # Plain text: brackets of [design] are no markup, and examples can be copied.
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -163,7 +165,8 @@ def run(arguments: Sequence[str]) -> int:
         if signals.came:  # whatever made that of it
             return _failed(signals.told(), signals.exit_code)
         return _failed(
-            f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}",
+            f"exoid itself failed: {type(error).__name__}: {error}; please report it,"
+            f" {_keep_traceback()}",
             1,
         )
 
@@ -200,7 +203,9 @@ _REMEDIES = {
     errno.EPERM: "you may not read or write there; change the permissions or choose another place",
     errno.ENOSPC: "free some space and run the command again",
     errno.EDQUOT: "free some space and run the command again",
-    errno.EFBIG: "files may not be so large there; raise the limit (ulimit -f), or choose another place",
+    errno.EFBIG: (
+        "files may not be so large there; raise the limit (ulimit -f), or choose another place"
+    ),
     errno.EROFS: "choose a folder that can be written to",
     errno.ENOENT: "check the name",
     errno.EEXIST: "a file stands where a folder should; choose another name",

@@ -38,14 +38,16 @@ def confirm(
     angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     # On the terminal in every mode: who answers must have seen it.
     lines = [
-        f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for {run.duration_s:g} s:"
+        f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for"
+        f" {run.duration_s:g} s:"
     ]
     for j, drive in enumerate(rig.drive):
         angle, speed = angles[:, j], abs(speeds[:, j]).max()
         low, high = drive.angle_rad
         lines.append(
-            f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f} rad/s; limits "
-            f"{low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s, {drive.torque_nm:g} N·m"
+            f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f}"
+            f" rad/s; limits {low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s,"
+            f" {drive.torque_nm:g} N·m"
         )
     cuffs = (
         f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
@@ -53,16 +55,17 @@ def confirm(
         else "none on the cuffs"
     )
     lines.append(
-        f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it"
+        f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C"
+        " stops it"
     )
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
     lines.append(
-        f"  a stop takes up to {stop_s:.2g} s, then the drives hold for {HOLD_SAMPLES / sample_rate_hz:.2g} s before "
-        "their torque is taken away"
+        f"  a stop takes up to {stop_s:.2g} s, then the drives hold for"
+        f" {HOLD_SAMPLES / sample_rate_hz:.2g} s before their torque is taken away"
     )
     lines.append(
-        f"  stopped after {rig.safety.watchdog_s:g} s of silence, or {rig.safety.following_error_rad:g} rad from a "
-        "set-point"
+        f"  stopped after {rig.safety.watchdog_s:g} s of silence, or"
+        f" {rig.safety.following_error_rad:g} rad from a set-point"
     )
     console.err.print("\n".join(lines), markup=False, soft_wrap=True)
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
@@ -96,9 +99,9 @@ def confirm_move() -> None:
     """Ask whether a check may move the leg; raise InputError unless the answer is yes."""
     _refuse_nobody_to_ask("--move moves the leg, which wants to be confirmed on a terminal")
     console.err.print(
-        "\nIf all registers are right, the drives will be enabled and move both joints by 0.05 rad to and fro, the hip "
-        "once in 4 s, the knee twice as fast. Keep the emergency stop in your hand; if the wrong joint moves faster, "
-        "press it: the drives are swapped.",
+        "\nIf all registers are right, the drives will be enabled and move both joints by 0.05 rad"
+        " to and fro, the hip once in 4 s, the knee twice as fast. Keep the emergency stop in your"
+        " hand; if the wrong joint moves faster, press it: the drives are swapped.",
         markup=False,
     )
     _ask("Is nobody in the machine, and everybody ready?", "--move")

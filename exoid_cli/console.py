@@ -76,9 +76,13 @@ class Console:
         """Print what is to be said of the line above, set in and broken between words."""
         hanging = "    " if text.startswith("- ") else "  "
         for line in wrap(
-            text, self.out.width, initial_indent="  ", subsequent_indent=hanging,
-            break_long_words=False, break_on_hyphens=False,
-        ):  # fmt: skip
+            text,
+            self.out.width,
+            initial_indent="  ",
+            subsequent_indent=hanging,
+            break_long_words=False,
+            break_on_hyphens=False,
+        ):
             self.say(line)
 
     def wrote(self, folder: Path, *names: str) -> None:
@@ -113,8 +117,12 @@ class Console:
                 width=width,
             )
         for row in cells:
-            table.add_row(*(Text(text if width is None else at_slashes(text, width))
-                            for text, width in zip(row, widths, strict=True)))  # fmt: skip
+            table.add_row(
+                *(
+                    Text(text if width is None else at_slashes(text, width))
+                    for text, width in zip(row, widths, strict=True)
+                )
+            )
         with self.out.capture() as captured:
             self.out.print(table)
         # The last column is filled up with spaces, which nobody wants who copies from it.
@@ -163,9 +171,12 @@ class Console:
         """Show a bar while the block runs; yields ``report(done, note="")`` with ``done`` out of
         ``total``."""
         columns = (
-            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"),
-            TimeElapsedColumn(), TimeRemainingColumn(),
-        )  # fmt: skip
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+        )
         with Progress(
             *columns, console=self.err, transient=True, disable=not self._may_move
         ) as bar:

@@ -91,14 +91,15 @@ def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any
     TRAJECTORY.write(output, found.frame(), found.metadata() | describe(config=config))
     if found.stopped_by == "seconds":
         console.warn(
-            f"the search was cut short after {settings.seconds:g} s, so another machine may find another design; "
-            "raise design.seconds"
+            f"the search was cut short after {settings.seconds:g} s, so another machine may find"
+            " another design; raise design.seconds"
         )
     console.emit({"file": str(output), **found.metadata()})
     _show(str(output), found.quality)
     console.say(
-        f"\n{output}: {settings.criterion} {found.quality.value(settings.criterion):.4g}, {settings.harmonics} "
-        f"harmonics, period {found.trajectory.period_s:g} s, seed {settings.seed}; stopped by {found.stopped_by}"
+        f"\n{output}: {settings.criterion} {found.quality.value(settings.criterion):.4g},"
+        f" {settings.harmonics} harmonics, period {found.trajectory.period_s:g} s, seed"
+        f" {settings.seed}; stopped by {found.stopped_by}"
     )
 
 
@@ -133,10 +134,16 @@ def _show(file: str, found: "Quality") -> None:
         "",
     )
     rows = [
-        (m.joint, m.quantity, m.unit, *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)), f"{m.margin:.4f}",
-         "" if m.kept else "OUT")
+        (
+            m.joint,
+            m.quantity,
+            m.unit,
+            *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)),
+            f"{m.margin:.4f}",
+            "" if m.kept else "OUT",
+        )
         for m in found.margins
-    ]  # fmt: skip
+    ]
     console.table(headings, rows, numbers="lowest, highest, at least, at most, margin")
     outside = [str(margin) for margin in found.margins if not margin.kept]
     if outside:

@@ -87,8 +87,8 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
     kinds = [file.suffix == ".toml" or contract_of(file) is TRAJECTORY for file in files]
     if any(kinds) and len(files) > 1:
         raise InputError(
-            f"{files[kinds.index(True)]}: an excitation among {len(files)} files; give one excitation, "
-            "or recordings and motions only"
+            f"{files[kinds.index(True)]}: an excitation among {len(files)} files; give one"
+            " excitation, or recordings and motions only"
         )
     return kinds[0]
 
@@ -109,7 +109,8 @@ def _planned(
     plant = load_rig(rig).plant if rig else _default_plant(experiment)
     if plant is None:
         raise InputError(
-            f"{rig}: has no [plant], expected the file of a virtual rig; name one that has, or leave it out"
+            f"{rig}: has no [plant], expected the file of a virtual rig; name one that has, or"
+            " leave it out"
         )
     design = experiment.design
     kinds = ("exo_alone", "with_human") if runs == "both" else (runs,)

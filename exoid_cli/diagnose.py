@@ -127,6 +127,9 @@ def diagnose(
     console.emit(said)
     show_verdict(said, machine.joints)
     console.wrote(
-        output, "verdict.json", *(f"{name}.parquet" for name in tables), "detectability.json",
+        output,
+        "verdict.json",
+        *(f"{name}.parquet" for name in tables),
+        "detectability.json",
         *(f"{name}.png" for name in FIGURES if figures),
-    )  # fmt: skip
+    )

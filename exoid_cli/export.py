@@ -91,7 +91,8 @@ def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
     )
     if meant:
         raise SettingsError(
-            f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to {chosen.name}"
+            f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to"
+            f" {chosen.name}"
         )
     return path
 

@@ -44,7 +44,8 @@ def figures(
     drawn = figures_of(session)
     if not drawn:
         raise InputError(
-            f"{session.folders[0]}: holds nothing to draw; `exoid diagnose` and `exoid simulate` make it"
+            f"{session.folders[0]}: holds nothing to draw; `exoid diagnose` and `exoid simulate`"
+            " make it"
         )
     for name in only or ():
         if name not in drawn:

@@ -73,7 +73,8 @@ def _targets(
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                f"found two files named {name}, which would be one in {output}; filter them one by one"
+                f"found two files named {name}, which would be one in {output}; filter them one"
+                " by one"
             )
     return [(file, output / file.name) for file in files]
 
@@ -91,7 +92,8 @@ def _filter(recording: Path, output: Path, settings: "FilterSettings") -> dict[s
         MOTION.write_pieces(output, found.passing(motion.pieces()), motion.metadata | provenance)
     gaps = "no gap" if found.segments == 1 else f"{found.segments} segments"
     console.say(
-        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid, cut-off {found.cutoff_hz:.1f} Hz"
+        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid, cut-off"
+        f" {found.cutoff_hz:.1f} Hz"
     )
     console.note(found.why)
     difference = found.velocity_difference

@@ -44,7 +44,10 @@ def identify(
     method: Annotated[
         str | None,
         typer.Option(
-            help="Estimator, also iv, wls, ols, irls or oe for short; docs/estimators.md tells of each.",
+            help=(
+                "Estimator, also iv, wls, ols, irls or oe for short; docs/estimators.md tells of"
+                " each."
+            ),
             show_default="[identify] method, weighted_least_squares",
             autocompletion=completion.methods,
         ),
@@ -92,7 +95,8 @@ def identify(
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"
         raise InputError(
-            f"{option}: no folder is given; name one with -o, for identified/ is of the model without"
+            f"{option}: no folder is given; name one with -o, for identified/ is of the model"
+            " without"
         )
     if output and (output / "verdict.json").exists():
         raise InputError(
@@ -100,7 +104,8 @@ def identify(
         )
     if causes and output and (output / "parameters.parquet").resolve() == causes.resolve():
         raise InputError(
-            f"-o: {output} is the folder of {causes}, which would be overwritten; name another folder"
+            f"-o: {output} is the folder of {causes}, which would be overwritten; name another"
+            " folder"
         )
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     for contract, name in ((PARAMETERS, "parameters"), (RESIDUALS, "residuals")):

@@ -89,7 +89,8 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     settings = load_map(map_)
     for left in leftovers(output) if output.is_dir() else []:
         console.warn(
-            f"{left}: left by an import that was killed, or of one that goes on; remove it once none does"
+            f"{left}: left by an import that was killed, or of one that goes on; remove it once"
+            " none does"
         )
     with folder_to_fill(output):
         told = _made(files, settings, map_, output)
@@ -109,7 +110,8 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
 def _refuse_the_name_of_a_recording(output: Path) -> None:
     if output.suffix == ".parquet":
         raise InputError(
-            f"-o {output}: ends as a recording's file does, expected the folder for all of them, such as "
+            f"-o {output}: ends as a recording's file does, expected the folder for all of them,"
+            " such as "
             f'-o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
         )
 
@@ -147,8 +149,9 @@ def _twice(path: Path, first: Path, second: Path) -> str:
         what = "give the file once, or [[recording]] in the map names that differ"
     elif first.stem == second.stem:
         what = (
-            'give [[recording]] in the map a name with {folder} in it, such as "{folder}_{file}_{purpose}", or each '
-            f'file one of its own, files = "{"/".join(second.absolute().parts[-2:])}"'
+            "give [[recording]] in the map a name with {folder} in it, such as"
+            ' "{folder}_{file}_{purpose}", or each file one of its own, files ='
+            f' "{"/".join(second.absolute().parts[-2:])}"'
         )
     else:
         what = "give [[recording]] in the map names that differ, with {file} in them"
@@ -162,7 +165,8 @@ def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
     found = imported_in(output)
     for name in no_longer_made(found, made):
         console.warn(
-            f"{output / name}: of these logs too, by an earlier map; this one makes it no more, remove it"
+            f"{output / name}: of these logs too, by an earlier map; this one makes it no more,"
+            " remove it"
         )
     lacking = list(lacks(found, made, map_))
     for one in lacking:
@@ -207,7 +211,8 @@ def _say(told: dict[str, Any]) -> None:
 
 def _say_what_was_made(made: dict[str, Any]) -> None:
     console.say(
-        f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz"
+        f"{made['path']}: {made['purpose']}, {made['samples']} samples,"
+        f" {made['sample_rate_hz']:.6g} Hz"
     )
 
 

@@ -36,5 +36,6 @@ def init(
     written = [folder / name for name in ("exoid.toml", "rigs", "Makefile")]
     console.emit({"folder": folder, "written": written})
     console.say(
-        f"{folder}: a new experiment; edit {folder / 'exoid.toml'}, then `cd {folder}` and `exoid run`"
+        f"{folder}: a new experiment; edit {folder / 'exoid.toml'}, then `cd {folder}` and `exoid"
+        " run`"
     )

@@ -13,7 +13,8 @@ class Terminal:
     def __init__(self) -> None:
         if not sys.stdin.isatty():
             raise InputError(
-                "--by-hand asks a person what to do, but standard input is no terminal; run it in one"
+                "--by-hand asks a person what to do, but standard input is no terminal; run it"
+                " in one"
             )
 
     async def ready(self, prompt: str) -> None:

@@ -76,9 +76,11 @@ class Gauge(NamedTuple):
             (f"{self.name:<11}", PLAIN),
             (f"{value:>12}{'!' if self.near else ' '}", style),
             (f"{self.low:>6g} ", FAINT),
-            ("─" * place, FAINT), ("█", style), ("─" * (BAR - 1 - place), FAINT),
+            ("─" * place, FAINT),
+            ("█", style),
+            ("─" * (BAR - 1 - place), FAINT),
             (f" {self.high:<5g}", FAINT),
-        ]  # fmt: skip
+        ]
 
 
 class OperatorView:

@@ -58,7 +58,8 @@ class Place:
             if step.run == run:
                 return step
         raise InputError(
-            f"{self.out / NAME}: {why_absent(stage, run)}; say what to read and, with -o, what to write"
+            f"{self.out / NAME}: {why_absent(stage, run)}; say what to read and, with -o, what to"
+            " write"
         )
 
 
@@ -107,8 +108,9 @@ def _how_to_begin(named: bool) -> str:
             f"with an empty {NAME} beside recordings/, `exoid run` does all with what was imported"
         )
     return (
-        f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with --config, or start one "
-        f"with `exoid init DIR`; beside recordings that `exoid import` made, an empty {NAME} is enough"
+        f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with"
+        " --config, or start one with `exoid init DIR`; beside recordings that `exoid import`"
+        f" made, an empty {NAME} is enough"
     )
 
 

@@ -87,6 +87,12 @@ def _told(one: "Recovered") -> str:
 def _as_json(one: "Recovered") -> dict:
     account = one.account
     return {
-        "path": one.path, "samples": account.samples, "planned": account.planned, "cut_off": account.cut_off,
-        "gaps": account.gaps, "abort": account.abort, "damaged": account.damaged, "checked": account.checked,
-    }  # fmt: skip
+        "path": one.path,
+        "samples": account.samples,
+        "planned": account.planned,
+        "cut_off": account.cut_off,
+        "gaps": account.gaps,
+        "abort": account.abort,
+        "damaged": account.damaged,
+        "checked": account.checked,
+    }

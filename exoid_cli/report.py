@@ -91,8 +91,15 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
     page = compare(first, second, titles_of(first, second))
     write_text(output, page.text)
     apart = [{"name": one.name, "first": one.first, "second": one.second} for one in page.settings]
-    console.emit({"path": str(output), "changed": page.changed, "judged": page.judged, "headline": page.headline,
-                  "settings": apart})  # fmt: skip
+    console.emit(
+        {
+            "path": str(output),
+            "changed": page.changed,
+            "judged": page.judged,
+            "headline": page.headline,
+            "settings": apart,
+        }
+    )
     console.say(f"{page.headline}{' (95 %)' if page.judged else ''}.")
     for line in page.errors:
         console.say(line)

@@ -91,11 +91,13 @@ def _address(bind: str, anyone: bool) -> str:
         return found[0]  # not the name, which may lead elsewhere the next time
     if not anyone:
         raise SettingsError(
-            f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}: Modbus has no "
-            "authentication, whoever reaches the rig can move it; add --anyone if that is wanted"
+            f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}:"
+            " Modbus has no authentication, whoever reaches the rig can move it; add --anyone if"
+            " that is wanted"
         )
     console.warn(
-        f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can move it"
+        f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can"
+        " move it"
     )
     return bind
 

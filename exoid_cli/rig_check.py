@@ -104,9 +104,10 @@ def _show(report: "RigReport") -> None:
     if drives:
         console.say("\nDrives, disabled")
         console.table(
-            ("", *DRIVE.values(), "samples/s", "clock s/s"), map(_drive, drives),
+            ("", *DRIVE.values(), "samples/s", "clock s/s"),
+            map(_drive, drives),
             numbers=", ".join((*DRIVE.values(), "samples/s", "clock s/s")),
-        )  # fmt: skip
+        )
     sensors = [device for device in report.devices if FORCES[0] in device.values]
     if sensors:
         console.say("\nSensors, mean ± noise in N")
@@ -122,7 +123,8 @@ def _show(report: "RigReport") -> None:
         headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
         console.note(
-            "The scale of the torque shows in no movement: hold a known weight, see docs/rig-check.md."
+            "The scale of the torque shows in no movement: hold a known weight, see"
+            " docs/rig-check.md."
         )
     for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
         if rate:

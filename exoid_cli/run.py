@@ -61,7 +61,8 @@ def run(
     kept = len(wanted) - len(done) - len(left_out)
     up_to_date = f"; {kept} {'was' if kept == 1 else 'were'} up to date" if kept else ""
     console.say(
-        f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s{up_to_date}"
+        f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f}"
+        f" s{up_to_date}"
     )
     _say_what_is_left_out(left_out)
 

@@ -90,7 +90,8 @@ def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:FIRST]:
         console.say(
-            f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}: {row['verdict']}"
+            f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}:"
+            f" {row['verdict']}"
         )
         console.note(labels_in_words(row["reason"], labels))
     if len(rows) > FIRST:

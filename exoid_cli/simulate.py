@@ -123,16 +123,17 @@ def _track(
     plant = plant_from_table(table, run, geometry_from(settings))
     if not reference and not plant.machine.is_exoskeleton:
         raise InputError(
-            f"{table.path} is of {', '.join(plant.machine.names)}, expected hip and knee: the gait is a leg's; "
-            "name what to follow with --reference"
+            f"{table.path} is of {', '.join(plant.machine.names)}, expected hip and knee: the gait"
+            " is a leg's; name what to follow with --reference"
         )
     wanted = read_trajectory(reference) if reference else gait()
     with console.working("simulating"):
         loop = track(plant, chosen, wanted)
     if loop.ran_away:
         raise InputError(
-            f"{loop.ran_away}: the loop is unstable, or the disturbance stronger than the drives; lower "
-            "simulate.adaptation_gain or simulate.disturbance_nm, or shorten simulate.step_s"
+            f"{loop.ran_away}: the loop is unstable, or the disturbance stronger than the drives;"
+            " lower simulate.adaptation_gain or simulate.disturbance_nm, or shorten"
+            " simulate.step_s"
         )
     with console.working("sweeping the feedback gain"):
         gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
@@ -176,7 +177,10 @@ def _track(
             "sweep": gains.to_dict("records"),
         }
     )
-    settled = f"largest error after {chosen.settled_after_s:g} s ({either(j.unit('angle') for j in plant.joints)})"
+    settled = (
+        f"largest error after {chosen.settled_after_s:g} s"
+        f" ({either(j.unit('angle') for j in plant.joints)})"
+    )
     strongest = f"peak torque ({either(j.unit('torque') for j in plant.joints)})"
     console.table(
         ("joint", settled, strongest),
@@ -240,9 +244,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     if lacks:
         console.warn(f"no closed loop for {recording}: {lacks}")
     console.wrote(
-        output.parent, output.name, *([] if lacks else [beside.name]),
+        output.parent,
+        output.name,
+        *([] if lacks else [beside.name]),
         *([output.with_suffix(".png").name] if settings.simulate.figures else []),
-    )  # fmt: skip
+    )
     for guess in plant.guesses:
         console.warn(f"{guess}, and as much as they differ the errors are not the model's")
 

@@ -41,12 +41,16 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
         ("import", "damaged", file.relative_to(place.out).as_posix(), DO) for file in place.damaged
     ]
     console.table(
-        ("stage", "state", "result", "why"), [*damaged, *(_line(stage, place.out) for stage in stages)]
-    )  # fmt: skip
+        ("stage", "state", "result", "why"),
+        [*damaged, *(_line(stage, place.out) for stage in stages)],
+    )
     if place.damaged:
         raise InputError(damage(place.damaged))
     todo = sum(not one.done for one in judged)
-    to_do = f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what is to do."
+    to_do = (
+        f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what"
+        " is to do."
+    )
     console.say(f"\n{to_do if todo else 'Everything is up to date.'}")
 
 

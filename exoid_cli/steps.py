@@ -117,7 +117,8 @@ def _look_before(place: Place, wanted: "Sequence[Step]") -> None:
             if not maker.done and stage not in told:
                 told.add(stage)
                 console.warn(
-                    f"{stage} is stale: {maker.why[0]}; `exoid run {step.stage}` brings it up to date too"
+                    f"{stage} is stale: {maker.why[0]}; `exoid run {step.stage}` brings it up to"
+                    " date too"
                 )
 
 

@@ -18,9 +18,12 @@ ERRORS = {
     "extended_rmse_nm": "with the causes",
 }
 ROUTER = {
-    "noise": "noise", "repeats": "repeats", "wanders": "wanders", "between_runs": "per run",
+    "noise": "noise",
+    "repeats": "repeats",
+    "wanders": "wanders",
+    "between_runs": "per run",
     "unsplit": "beyond noise",
-}  # fmt: skip
+}
 """Headings of the residual's parts; one that is zero at every joint has no column."""
 MISSING, WHAT = "is anything missing?", "what is missing, and where"
 FAULTS = 5
@@ -72,11 +75,14 @@ def _show_findings(said: Mapping[str, Any]) -> None:
     width = max(map(len, chain([MISSING, WHAT], *shown)))
     for heading, lines in (
         (MISSING, [(case.words, f"{case.probability:.2f}") for case in cases]),
-        (WHAT, [
-            ("\n".join(words), f"{row.probability:.2f}")
-            for words, row in zip(shown, tree, strict=True)
-        ]),
-    ):  # fmt: skip
+        (
+            WHAT,
+            [
+                ("\n".join(words), f"{row.probability:.2f}")
+                for words, row in zip(shown, tree, strict=True)
+            ],
+        ),
+    ):
         if lines:
             console.say("")
             console.table((heading.ljust(width), "probability"), lines, numbers="probability")
@@ -104,14 +110,15 @@ def _show_router(said: Mapping[str, Any]) -> None:
         headings,
         [
             (
-                one.joint, *(f"{one.parts[part]:.0%}" for part in parts),
+                one.joint,
+                *(f"{one.parts[part]:.0%}" for part in parts),
                 *(f"{one.predicted[name]:.0%}" for name in variables),
             )
             for one in joints
         ],
         title="where the error of rigid body and friction comes from",
         numbers=", ".join(headings[1:]),
-    )  # fmt: skip
+    )
     console.note(
         f"{_listed(parts.values())}: parts of the mean square, {searched_runs(said)}. "
         f"{_listed(variables)}: what a curve of it alone predicts, validation runs."
@@ -136,7 +143,8 @@ def _show_errors(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
         headings,
         [
             (
-                joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told),
+                joint.name,
+                *(f"{said[key][joint.name]:{digits}}" for key in told),
                 *[_excess_left(said, joint.name)] * bool(said["causes"]),
             )
             for joint in joints
@@ -144,7 +152,7 @@ def _show_errors(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
         title=f"{either(joint.effort for joint in joints)} error on runs no fit has seen, "
         f"{either(joint.unit('torque') for joint in joints)}",
         numbers=", ".join(headings[1:]),
-    )  # fmt: skip
+    )
 
 
 def _excess_left(said: Mapping[str, Any], joint: str) -> str:
@@ -197,11 +205,16 @@ def _show_control(said: Mapping[str, Any]) -> None:
     console.table(
         headings,
         [
-            (joint, f"{1e3 * before['tracking_rmse_rad'][joint]:.2f}", f"{1e3 * error:.2f}",
-             f"{before['peak_torque_nm'][joint]:.1f}", f"{after['peak_torque_nm'][joint]:.1f}")
+            (
+                joint,
+                f"{1e3 * before['tracking_rmse_rad'][joint]:.2f}",
+                f"{1e3 * error:.2f}",
+                f"{before['peak_torque_nm'][joint]:.1f}",
+                f"{after['peak_torque_nm'][joint]:.1f}",
+            )
             for joint, error in after["tracking_rmse_rad"].items()
         ],
         title="tracking error and peak torque under adaptive control, without and with the causes",
         numbers=", ".join(headings[1:]),
-    )  # fmt: skip
+    )
     console.note("Predicted by simulation. The model with the causes may predict worse tracking.")

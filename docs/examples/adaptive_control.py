@@ -28,7 +28,8 @@ for gain in (50.0, 100.0, 200.0, 300.0, 500.0):
     errors[gain] = loop.worst_error(5.0)
     hip, knee = errors[gain]
     print(
-        f"Kv {gain:3.0f} N·m·s/rad: largest error after 5 s {hip:.4f} rad at the hip, {knee:.4f} rad at the knee"
+        f"Kv {gain:3.0f} N·m·s/rad: largest error after 5 s {hip:.4f} rad at the hip, {knee:.4f}"
+        " rad at the knee"
     )
 
 assert np.all(np.diff(np.array(list(errors.values())), axis=0) < 0), (

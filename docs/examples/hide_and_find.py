@@ -44,7 +44,8 @@ for cause in said["causes"]:
     for parameter in cause["parameters"]:
         low, high = parameter["ci95"]
         print(
-            f"{parameter['name']:12s} {parameter['value']:7.3f} {parameter['unit']:8s} 95 %: {low:.3f} to {high:.3f}"
+            f"{parameter['name']:12s} {parameter['value']:7.3f} {parameter['unit']:8s} 95 %:"
+            f" {low:.3f} to {high:.3f}"
         )
 
 assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [

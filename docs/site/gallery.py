@@ -54,12 +54,15 @@ def add_figures(app: Sphinx, docname: str, source: list[str]) -> None:
             source[0] = f"{head}{looks}{told}\n\n{_image(name)}\n\n{CAPTION}{end}{tail}"
 
 
-CAPTION = """*What a model of rigid body and friction, fitted to a quiet virtual leg that has this, leaves of the
-torque: one run with a wearer, fitted together with one of the empty machine.*"""
+CAPTION = """*What a model of rigid body and friction, fitted to a quiet virtual leg that has this,
+leaves of the torque: one run with a wearer, fitted together with one of the empty machine.*"""
 
 
 def _image(name: str) -> str:
-    return f'<img class="signature" src="../{FOLDER}/{name}.png" alt="What {name} leaves of the torque" loading="lazy">'
+    return (
+        f'<img class="signature" src="../{FOLDER}/{name}.png" alt="What {name} leaves of the'
+        ' torque" loading="lazy">'
+    )
 
 
 def _index(app: Sphinx) -> str:

@@ -105,8 +105,10 @@ def signature(effect: type[Effect]) -> Signature:
     hidden = None if effect in map(type, bodies_and_friction) else _sized(effect)
     assumed = Model.of(e for e in bodies_and_friction if e.name != effect.name)
     found = [next(regressions(motion, assumed)) for motion in _recorded([hidden] if hidden else [])]
-    A, y = (np.concatenate([part[r.usable] for r, part in zip(found, parts, strict=True)])
-            for parts in ([r.regressor for r in found], [r.torque for r in found]))  # fmt: skip
+    A, y = (
+        np.concatenate([part[r.usable] for r, part in zip(found, parts, strict=True)])
+        for parts in ([r.regressor for r in found], [r.torque for r in found])
+    )
     values = np.linalg.lstsq(A, y, rcond=None)[0]
     return Signature(hidden, found[-1], residual_of(found[-1], values))
 

@@ -125,8 +125,10 @@ def acquire(
     metadata = _metadata(rig, run, trajectory, recorded_hz, mechanism or MechanismSettings())
     metadata |= {"trajectory": trajectory_path.name}
     config = {
-        "run": run.model_dump(mode="json"), "acquire": {"sample_rate_hz": sample_rate_hz}, "rig": rig.public()
-    }  # fmt: skip
+        "run": run.model_dump(mode="json"),
+        "acquire": {"sample_rate_hz": sample_rate_hz},
+        "rig": rig.public(),
+    }
     metadata |= describe([trajectory_path, rig_path], config)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
@@ -179,8 +181,9 @@ async def _record(
                 journal.end(supervisor.why, loop.found())
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
             raise DeviceError(
-                f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
-                f"of what is in it{f'. {_left(supervisor, supervisor.why)}' if supervisor.why else ''}"
+                f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes"
+                " a recording of what is in"
+                f" it{f'. {_left(supervisor, supervisor.why)}' if supervisor.why else ''}"
             ) from error
     finally:
         machine.close()
@@ -258,9 +261,9 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
     if supervisor.fault:
         log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
         return ExoidError, _left(supervisor, f"{supervisor.why}; please report it with {log}")
-    return DeviceError, _left(
-        supervisor, supervisor.why
-    ) if supervisor.why else "the run is complete"
+    return DeviceError, (
+        _left(supervisor, supervisor.why) if supervisor.why else "the run is complete"
+    )
 
 
 def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
@@ -271,8 +274,8 @@ def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
             lock = held.enter_context(locked(journal))
         except OSError as error:
             raise kind(
-                f"{told}; its samples are not in {journal} any more ({error.strerror}); where that was moved to, "
-                "`exoid recover` makes a recording of it"
+                f"{told}; its samples are not in {journal} any more ({error.strerror}); where that"
+                " was moved to, `exoid recover` makes a recording of it"
             ) from error
         return _recorded(output, lock, kind, told, supervisor.fault)
 
@@ -291,8 +294,8 @@ def _recorded(
             write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
         raise kind(
-            f"{told}; its samples are in {path}, but could not be written as a recording: {error}; once that is "
-            f"mended, `exoid recover {path}` makes one"
+            f"{told}; its samples are in {path}, but could not be written as a recording: {error};"
+            f" once that is mended, `exoid recover {path}` makes one"
         ) from error
     if account.damaged:
         left = (
@@ -301,7 +304,8 @@ def _recorded(
             else "no sample of it can be read, since"
         )
         raise kind(
-            f"{told}; {left} the disk did not give back all that was written; check the disk, {path} is kept"
+            f"{told}; {left} the disk did not give back all that was written; check the disk,"
+            f" {path} is kept"
         ) from fault
     lock.remove()
     if account.abort:

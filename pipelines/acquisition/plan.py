@@ -65,8 +65,9 @@ def check_trajectory(
     rig's limits."""
     if duration_s > trajectory.duration_s + 1e-9:
         raise InputError(
-            f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's duration_s is "
-            f"{duration_s:g}; shorten the run, or give the trajectory's omega_rad_s if it repeats"
+            f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's"
+            f" duration_s is {duration_s:g}; shorten the run, or give the trajectory's omega_rad_s"
+            " if it repeats"
         )
     nowhere = np.empty((0, len(rig.drive)))
     samples = round(duration_s * sample_rate_hz)
@@ -90,9 +91,10 @@ def _refuse_what_set_points_do_not_show(
             fastest = TOO_FAST * drive.speed_rad_s
             if (k := _first_outside(speed[:, j], -fastest, fastest)) is not None:
                 raise InputError(
-                    f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {(begin + k + share) / rate:.3f} s, "
-                    f"which {rate:g} set-points a second do not show, but the rig allows {drive.speed_rad_s:g} rad/s; "
-                    "make the excitation slower: is its omega_rad_s in rad/s?"
+                    f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at"
+                    f" {(begin + k + share) / rate:.3f} s, which {rate:g} set-points a second do"
+                    f" not show, but the rig allows {drive.speed_rad_s:g} rad/s; make the"
+                    " excitation slower: is its omega_rad_s in rad/s?"
                 )
 
 
@@ -109,8 +111,8 @@ def check_start(rig: RigSettings, angle: NDArray) -> str | None:
         low, high = drive.angle_rad
         if not low <= found <= high:
             return (
-                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to {high:g} rad; move the "
-                "leg by hand, or check the encoder's zero"
+                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to"
+                f" {high:g} rad; move the leg by hand, or check the encoder's zero"
             )
     return None
 
@@ -142,8 +144,9 @@ def _ramp(
         ramp_s *= RAMP_GROWTH
     slowest = rig.drive[int(np.argmax(speed / [drive.speed_rad_s for drive in rig.drive]))]
     raise InputError(
-        f"no ramp of at most {LONGEST_RAMP_S:g} s leads the {slowest.joint} between rest and the trajectory below "
-        f"its {slowest.speed_rad_s:g} rad/s; start with the leg nearer to the motion"
+        f"no ramp of at most {LONGEST_RAMP_S:g} s leads the {slowest.joint} between rest and the"
+        f" trajectory below its {slowest.speed_rad_s:g} rad/s; start with the leg nearer to the"
+        " motion"
     )
 
 
@@ -188,16 +191,17 @@ def _refuse_piece_outside(
         low, high = drive.angle_rad
         if (k := _first_outside(path[:, j], low, high)) is not None:
             raise InputError(
-                f"the {drive.joint} would be at {path[k, j]:.3f} rad on the way "
-                f"{'into' if first + k <= reference.first else 'out of'} the run, but the rig allows {low:g} to "
-                f"{high:g} rad; make the excitation smaller, or record a whole period of it to see where it leaves the "
-                "limits"
+                f"the {drive.joint} would be at {path[k, j]:.3f} rad on the way"
+                f" {'into' if first + k <= reference.first else 'out of'} the run, but the rig"
+                f" allows {low:g} to {high:g} rad; make the excitation smaller, or record a whole"
+                " period of it to see where it leaves the limits"
             )
         fastest = drive.speed_rad_s * (1.0 + 1e-9)
         if (k := _first_outside(speed[:, j], -fastest, fastest)) is not None:
             raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(first + k - reference.first) / rate:.3f} s "
-                f"after the run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s"
+                f" {(first + k - reference.first) / rate:.3f} s after the run's beginning, but the"
+                f" rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
             )
 
 
@@ -209,12 +213,14 @@ def _refuse_outside(rig: RigSettings, run: NDArray, first: int, rate: float) -> 
         low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
         if (k := _first_outside(run[:, j], low, high)) is not None:
             raise InputError(
-                f"the {drive.joint} would be at {run[k, j]:.3f} rad at {(first + k + 0.5) / rate:.3f} s, but the rig "
-                f"allows {low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or "
-                "design it within the rig's limits"
+                f"the {drive.joint} would be at {run[k, j]:.3f} rad at"
+                f" {(first + k + 0.5) / rate:.3f} s, but the rig allows {low:g} to {high:g} rad"
+                " (its limits less angle_margin_rad); make the excitation smaller, or design it"
+                " within the rig's limits"
             )
         if (k := _first_outside(speed[:, j], -drive.speed_rad_s, drive.speed_rad_s)) is not None:
             raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {(first + k + 0.5) / rate:.3f} s, but the "
-                f"rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at"
+                f" {(first + k + 0.5) / rate:.3f} s, but the rig allows {drive.speed_rad_s:g}"
+                " rad/s; make the excitation slower or smaller"
             )

@@ -11,22 +11,34 @@ CANDIDATES = Contract(
     made_by="exoid diagnose",
     columns=(
         Column("rank", "", "1 is the best", dtype=INTEGER),
-        Column("causes", "", "the causes tried together, each as effect@joint", dtype=pa.list_(TEXT)),
         Column(
-            "parameters", "", "what was fitted",
+            "causes", "", "the causes tried together, each as effect@joint", dtype=pa.list_(TEXT)
+        ),
+        Column(
+            "parameters",
+            "",
+            "what was fitted",
             dtype=pa.list_(pa.struct([("name", TEXT), ("value", FLOAT), ("unit", TEXT)])),
         ),
         Column("train_score", "", "score on the train runs", nullable=True),
         per_joint("rmse_before", "validate RMSE of the baseline", nullable=True),
         per_joint("rmse_after", "validate RMSE with the causes", nullable=True),
-        Column("gain_nm", "N·m", "what the causes take together of the baseline's RMSE, where most", nullable=True),
+        Column(
+            "gain_nm",
+            "N·m",
+            "what the causes take together of the baseline's RMSE, where most",
+            nullable=True,
+        ),
         Column("gain_low_nm", "N·m", "lower end of its 95 % interval", nullable=True),
         Column("gain_high_nm", "N·m", "upper end of its 95 % interval", nullable=True),
         Column("probability", "", "how likely the causes are the true ones, 0 to 1", nullable=True),
         Column(
-            "verdict", "", "what became of it", dtype=TEXT,
+            "verdict",
+            "",
+            "what became of it",
+            dtype=TEXT,
             choices=("named", "indistinguishable", "unlisted", "absorbed", "rejected"),
         ),
         Column("reason", "", "one sentence", dtype=TEXT),
     ),
-)  # fmt: skip
+)

@@ -111,7 +111,8 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> Non
         if infinite.any():
             row = int(np.argmax(infinite))
             raise ContractError(
-                f"{where.row(row)}: found {column[row].as_py()}, expected a finite number; {_MEND_ROWS}"
+                f"{where.row(row)}: found {column[row].as_py()}, expected a finite number;"
+                f" {_MEND_ROWS}"
             )
 
 
@@ -127,7 +128,8 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
     if strange.any():
         row = int(np.argmax(strange))
         raise ContractError(
-            f"{where.row(row)}: found {column[row].as_py()!r}, expected one of {', '.join(choices)}; mend the value"
+            f"{where.row(row)}: found {column[row].as_py()!r}, expected one of"
+            f" {', '.join(choices)}; mend the value"
         )
 
 

@@ -38,8 +38,9 @@ def _covariance_has_the_rows_shape(
     lengths = {len(row) for row in covariance}
     if len(covariance) != len(frame) or lengths != {len(frame)}:
         raise ContractError(
-            f"{source}: metadata covariance: found {len(covariance)} rows of {sorted(lengths)} values, expected "
-            f"{len(frame)} x {len(frame)}, one for each parameter in row order; write the whole matrix"
+            f"{source}: metadata covariance: found {len(covariance)} rows of {sorted(lengths)}"
+            f" values, expected {len(frame)} x {len(frame)}, one for each parameter in row order;"
+            " write the whole matrix"
         )
 
 
@@ -48,16 +49,16 @@ def _errors_are_errors(frame: pd.DataFrame, metadata: Mapping[str, Any], source:
     if len(below):
         found = frame["std_error"].iloc[below[0]]
         raise ContractError(
-            f"{source}: column std_error, row {below[0]}: found {found:g}, expected 0 or more; write null where it is "
-            "not known"
+            f"{source}: column std_error, row {below[0]}: found {found:g}, expected 0 or more;"
+            " write null where it is not known"
         )
     covariance = np.array(metadata.get("covariance") or np.zeros((0, 0)), dtype=float)
     size = np.sqrt(np.abs(np.diag(covariance)))
     off = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
     if off.any() or (np.diag(covariance) < 0.0).any():
         raise ContractError(
-            f"{source}: metadata covariance: found variances below 0, or a matrix that is not its own transpose; "
-            "write the covariance of the rows"
+            f"{source}: metadata covariance: found variances below 0, or a matrix that is not its"
+            " own transpose; write the covariance of the rows"
         )
 
 
@@ -71,7 +72,11 @@ PARAMETERS = Contract(
         Column("symbol", "", "its symbol in print", dtype=TEXT),
         Column("joint", "", "its joint; null where shared", dtype=TEXT, nullable=True),
         Column(
-            "run", "", "the kind of run it holds for; null where it holds for all", dtype=TEXT, nullable=True,
+            "run",
+            "",
+            "the kind of run it holds for; null where it holds for all",
+            dtype=TEXT,
+            nullable=True,
             choices=("exo_alone", "with_human", "human"),
         ),
         Column("value", "", "its estimate, in the row's unit"),
@@ -79,13 +84,22 @@ PARAMETERS = Contract(
         Column("std_error", "", "standard error; null where it was not estimated", nullable=True),
         Column("ci95_low", "", "lower end of the 95 % interval", nullable=True),
         Column("ci95_high", "", "upper end of the 95 % interval", nullable=True),
-        Column("step", "", "the fit it comes from", dtype=TEXT, choices=("friction", "inertia", "extension")),
+        Column(
+            "step",
+            "",
+            "the fit it comes from",
+            dtype=TEXT,
+            choices=("friction", "inertia", "extension"),
+        ),
         Column("effect", "", "rigid_body, friction, or a cause's name", dtype=TEXT),
         Column(
-            "each_run", "", "whether every run has its own, of which this is the first training run's", dtype=BOOLEAN,
+            "each_run",
+            "",
+            "whether every run has its own, of which this is the first training run's",
+            dtype=BOOLEAN,
             required=False,
         ),
     ),
     metadata=ParametersKeys,
     rules=(_covariance_has_the_rows_shape, _errors_are_errors),
-)  # fmt: skip
+)

@@ -119,7 +119,8 @@ def refuse_place(path: Path, contract: str) -> None:
         found = "something else"
     if found.partition("/")[0] != contract.partition("/")[0]:
         raise ContractError(
-            f"{path}: holds {found}, not overwritten with {contract}; choose another name or remove it"
+            f"{path}: holds {found}, not overwritten with {contract}; choose another name or"
+            " remove it"
         )
 
 
@@ -136,7 +137,8 @@ def to_json(metadata: Mapping[str, Any], source: str) -> str:
         return json.dumps(dict(metadata), ensure_ascii=False, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
         raise ContractError(
-            f"{source}: metadata cannot be written as JSON ({error}); use finite numbers, text, lists and objects"
+            f"{source}: metadata cannot be written as JSON ({error}); use finite numbers, text,"
+            " lists and objects"
         ) from error
 
 
@@ -164,11 +166,14 @@ def _refuse_what_is_no_file(path: Path) -> None:
 def _what_is_wrong_with_the_bytes(path: Path) -> str:
     if (start := _start(path)) == STREAM:
         return (
-            f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)} whole samples; "
-            f"`exoid recover {path}` makes a recording of it"
+            f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"
+            f" whole samples; `exoid recover {path}` makes a recording of it"
         )
     if start != MAGIC:
-        return f"is not a Parquet file (it starts with {start!r}, expected {MAGIC!r}); name a file that exoid wrote"
+        return (
+            f"is not a Parquet file (it starts with {start!r}, expected {MAGIC!r}); name a file"
+            " that exoid wrote"
+        )
     return "is a damaged or truncated Parquet file; copy or make it again"
 
 
@@ -190,8 +195,9 @@ def _metadata(schema: pa.Schema, path: Path) -> dict[str, Any]:
     text = (schema.metadata or {}).get(KEY)
     if text is None:
         raise ContractError(
-            f"{path}: has no `exoid` entry in its schema metadata, so exoid did not write it; `exoid import` makes a "
-            'recording of a log; for a table of your own add {"contract": "<name>/<version>"}, see docs/contracts.md'
+            f"{path}: has no `exoid` entry in its schema metadata, so exoid did not write it;"
+            ' `exoid import` makes a recording of a log; for a table of your own add {"contract":'
+            ' "<name>/<version>"}, see docs/contracts.md'
         )
     try:
         metadata = json.loads(text)
@@ -201,6 +207,7 @@ def _metadata(schema: pa.Schema, path: Path) -> dict[str, Any]:
         ) from error
     if not isinstance(metadata, dict) or not isinstance(metadata.get("contract"), str):
         raise ContractError(
-            f'{path}: its `exoid` metadata names no contract; it must hold at least {{"contract": "<name>/<version>"}}'
+            f'{path}: its `exoid` metadata names no contract; it must hold at least {{"contract":'
+            ' "<name>/<version>"}'
         )
     return metadata

@@ -5,14 +5,17 @@ from pipelines.contracts.table import INTEGER, Column, Contract, per_joint
 
 CUFF_FORCES = tuple(
     Column(
-        f"{segment}_{side}_force_{axis}_n", "N",
-        f"force of the exoskeleton on the {segment}, {side} sensor, {direction}, in the segment's frame",
-        required=False, nullable=True,
+        f"{segment}_{side}_force_{axis}_n",
+        "N",
+        f"force of the exoskeleton on the {segment}, {side} sensor, {direction}, in the segment's"
+        " frame",
+        required=False,
+        nullable=True,
     )
     for segment in ("thigh", "shank")
     for side in ("front", "back")
     for axis, direction in (("x", "along the segment (distal)"), ("y", "forward"), ("z", "lateral"))
-)  # fmt: skip
+)
 
 RECORDING = Contract(
     name="recording",

@@ -201,7 +201,8 @@ class Contract:
         name, _, version = found.partition("/")
         if name != self.name:
             raise ContractError(
-                f"{path}: holds {found}, expected {self.label}; `{self.made_by}` makes a {self.name} file"
+                f"{path}: holds {found}, expected {self.label}; `{self.made_by}` makes a"
+                f" {self.name} file"
             )
         if version != str(self.version):
             raise ContractError(
@@ -225,7 +226,8 @@ class Contract:
                 arrays[str(name)] = pa.Array.from_pandas(frame[name], type=nested.get(name))
             except (pa.ArrowException, TypeError) as error:
                 raise ContractError(
-                    f"{source}: column {name}: its values have no common type ({error}); give them one"
+                    f"{source}: column {name}: its values have no common type ({error}); give"
+                    " them one"
                 ) from error
         return pa.table(arrays)
 

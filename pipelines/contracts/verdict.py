@@ -273,7 +273,8 @@ class Verdict(_Object):
         for number, cause in enumerate(self.causes):
             if cause.gain.joint not in joints:
                 raise ValueError(
-                    f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of noise_floor_nm"
+                    f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of"
+                    " noise_floor_nm"
                 )
         for number, finding in enumerate(self.findings):
             if finding.joint is not None and finding.joint not in joints:
@@ -283,9 +284,18 @@ class Verdict(_Object):
         return self
 
     def _tables(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
-        for key in ("baseline_rmse_nm", "extended_rmse_nm", "baseline_rmse_unmasked_nm", "extended_rmse_unmasked_nm",
-                    "baseline_simulation_rmse_rad", "extended_simulation_rmse_rad", "unexplained", "error_budget",
-                    "depends_on", "units"):  # fmt: skip
+        for key in (
+            "baseline_rmse_nm",
+            "extended_rmse_nm",
+            "baseline_rmse_unmasked_nm",
+            "extended_rmse_unmasked_nm",
+            "baseline_simulation_rmse_rad",
+            "extended_simulation_rmse_rad",
+            "unexplained",
+            "error_budget",
+            "depends_on",
+            "units",
+        ):
             yield key, getattr(self, key)
         if self.router:
             yield "router", self.router
@@ -311,7 +321,8 @@ def parsed(path: Path) -> Any:
         ) from error
     except json.JSONDecodeError as error:
         raise ContractError(
-            f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}: {error.msg}); make it again"
+            f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}:"
+            f" {error.msg}); make it again"
         ) from error
 
 

@@ -52,9 +52,9 @@ class Quality:
         }
         return {
             **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
-            "inertial_condition": self.inertial_condition
-            if np.isfinite(self.inertial_condition)
-            else None,
+            "inertial_condition": (
+                self.inertial_condition if np.isfinite(self.inertial_condition) else None
+            ),
             "standard_errors": {
                 k: v if np.isfinite(v) else None for k, v in self.standard_errors.items()
             },
@@ -104,9 +104,17 @@ def _planned(
     nothing = np.zeros_like(q)
     count = len(time)
     return Motion(
-        time, q, dq, ddq, torque=nothing, load=nothing, segment=np.zeros(count, np.int64), valid=np.ones(count, bool),
-        sample_rate_hz=sample_rate_hz, geometry=geometry,
-    )  # fmt: skip
+        time,
+        q,
+        dq,
+        ddq,
+        torque=nothing,
+        load=nothing,
+        segment=np.zeros(count, np.int64),
+        valid=np.ones(count, bool),
+        sample_rate_hz=sample_rate_hz,
+        geometry=geometry,
+    )
 
 
 def standard_errors(

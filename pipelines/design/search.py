@@ -79,15 +79,20 @@ def search(
     for i, arc in enumerate(np.array_split(np.arange(settings.particles), POLISHED)):
         start = swarm.best_position[arc[np.argmin(swarm.best_cost[arc])]]
         candidate, cost = polish(
-            start, POLISH_SPREAD * spread, lambda positions: costs(positions, fine), rng, GENERATIONS,
+            start,
+            POLISH_SPREAD * spread,
+            lambda positions: costs(positions, fine),
+            rng,
+            GENERATIONS,
             out_of_time=lambda: time.monotonic() > deadline,
-        )  # fmt: skip
+        )
         if cost < best_cost:
             best, best_cost = candidate, cost
         report(0.5 + 0.5 * (i + 1) / POLISHED, note(best_cost))
     if not np.isfinite(best_cost):
         raise NotIdentifiable(
-            "no excitation within the bounds tells the parameters apart; widen [design.bounds] or add harmonics"
+            "no excitation within the bounds tells the parameters apart; widen [design.bounds] or"
+            " add harmonics"
         )
     return Found(_trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by)
 

@@ -4,8 +4,8 @@
 2. *Library*: every cause and every unlisted law as columns of one regression.
 3. *Posterior*: how probable each set of causes and laws is.
 4. *Fit*: the named causes with the baseline, their shapes refined.
-5. *Validation*: errors and gains on runs that no fit has seen. Where these have an error above the noise, steps 2 to 5
-   are repeated with causes sought on all runs.
+5. *Validation*: errors and gains on runs that no fit has seen. Where these have an error above the
+   noise, steps 2 to 5 are repeated with causes sought on all runs.
 """
 
 from collections.abc import Sequence
@@ -105,7 +105,17 @@ def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Dia
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)
     return Diagnosis(
-        data, prepared, judged.selected, before, after, judged.without, after.floor, known,
-        parameters, covariance, parameter_rows.residual_table(validate, residuals), tuple(reversals),
+        data,
+        prepared,
+        judged.selected,
+        before,
+        after,
+        judged.without,
+        after.floor,
+        known,
+        parameters,
+        covariance,
+        parameter_rows.residual_table(validate, residuals),
+        tuple(reversals),
         {"baseline": drift, "extended": after_drift},
-    )  # fmt: skip
+    )

@@ -24,21 +24,19 @@ MEASURED = PACKAGE / "criteria_measured.json"
 INTRODUCTION = f"""\
 # Criteria: the numbers of a diagnosis
 
-For those who want to know why a verdict came out as it did, or who change the decision.
-Written by `make docs` from the code. The first table has the hyper-parameters of the decision, of
+For those who want to know why a verdict came out as it did, or who change the decision. Written by
+`make docs` from the code. The first table has the hyper-parameters of the decision, of
 `pipelines/diagnosis/criteria.py`. `make learn` learns all of them except
-{", ".join(f"`{name}`" for name in HELD)}: it maximises the log probability that the posterior gives to
-the truth, over simulated sessions. {LEARNED}
-[science.md](science.md#9-the-decision) has the equations in which they stand.
-The [other numbers](#other-numbers) of a diagnosis, of its noise model, its search and its checks of the data, stand
-at the end.
-"""
+{", ".join(f"`{name}`" for name in HELD)}: it maximises the log probability that the posterior gives
+to the truth, over simulated sessions. {LEARNED} [science.md](science.md#9-the-decision) has the
+equations in which they stand. The [other numbers](#other-numbers) of a diagnosis, of its noise
+model, its search and its checks of the data, stand at the end. """
 OTHERS = """\
 ## Other numbers
 
-These are not learned. They concern physics, recording, numerical precision, or how much is reported. Each is defined at
-the head of its file in `pipelines/diagnosis`. Those by which figures are drawn are left out.
-"""
+These are not learned. They concern physics, recording, numerical precision, or how much is
+reported. Each is defined at the head of its file in `pipelines/diagnosis`. Those by which figures
+are drawn are left out. """
 HEADINGS = {
     "data_faults": "Faults of acquisition",
     "evidence": "Noise and evidence",

@@ -90,8 +90,8 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
     if strangers:
         kind = next(m.run for m in motions if m.file == strangers[0])
         raise InputError(
-            f"{strangers[0]}: found a {kind} run to validate on and none to train on, among: {listed}; "
-            "record a training run of that kind, or leave this one out"
+            f"{strangers[0]}: found a {kind} run to validate on and none to train on, among:"
+            f" {listed}; record a training run of that kind, or leave this one out"
         )
 
 
@@ -107,6 +107,6 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
                 f"; {fault.file}: {fault.what}" for fault in faults if fault.file in files
             )
             raise InputError(
-                f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few in a row to tell "
-                f"noise from error; validate on longer runs{wrong}"
+                f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few"
+                f" in a row to tell noise from error; validate on longer runs{wrong}"
             )

@@ -112,8 +112,8 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             continue
         if effect.at_cuff != cuffed(effects):
             raise InputError(
-                f"{effect.label}: a simulation holds compliant cuffs or joints that are not rigid, not both; "
-                "leave out the one or the other"
+                f"{effect.label}: a simulation holds compliant cuffs or joints that are not rigid,"
+                " not both; leave out the one or the other"
             )
         if sprung[joint[i]] >= 0:
             raise InputError(
@@ -156,8 +156,9 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
         return effect.motor_inertia
     if isinstance(effect, Backlash):
         raise InputError(
-            f"{effect.label}: the teeth that a simulation has are those of an exoskeleton's gear, too hard for a "
-            "machine of another size; simulate the model without it, as `exoid identify` writes it"
+            f"{effect.label}: the teeth that a simulation has are those of an exoskeleton's gear,"
+            " too hard for a machine of another size; simulate the model without it, as `exoid"
+            " identify` writes it"
         )
     mechanism = effect.on.mechanism
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)

@@ -66,8 +66,9 @@ def _set_points(motion: Motion) -> NDArray:
     for joint, column in zip(motion.joints, told.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(
-                f"{motion.file or 'the motion'}: has no set-points of {the(joint)}, which a simulation of its closed "
-                "loop follows; record them with the run, or choose a --method that needs none"
+                f"{motion.file or 'the motion'}: has no set-points of {the(joint)}, which a"
+                " simulation of its closed loop follows; record them with the run, or choose a"
+                " --method that needs none"
             )
     known = (np.isfinite(column) for column in told.T)
     lines = [

@@ -73,9 +73,17 @@ def masses(a: Assembly) -> tuple[NDArray, NDArray]:
     mass, mobility = np.empty((2, len(poses), joints, joints))
     state, still = resting_state(np.zeros(joints)), np.zeros(joints)
     _masses(
-        a, workspace(joints), poses, np.zeros(memory_size(a)), state, still, still.copy(), np.zeros((4, joints)),
-        mass, mobility,
-    )  # fmt: skip
+        a,
+        workspace(joints),
+        poses,
+        np.zeros(memory_size(a)),
+        state,
+        still,
+        still.copy(),
+        np.zeros((4, joints)),
+        mass,
+        mobility,
+    )
     return mass, mobility
 
 
@@ -93,8 +101,9 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     needed = feedback_gain * mobility * period / STABLE_REACH
     if not needed <= MOST_STEPS:
         raise InputError(
-            f"the motors feel as little as {1.0 / mobility:.2g} kg·m² at some pose of this model, too little for a "
-            f"feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz to be simulated. Identify it again from "
-            "richer motions, or give smaller gains of feedback"
+            f"the motors feel as little as {1.0 / mobility:.2g} kg·m² at some pose of this model,"
+            f" too little for a feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz to"
+            " be simulated. Identify it again from richer motions, or give smaller gains of"
+            " feedback"
         )
     return max(1, int(np.ceil(needed)))

@@ -104,9 +104,15 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     read_encoders(a, angle)
     zeros = [np.zeros(a.joints) for _ in range(3)]
     return LoopState(
-        resting_state(q), np.zeros(memory_size(a)), zeros[0], angle, zeros[1], zeros[2], angle.copy(),
+        resting_state(q),
+        np.zeros(memory_size(a)),
+        zeros[0],
+        angle,
+        zeros[1],
+        zeros[2],
+        angle.copy(),
         np.zeros(int(a.sensed_at[-1])),
-    )  # fmt: skip
+    )
 
 
 @njit(**HOT)

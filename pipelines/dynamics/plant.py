@@ -75,8 +75,8 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
             )
         )
         raise InputError(
-            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. A simulation of it would run away; "
-            f"identify again {mend}, or choose another --run"
+            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. A simulation of it"
+            f" would run away; identify again {mend}, or choose another --run"
         )
     return Plant(model, geometry, joints, run, assembly)
 
@@ -105,7 +105,8 @@ def plant_from_table(
     if not (bodies.isna() | (bodies == run)).any():
         known = ", ".join(sorted(set(bodies) - {"human"})) or "none"
         raise InputError(
-            f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run"
+            f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with"
+            " --run"
         )
     joints, geometry = joints_of(table.metadata), geometry_of(table.metadata, default_geometry)
     machine = machine_of(joints, geometry, table.path)

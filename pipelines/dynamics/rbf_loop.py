@@ -163,10 +163,24 @@ def _keeps_going(direction, state):
 
 @compiled_once(
     boolean(
-        ASSEMBLY, CONTROLLER, WORKSPACE, STAGES, NETWORK, SEEN, float64, float64, states, vector, vector,
-        float64[:, :, ::1], states, vector, vector, states,
+        ASSEMBLY,
+        CONTROLLER,
+        WORKSPACE,
+        STAGES,
+        NETWORK,
+        SEEN,
+        float64,
+        float64,
+        states,
+        vector,
+        vector,
+        float64[:, :, ::1],
+        states,
+        vector,
+        vector,
+        states,
     )
-)  # fmt: skip
+)
 def _step(
     a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
 ):
@@ -271,10 +285,23 @@ def _advance(
         if not whole:
             _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
         smooth = _step(
-            a, c, w, s, net, seen, t + done * h / PARTS, size * h / PARTS, state, memory, load,
-            wanted if whole else kept.wanted, disturbance if whole else kept.disturbance,
-            torque if whole else drive[1], network if whole else drive[2], drive,
-        )  # fmt: skip
+            a,
+            c,
+            w,
+            s,
+            net,
+            seen,
+            t + done * h / PARTS,
+            size * h / PARTS,
+            state,
+            memory,
+            load,
+            wanted if whole else kept.wanted,
+            disturbance if whole else kept.disturbance,
+            torque if whole else drive[1],
+            network if whole else drive[2],
+            drive,
+        )
         if smooth or size == 1:
             done += size
             while size < PARTS and done % (2 * size) == 0:
@@ -358,9 +385,24 @@ def _run(
             if i > 0:
                 torque, network = drive[1], drive[2]
             _advance(
-                a, c, w, s, net, seen, begin, h, state, memory, load, reference[now], disturbance[now],
-                torque, network, drive, kept,
-            )  # fmt: skip
+                a,
+                c,
+                w,
+                s,
+                net,
+                seen,
+                begin,
+                h,
+                state,
+                memory,
+                load,
+                reference[now],
+                disturbance[now],
+                torque,
+                network,
+                drive,
+                kept,
+            )
     return k + 1
 
 
@@ -424,13 +466,32 @@ def follow_with_rbf(
         np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m)
     )
     kept = _Kept(
-        np.zeros((4, joints)), np.zeros(len(memory)), np.zeros(joints), np.zeros((joints, m)),
-        np.zeros((3, 3, joints)), np.zeros((3, joints)),
-    )  # fmt: skip
+        np.zeros((4, joints)),
+        np.zeros(len(memory)),
+        np.zeros(joints),
+        np.zeros((joints, m)),
+        np.zeros((3, 3, joints)),
+        np.zeros((3, joints)),
+    )
     seen, load, drive = _Seen(*np.zeros((5, joints))), np.zeros(joints), np.zeros((4, joints))
     reference, disturbance = np.ascontiguousarray(reference), np.ascontiguousarray(disturbance)
     reached = _run(
-        a, _of_floats(controller), encoder, w, s, network, seen, state, memory, load, reference, disturbance,
-        period, substeps, drive, kept, out,
-    )  # fmt: skip
+        a,
+        _of_floats(controller),
+        encoder,
+        w,
+        s,
+        network,
+        seen,
+        state,
+        memory,
+        load,
+        reference,
+        disturbance,
+        period,
+        substeps,
+        drive,
+        kept,
+        out,
+    )
     return RbfRun(*(out[:reached, i] for i in range(4)))

@@ -85,8 +85,8 @@ def replay(
     )
     if first.size == 0:
         raise InputError(
-            f"{motion.file or 'the motion'}: no stretch of valid samples lasts the {window_s:g} s of a window; "
-            "replay a longer recording without gaps"
+            f"{motion.file or 'the motion'}: no stretch of valid samples lasts the {window_s:g} s"
+            " of a window; replay a longer recording without gaps"
         )
     model = model.for_run(motion.run)
     a = assemble(model, motion.geometry, motion.joints)

@@ -130,7 +130,8 @@ def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
             for joints in (reference.joints, plant.joints)
         )
         raise InputError(
-            f"the reference moves {told}, expected the model's joints, {expected}; give one for these"
+            f"the reference moves {told}, expected the model's joints, {expected}; give one for"
+            " these"
         )
 
 
@@ -138,6 +139,7 @@ def _refuse_short(reference: Trajectory, settings: SimulateSettings) -> None:
     # A sampled motion ends at its last sample; half a step is rounding.
     if reference.duration_s < settings.duration_s - 0.5 * settings.step_s:
         raise InputError(
-            f"the reference lasts {reference.duration_s:g} s, but simulate.duration_s asks for "
-            f"{settings.duration_s:g} s; shorten that, or give a reference that repeats (omega_rad_s)"
+            f"the reference lasts {reference.duration_s:g} s, but simulate.duration_s asks for"
+            f" {settings.duration_s:g} s; shorten that, or give a reference that repeats"
+            " (omega_rad_s)"
         )

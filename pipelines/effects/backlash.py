@@ -41,17 +41,28 @@ class Backlash(Effect):
     resembles = ("load", "angle", "speed", "inertia_by_angle")
     forms_differ = "real play differs from tooth to tooth, and the link bounces in it"
     equation = "load angle = motor angle - play / 2 * sgn(transmitted torque)"
-    source = "Nordin, Gutman (2002), Automatica 38(10): controlling mechanical systems with backlash, sec. 2"
-    looks_like = "bursts of torque at 4 to 25 Hz wherever the load changes sign, and gravity that jumps there"
+    source = (
+        "Nordin, Gutman (2002), Automatica 38(10): controlling mechanical systems with backlash,"
+        " sec. 2"
+    )
+    looks_like = (
+        "bursts of torque at 4 to 25 Hz wherever the load changes sign, and gravity that jumps"
+        " there"
+    )
     confirm = "hold the motor and shake the link by hand: it moves freely by the play"
     by_angle = True
     shape = (
         Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),
         Parameter(
-            "contact_stiffness", "N·m/rad", "stiffness of the teeth in contact", "k", (1000.0, 100000.0),
-            default=CONTACT_STIFFNESS, forms=(CONTACT_STIFFNESS, SHAFT_STIFFNESS),
+            "contact_stiffness",
+            "N·m/rad",
+            "stiffness of the teeth in contact",
+            "k",
+            (1000.0, 100000.0),
+            default=CONTACT_STIFFNESS,
+            forms=(CONTACT_STIFFNESS, SHAFT_STIFFNESS),
         ),
-    )  # fmt: skip
+    )
     motor_inertia = MOTOR_INERTIA
     known_to = 0.2
     swings = True

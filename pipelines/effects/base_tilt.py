@@ -23,7 +23,10 @@ class BaseTilt(Effect):
     resembles = ("angle", "other_angle", "both_angles")
     forms_differ = "a real base gives way under load, so its tilt changes with the motion"
     equation = "hip angle from the vertical = hip angle from the base + tilt"
-    source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the base's frame)"
+    source = (
+        "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the"
+        " base's frame)"
+    )
     looks_like = "gravity torque that leads or lags the first joint's angle in every run alike"
     confirm = (
         "put a spirit level on the base, or let the machine hang freely and read its first angle"

@@ -15,12 +15,20 @@ class CoulombAsymmetry(Effect):
     forms_differ = "a real level may also change with load or with the angle"
     holds = True
     equation = "tau = a abs(sgn v): Ks + a forward, Ks - a backward"
-    source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
+    source = (
+        "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive"
+        " chain's offset"
+    )
     looks_like = "a constant while the joint moves, whichever way; at standstill it is gone"
-    confirm = "move the empty joint slowly both ways through the same range: the mean torque less gravity is the asymmetry"
+    confirm = (
+        "move the empty joint slowly both ways through the same range: the mean torque less gravity"
+        " is the asymmetry"
+    )
     linear = (
-        Parameter("asymmetry", "N·m", "half of forward less backward Coulomb friction", "a", (-3.0, 3.0)),
-    )  # fmt: skip
+        Parameter(
+            "asymmetry", "N·m", "half of forward less backward Coulomb friction", "a", (-3.0, 3.0)
+        ),
+    )
     parity = Parity.EVEN
 
     @reaction

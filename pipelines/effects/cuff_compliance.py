@@ -37,23 +37,43 @@ class CuffCompliance(Effect):
     resembles = ("angle", "load", "speed", "inertia_by_angle", "other_load", "both_angles")
     forms_differ = "real tissue hardens, creeps, and slides in its cuff"
     equation = "torque on the limb = k twist (1 + h twist²); limb angle = exoskeleton angle - twist"
-    source = "Yandell, Quinlivan, Popov, Walsh, Zelik (2017), J. NeuroEngineering and Rehabilitation 14:40"
+    source = (
+        "Yandell, Quinlivan, Popov, Walsh, Zelik (2017), J. NeuroEngineering and Rehabilitation"
+        " 14:40"
+    )
     looks_like = "with the human only, gravity and inertia torques off in step with the cuff forces"
     confirm = (
         "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
     )
     acts_in = ("with_human",)
     shape = (
-        Parameter("stiffness", "N·m/rad", "torque between machine and limb per small angle", "k", (30.0, 2000.0)),
         Parameter(
-            "shank_held", "1", "1 where the shank's own cuff holds it while the thigh moves", "e", (0.0, 1.0),
-            default=0.0, forms=(1.0, 0.0), between_forms=False,
+            "stiffness",
+            "N·m/rad",
+            "torque between machine and limb per small angle",
+            "k",
+            (30.0, 2000.0),
         ),
         Parameter(
-            "hardening", "1/rad²", "growth of the stiffness with the angle's square", "h", (0.0, 200.0), default=0.0,
+            "shank_held",
+            "1",
+            "1 where the shank's own cuff holds it while the thigh moves",
+            "e",
+            (0.0, 1.0),
+            default=0.0,
+            forms=(1.0, 0.0),
+            between_forms=False,
+        ),
+        Parameter(
+            "hardening",
+            "1/rad²",
+            "growth of the stiffness with the angle's square",
+            "h",
+            (0.0, 200.0),
+            default=0.0,
             forms=(0.0, 60.0),
         ),
-    )  # fmt: skip
+    )
     at_cuff = True
     motor_inertia = MACHINE_INERTIA
     known_to = 0.05

@@ -65,10 +65,23 @@ class Family(StrEnum):
 
 
 LAWS = (
-    "angle", "other_angle", "both_angles", "speed", "other_speed", "load", "other_load", "friction_by_angle",
-    "friction_by_other_angle", "inertia_by_angle", "gain_over_time", "friction_over_time", "time", "hum",
-    "across_joints", "quantisation",
-)  # fmt: skip
+    "angle",
+    "other_angle",
+    "both_angles",
+    "speed",
+    "other_speed",
+    "load",
+    "other_load",
+    "friction_by_angle",
+    "friction_by_other_angle",
+    "inertia_by_angle",
+    "gain_over_time",
+    "friction_over_time",
+    "time",
+    "hum",
+    "across_joints",
+    "quantisation",
+)
 """Names of the smooth laws that ``Effect.resembles`` may list.
 
 ======================= ==========================================================================
@@ -83,14 +96,17 @@ gain_over_time          a share of the whole torque that changes slowly with tim
 friction_over_time      friction that changes slowly with time
 time                    a torque that wanders with time, in each run in its own way
 hum                     a line at a fixed frequency
-across_joints           torques of both joints that are the slopes of one elastic energy of both angles
+across_joints           torques of both joints, the slopes of one elastic energy of both angles
 quantisation            what rounding to coarse steps adds to the measured torque
 ======================= ==========================================================================
 """
 
 FAMILY_OF_SIDE = {
-    Side.DRIVE: Family.SPEED, Side.STRUCTURE: Family.ANGLE, Side.SENSOR: Family.SENSOR, Side.HUMAN: Family.PERSON,
-}  # fmt: skip
+    Side.DRIVE: Family.SPEED,
+    Side.STRUCTURE: Family.ANGLE,
+    Side.SENSOR: Family.SENSOR,
+    Side.HUMAN: Family.PERSON,
+}
 """The family of an effect that states none."""
 
 LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
@@ -164,10 +180,13 @@ class Parameter:
             return self
         scale, (low, high) = machine.scale(joint).of(self.unit), self.typical
         return replace(
-            self, unit=unit_at(machine.joint(joint).kind, self.unit), typical=(scale * low, scale * high),
+            self,
+            unit=unit_at(machine.joint(joint).kind, self.unit),
+            typical=(scale * low, scale * high),
             default=None if self.default is None else scale * self.default,
-            forms=tuple(scale * form for form in self.forms), grain=scale * self.grain,
-        )  # fmt: skip
+            forms=tuple(scale * form for form in self.forms),
+            grain=scale * self.grain,
+        )
 
 
 @dataclass(frozen=True)
@@ -304,9 +323,12 @@ class Effect(ABC):
             return [None] if mechanism.places[0] in shows_at else []
         places = dict(zip(machine.names, mechanism.places, strict=True))
         return [
-            name for name, place in places.items()
-            if place in shows_at and (cls.joints is None or place in cls.joints) and place not in cls.absorbed
-        ]  # fmt: skip
+            name
+            for name, place in places.items()
+            if place in shows_at
+            and (cls.joints is None or place in cls.joints)
+            and place not in cls.absorbed
+        ]
 
     @property
     def scale(self) -> Scale:
@@ -458,10 +480,16 @@ class Effect(ABC):
             return
         for stretch in motion.segments():
             columns_along_with_memory(
-                address(self.reaction), address(self.derivative), values, joint,
-                *(a[stretch] for a in arrays), geometry,
-                np.zeros((11, joints)), np.zeros((3, self.states)), out[stretch],
-            )  # fmt: skip
+                address(self.reaction),
+                address(self.derivative),
+                values,
+                joint,
+                *(a[stretch] for a in arrays),
+                geometry,
+                np.zeros((11, joints)),
+                np.zeros((3, self.states)),
+                out[stretch],
+            )
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:
         """Torque that the effect adds to what is measured, (n, J) N·m."""
@@ -498,9 +526,16 @@ class Effect(ABC):
         )
         for stretch in motion.segments():
             read_along(
-                address(self.torque_reading), values, joint, time[stretch], temperature[stretch], torque[stretch],
-                np.zeros(len(motion.joints)), np.zeros(self.reading_states), out[stretch],
-            )  # fmt: skip
+                address(self.torque_reading),
+                values,
+                joint,
+                time[stretch],
+                temperature[stretch],
+                torque[stretch],
+                np.zeros(len(motion.joints)),
+                np.zeros(self.reading_states),
+                out[stretch],
+            )
         return out
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:

@@ -19,11 +19,18 @@ class EncoderOffset(Effect):
     resembles = ("angle", "other_angle", "both_angles")
     forms_differ = "a real zero may slip during a run"
     equation = "measured angle = true angle + offset"
-    source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset calibration)"
-    looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the link's angle"
+    source = (
+        "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset"
+        " calibration)"
+    )
+    looks_like = (
+        "gravity torque that leads or lags the angle: a residual like the cosine of the link's"
+        " angle"
+    )
     confirm = (
-        "hold the links where a level or a stop tells their angles, and read them; one that is zeroed at each start "
-        "reads zero wherever it then hangs: let it hang freely after a run, or home it on an index mark"
+        "hold the links where a level or a stop tells their angles, and read them; one that is"
+        " zeroed at each start reads zero wherever it then hangs: let it hang freely after a run,"
+        " or home it on an index mark"
     )
     by_angle = True
     may_differ = "a joint that is zeroed anew at every start"

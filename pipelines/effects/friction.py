@@ -15,7 +15,10 @@ class Friction(Effect):
     resembles = ("speed",)
     forms_differ = "real friction has no sharp corner at standstill and no straight line above it"
     equation = "tau = Ks sgn(v) + Km v"
-    source = "paper, appendix A (tau_fic); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7)"
+    source = (
+        "paper, appendix A (tau_fic); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica"
+        " 30(7)"
+    )
     looks_like = (
         "a square wave that flips with the direction of motion, on a ramp in proportion to speed"
     )

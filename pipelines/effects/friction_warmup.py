@@ -16,7 +16,10 @@ class FrictionWarmup(Effect):
     resembles = ("friction_over_time", "speed")
     forms_differ = "a real gear warms with its losses, and in more than one time constant"
     equation = "tau = (dv v + ds sgn(v)) exp(-t / T)"
-    source = "Simoni, Beschi, Legnani, Visioli (2015), IROS: friction with temperature effects in industrial robots"
+    source = (
+        "Simoni, Beschi, Legnani, Visioli (2015), IROS: friction with temperature effects in"
+        " industrial robots"
+    )
     looks_like = "residual in step with speed that shrinks from period to period"
     confirm = "repeat one motion from cold for ten minutes and watch torque and motor temperature"
     linear = (

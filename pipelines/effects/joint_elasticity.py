@@ -30,16 +30,24 @@ class JointElasticity(Effect):
     resembles = ("load", "angle", "speed", "inertia_by_angle", "other_load")
     forms_differ = "a real gear hardens with its twist, and loses energy in a loop"
     equation = "torque = k twist (1 + h twist²); load angle = motor angle - twist"
-    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; Tuttle, Seering (1996), IEEE T-RA 12(3)"
+    source = (
+        "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; Tuttle, Seering (1996), IEEE"
+        " T-RA 12(3)"
+    )
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"
     confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
     shape = (
         Parameter("stiffness", "N·m/rad", "torque per angle of small twist", "k", (60.0, 8000.0)),
         Parameter(
-            "hardening", "1/rad²", "growth of the stiffness with the twist's square", "h", (0.0, 1000.0), default=0.0,
+            "hardening",
+            "1/rad²",
+            "growth of the stiffness with the twist's square",
+            "h",
+            (0.0, 1000.0),
+            default=0.0,
             forms=(0.0, 100.0, 600.0),
         ),
-    )  # fmt: skip
+    )
     motor_inertia = MOTOR_INERTIA
     known_to = 0.08
     swings = True

@@ -117,9 +117,16 @@ _MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperatur
 _ALONG = void(int64, vector, int64, *_MOTION, vector, _columns)
 _ALONG_WITH_MEMORY = void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns)
 _READ_ALONG = void(
-    int64, vector, int64, vector, _table, types.Array(float64, 3, "A"), vector, vector,
+    int64,
+    vector,
+    int64,
+    vector,
+    _table,
     types.Array(float64, 3, "A"),
-)  # fmt: skip
+    vector,
+    vector,
+    types.Array(float64, 3, "A"),
+)
 
 _SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 

@@ -17,11 +17,14 @@ class LoadDependentFriction(Effect):
     forms_differ = "a real share changes with the speed and along the gear"
     holds = True
     equation = "tau = mu abs(T) (sgn(v) + k sgn(T)), T the transmitted torque, k = 0 unless said"
-    source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity, in four quadrants"
+    source = (
+        "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity, in four"
+        " quadrants"
+    )
     looks_like = "a square wave with the motion's direction whose height follows the load"
     confirm = (
-        "hang weights on the joint, move it slowly both ways, and plot half the difference against the load; "
-        "half the sum, less gravity, shows the driving excess"
+        "hang weights on the joint, move it slowly both ways, and plot half the difference against"
+        " the load; half the sum, less gravity, shows the driving excess"
     )
     linear = (
         Parameter(
@@ -30,11 +33,16 @@ class LoadDependentFriction(Effect):
     )
     shape = (
         Parameter(
-            "driving_excess", "1",
-            "share by which friction is larger where the drive moves the load, and smaller where the load moves it",
-            "k", (-1.0, 1.0), default=0.0, forms=(0.0, 0.5, -0.5),
+            "driving_excess",
+            "1",
+            "share by which friction is larger where the drive moves the load, and smaller where"
+            " the load moves it",
+            "k",
+            (-1.0, 1.0),
+            default=0.0,
+            forms=(0.0, 0.5, -0.5),
         ),
-    )  # fmt: skip
+    )
     dissipative = True  # for abs(k) <= 1
     reads_load = True
 

@@ -19,8 +19,14 @@ class MassOffAxis(Effect):
     family = Family.ANGLE
     resembles = ("angle", "other_angle", "both_angles")
     forms_differ = "a real part may also move on its segment, as a cable does"
-    equation = "tau = Y3 dA3 (shank) or Y4 dA4 (thigh): columns X3, X4 with the segment a right angle ahead"
-    source = "Khalil, Dombre (2002), Modeling, Identification and Control of Robots, ch. 9 (first moments MX, MY)"
+    equation = (
+        "tau = Y3 dA3 (shank) or Y4 dA4 (thigh): columns X3, X4 with the segment a right angle"
+        " ahead"
+    )
+    source = (
+        "Khalil, Dombre (2002), Modeling, Identification and Control of Robots, ch. 9 (first"
+        " moments MX, MY)"
+    )
     looks_like = "gravity torque like the cosine of the link's angle: largest where the link hangs"
     confirm = "let the joint hang freely: it rests off the vertical, towards the mass"
     by_angle = True

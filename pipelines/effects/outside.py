@@ -64,6 +64,6 @@ def _loaded(entry: EntryPoint) -> type[Effect]:
 def _broken(entry: EntryPoint, what: str, remedy: str) -> InputError:
     package = entry.dist.name if entry.dist else "an unknown package"
     return InputError(
-        f"effect {entry.name} ({entry.value}) of package {package} cannot be used: {what}; {remedy}, "
-        f"or uninstall {package}"
+        f"effect {entry.name} ({entry.value}) of package {package} cannot be used: {what};"
+        f" {remedy}, or uninstall {package}"
     )

@@ -11,13 +11,13 @@ from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
 
 CONFIRM_A_SLIDES = (
-    "take the drive off, or switch it off, and hold the joint at several positions with a spring balance: the force "
-    "grows evenly along the way, where a weight's is the same everywhere"
+    "take the drive off, or switch it off, and hold the joint at several positions with a spring"
+    " balance: the force grows evenly along the way, where a weight's is the same everywhere"
 )
 
 CONFIRM_WITHOUT_GRAVITY = (
-    "put a spirit level on the axis first: about one that leans, gravity does nearly what a spring does; then switch "
-    "the drive off and hold the joint at several angles"
+    "put a spirit level on the axis first: about one that leans, gravity does nearly what a spring"
+    " does; then switch the drive off and hold the joint at several angles"
 )
 
 
@@ -34,7 +34,10 @@ class ParallelSpring(Effect):
     source = (
         "Wang, van Dijk, van der Kooij (2011), ICORR: spring uses in exoskeleton actuation design"
     )
-    looks_like = "residual against angle: a straight line, the same both ways; partly hidden in gravity and friction"
+    looks_like = (
+        "residual against angle: a straight line, the same both ways; partly hidden in gravity and"
+        " friction"
+    )
     confirm = (
         "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
     )
@@ -45,7 +48,7 @@ class ParallelSpring(Effect):
     reported = (
         linear[0],
         Parameter("rest_angle", "rad", "angle at which it pulls neither way", "q0", (-1.0, 1.0)),
-    )  # fmt: skip
+    )
     parity = Parity.EVEN
 
     @reaction
@@ -76,9 +79,11 @@ class ParallelSpring(Effect):
             assert self.reported is not None
             stiffness, rest = self.reported
             of_this = {
-                "linear": (stiffness,), "shape": (replace(rest, default=0.0, forms=(0.0,)),), "reported": None,
+                "linear": (stiffness,),
+                "shape": (replace(rest, default=0.0, forms=(0.0,)),),
+                "reported": None,
                 "reaction": self.about_rest,
-            }  # fmt: skip
+            }
             for name, value in of_this.items():
                 object.__setattr__(self, name, value)
 

@@ -20,7 +20,10 @@ class PassiveJointTorque(Effect):
     resembles = ("angle", "both_angles")
     forms_differ = "real muscles cross the next joint too, and lose energy when they are stretched"
     equation = "tau = k w (exp((q - q0) / w) - 1) beyond q0 on the side of w's sign, else 0"
-    source = "Riener, Edrich (1999), J. Biomechanics 32(5): passive elastic joint moments in the lower extremities"
+    source = (
+        "Riener, Edrich (1999), J. Biomechanics 32(5): passive elastic joint moments in the lower"
+        " extremities"
+    )
     looks_like = (
         "residual against angle: flat, then steep at one end of the range; only with the human"
     )
@@ -32,10 +35,16 @@ class PassiveJointTorque(Effect):
     shape = (
         Parameter("onset_angle", "rad", "angle beyond which it acts", "q0", (-1.6, 0.9)),
         Parameter(
-            "width", "rad", "travel over which it grows e-fold; its sign is the side it acts on", "w", (-0.4, 0.4),
-            default=0.25, forms=(0.25, -0.25, 0.1, -0.1, 5.0, -5.0), between_forms=False,
+            "width",
+            "rad",
+            "travel over which it grows e-fold; its sign is the side it acts on",
+            "w",
+            (-0.4, 0.4),
+            default=0.25,
+            forms=(0.25, -0.25, 0.1, -0.1, 5.0, -5.0),
+            between_forms=False,
         ),
-    )  # fmt: skip
+    )
     parity = Parity.EVEN
 
     @reaction

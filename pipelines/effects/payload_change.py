@@ -17,7 +17,10 @@ class PayloadChange(Effect):
     family = Family.TIME
     resembles = ("angle", "both_angles", "time")
     forms_differ = "a real load is picked up over a second or so, and may swing"
-    equation = "tau = p (t >= t0) dA/dp, p = m r; shank: A3 + r A2 + (r + L1²/r) A1 + L1/r A4; thigh: A4 + r A1"
+    equation = (
+        "tau = p (t >= t0) dA/dp, p = m r; shank: A3 + r A2 + (r + L1²/r) A1 + L1/r A4; thigh: A4 +"
+        " r A1"
+    )
     source = (
         "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
     )

@@ -18,7 +18,10 @@ class PreslidingHysteresis(Effect):
     equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 unless said"
     source = "Dahl (1976), AIAA Journal 14(12), eq. 4"
     looks_like = "friction against angle: a loop whose corners are rounded after each reversal"
-    confirm = "move the empty joint to and fro by a few hundredths of its travel and plot torque against where it is"
+    confirm = (
+        "move the empty joint to and fro by a few hundredths of its travel and plot torque against"
+        " where it is"
+    )
     linear = (Parameter("friction_torque", "N·m", "friction torque once sliding", "F", (0.5, 8.0)),)
     shape = (
         Parameter(

@@ -14,7 +14,10 @@ class QuadraticDrag(Effect):
     resembles = ("speed",)
     forms_differ = "real drag has another power of the speed, and none below some speed"
     equation = "tau = c v abs(v)"
-    source = "Olsson, Åström, Canudas de Wit, Gäfvert, Lischinsky (1998), European J. Control 4(3), eq. 4, exponent 2"
+    source = (
+        "Olsson, Åström, Canudas de Wit, Gäfvert, Lischinsky (1998), European J. Control 4(3), eq."
+        " 4, exponent 2"
+    )
     looks_like = "friction against speed: curved upward at the fast end on both sides"
     confirm = (
         "move the empty joint at constant speeds up to the fastest and plot torque against speed"

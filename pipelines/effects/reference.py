@@ -14,11 +14,10 @@ from pipelines.effects import EFFECTS, Effect, Parameter
 INTRODUCTION = """\
 # Effects
 
-Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The first two are
-the baseline of every fit; the others are the causes that `exoid diagnose` knows and a rig file may name.
-`exoid effects NAME` prints a page on the terminal. The site that `make docs` makes shows beside each what it leaves
-in a residual, drawn anew from a virtual leg that has it.
-"""
+Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The
+first two are the baseline of every fit; the others are the causes that `exoid diagnose` knows and a
+rig file may name. `exoid effects NAME` prints a page on the terminal. The site that `make docs`
+makes shows beside each what it leaves in a residual, drawn anew from a virtual leg that has it. """
 
 
 def facts(effect: type[Effect]) -> dict[str, Any]:
@@ -93,7 +92,10 @@ def page(effect: type[Effect]) -> str:
         [
             f"# {told['title']}",
             "",
-            f"`{told['effect']}`, side: {told['side']}, joints: {told['joints']}, runs: {', '.join(told['runs'])}",
+            (
+                f"`{told['effect']}`, side: {told['side']}, joints: {told['joints']}, runs:"
+                f" {', '.join(told['runs'])}"
+            ),
             "",
             told["meaning"],
             "",
@@ -126,7 +128,10 @@ def _row(parameter: Parameter) -> str:
         meaning += "; each run's own"
     if parameter.default is not None:
         meaning += f"; {parameter.default:g} where not said"
-    return f"| `{parameter.name}` | {parameter.symbol} | {parameter.unit} | {meaning} | {typical_range(parameter)} |"
+    return (
+        f"| `{parameter.name}` | {parameter.symbol} | {parameter.unit} | {meaning} |"
+        f" {typical_range(parameter)} |"
+    )
 
 
 def pages() -> dict[str, str]:
@@ -134,7 +139,8 @@ def pages() -> dict[str, str]:
     ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (
-        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} | {typical_size(e)} |"
+        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} |"
+        f" {typical_size(e)} |"
         for e in ours
     )
     return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {

@@ -16,7 +16,10 @@ def _parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
 
 
 def _equation(mechanism: Mechanism) -> str:
-    return f"tau = M(q) ddq + C(q, dq) dq + G(q) = A(q, dq, ddq) ({', '.join(p.name for p in mechanism.parameters)})"
+    return (
+        "tau = M(q) ddq + C(q, dq) dq + G(q) = A(q, dq, ddq)"
+        f" ({', '.join(p.name for p in mechanism.parameters)})"
+    )
 
 
 class RigidBody(Effect):

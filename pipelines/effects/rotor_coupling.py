@@ -25,7 +25,10 @@ class RotorCoupling(Effect):
     resembles = ("inertia_by_angle",)
     forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau1 = c ddq2, tau2 = c ddq1; c = N Ir"
-    source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
+    source = (
+        "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in"
+        " gear-driven manipulators"
+    )
     looks_like = (
         "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"
     )

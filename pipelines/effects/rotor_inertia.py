@@ -16,7 +16,10 @@ class RotorInertia(Effect):
     resembles = ("inertia_by_angle",)
     forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau = J ddq, at its own joint only"
-    source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
+    source = (
+        "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in"
+        " gear-driven manipulators"
+    )
     looks_like = (
         "residual in step with its joint's own acceleration; X2 too large for a link of that weight"
     )

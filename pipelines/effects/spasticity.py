@@ -18,16 +18,31 @@ class Spasticity(Effect):
     resembles = ("speed",)
     forms_differ = "a real reflex comes some 40 ms late, and its threshold depends on the angle"
     equation = "tau = gain (v - v0) beyond v0 on the side of v0's sign, else 0"
-    source = "Lance (1980), in Spasticity: Disordered Motor Control; Falisse et al. (2018), PLoS ONE 13(12)"
-    looks_like = "residual against speed: flat, then a ramp beyond a speed, one way only and only with the human"
-    confirm = "stretch the relaxed leg at several speeds: the torque jumps at the fast ones (Tardieu's test)"
+    source = (
+        "Lance (1980), in Spasticity: Disordered Motor Control; Falisse et al. (2018), PLoS ONE"
+        " 13(12)"
+    )
+    looks_like = (
+        "residual against speed: flat, then a ramp beyond a speed, one way only and only with the"
+        " human"
+    )
+    confirm = (
+        "stretch the relaxed leg at several speeds: the torque jumps at the fast ones (Tardieu's"
+        " test)"
+    )
     acts_in = ("with_human",)
     linear = (
         Parameter("gain", "N·m·s/rad", "torque per speed beyond the threshold", "G", (1.0, 20.0)),
     )
     shape = (
-        Parameter("threshold_velocity", "rad/s", "speed from which it acts; its sign is the way", "v0", (-1.5, 1.5)),
-    )  # fmt: skip
+        Parameter(
+            "threshold_velocity",
+            "rad/s",
+            "speed from which it acts; its sign is the way",
+            "v0",
+            (-1.5, 1.5),
+        ),
+    )
     reported = (
         linear[0],
         Parameter("threshold_velocity", "rad/s", "speed from which it acts", "|v0|", (0.05, 1.5)),

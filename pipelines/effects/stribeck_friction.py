@@ -17,9 +17,15 @@ class StribeckFriction(Effect):
     forms_differ = "a real fall may have another exponent, and come back a moment late"
     holds = True
     equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
-    source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
+    source = (
+        "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7),"
+        " eq. 3"
+    )
     looks_like = "a narrow peak of friction on both sides of zero speed"
-    confirm = "creep the empty joint at several speeds up to a tenth of its fastest and plot torque against speed"
+    confirm = (
+        "creep the empty joint at several speeds up to a tenth of its fastest and plot torque"
+        " against speed"
+    )
     linear = (
         Parameter(
             "stribeck_torque",

@@ -41,9 +41,14 @@ def rotor_among_links(motion: Motion, joint: str) -> float:
 
 
 def behind_spring(
-    motion: Motion, load: Load, direction: NDArray, effect: Effect, values: NDArray | tuple[float, ...],
-    ratio: float = 0.0, with_motor: float = 0.0,
-) -> Motion:  # fmt: skip
+    motion: Motion,
+    load: Load,
+    direction: NDArray,
+    effect: Effect,
+    values: NDArray | tuple[float, ...],
+    ratio: float = 0.0,
+    with_motor: float = 0.0,
+) -> Motion:
     """Return the motion behind an effect's spring.
 
     Parameters

@@ -21,8 +21,14 @@ class TimeDelay(Effect):
     resembles = ("load", "speed", "inertia_by_angle")
     forms_differ = "a real channel is a filter, later at one frequency than at another"
     equation = "measured torque(t) = true torque(t - delay)"
-    source = "Björklund (2003), A Survey and Comparison of Time-Delay Estimation Methods in Linear Systems, Linköping"
-    looks_like = "residual in step with the torque's rate of change; friction steps smeared to one side of reversals"
+    source = (
+        "Björklund (2003), A Survey and Comparison of Time-Delay Estimation Methods in Linear"
+        " Systems, Linköping"
+    )
+    looks_like = (
+        "residual in step with the torque's rate of change; friction steps smeared to one side of"
+        " reversals"
+    )
     confirm = "knock on the link and compare when the torque and when the encoder answers"
     shape = (Parameter("delay", "s", "by which the torque channel is late", "T", (0.0, 0.06)),)
     reading_states = 1 + 2 * SLOTS

@@ -18,8 +18,14 @@ class TorqueGain(Effect):
     resembles = ("load", "gain_over_time")
     forms_differ = "a real gain may differ with the sign of the torque, or fall at large ones"
     equation = "measured torque = gain * true torque"
-    source = "Gautier, Briot (2014), ASME J. Dyn. Sys. Meas. Control 136(5): identification of joint drive gains"
-    looks_like = "the joints disagree about the second link: what both carry, X2 and X3, differs between the rows"
+    source = (
+        "Gautier, Briot (2014), ASME J. Dyn. Sys. Meas. Control 136(5): identification of joint"
+        " drive gains"
+    )
+    looks_like = (
+        "the joints disagree about the second link: what both carry, X2 and X3, differs between the"
+        " rows"
+    )
     confirm = "hang a known weight on the joint and compare the change of torque with the weight's"
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
 

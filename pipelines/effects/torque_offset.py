@@ -15,11 +15,14 @@ class TorqueOffset(Effect):
     resembles = ("angle", "time")
     forms_differ = "a real zero creeps, and steps when the sensor is loaded"
     equation = "measured torque = true torque + offset"
-    source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
+    source = (
+        "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive"
+        " chain's offset"
+    )
     looks_like = "a residual whose mean is not zero, moving or standing"
     confirm = (
-        "switch the drive off and read its torque: it should be zero; one that is tared at each start reads zero then "
-        "whatever loads it: take the load off first"
+        "switch the drive off and read its torque: it should be zero; one that is tared at each"
+        " start reads zero then whatever loads it: take the load off first"
     )
     may_differ = "a torque sensor that is tared anew at every start"
     linear = (Parameter("offset", "N·m", "measured less true torque", "o", (-4.0, 4.0)),)

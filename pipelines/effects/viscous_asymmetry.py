@@ -18,8 +18,14 @@ class ViscousAsymmetry(Effect):
     looks_like = "torque against speed: a V, zero at standstill"
     confirm = "move the empty joint at several constant speeds both ways and compare the two slopes"
     linear = (
-        Parameter("asymmetry", "N·m·s/rad", "half of forward less backward viscous friction", "c", (-4.0, 4.0)),
-    )  # fmt: skip
+        Parameter(
+            "asymmetry",
+            "N·m·s/rad",
+            "half of forward less backward viscous friction",
+            "c",
+            (-4.0, 4.0),
+        ),
+    )
     parity = Parity.EVEN
 
     @reaction

@@ -24,7 +24,10 @@ class VoluntaryTorque(Effect):
     looks_like = (
         "a tone in residual and cuff forces, at a frequency that no period of the motion explains"
     )
-    confirm = "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not show it"
+    confirm = (
+        "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not"
+        " show it"
+    )
     acts_in = ("with_human",)
     linear = (
         Parameter("sine", "N·m", "amplitude of the sine", "A", (-10.0, 10.0), per_run=True),

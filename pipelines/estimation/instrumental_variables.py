@@ -109,9 +109,13 @@ def _solved(problem: Problem, rows: Sequence[_Rows], weights: NDArray) -> Fit:
     held = problem.of_held
     values = sensitivity @ (right - slope[:, held] @ problem.held[held])
     return Fit(
-        values, normal, sensitivity, carry_of(problem, sensitivity, slope), weights,
+        values,
+        normal,
+        sensitivity,
+        carry_of(problem, sensitivity, slope),
+        weights,
         _scores(problem, rows, values, weights),
-    )  # fmt: skip
+    )
 
 
 def _weights(problem: Problem, rows: Sequence[_Rows], values: NDArray) -> NDArray:
@@ -138,20 +142,26 @@ def _scores(problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: N
 
 def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
     among, rest = test.freedom
-    numbers = f"Durbin-Wu-Hausman F({among:.0f}, {rest:.0f}) = {test.statistic:.2f}, p = {test.p_value:.2g}"
+    numbers = (
+        f"Durbin-Wu-Hausman F({among:.0f}, {rest:.0f}) = {test.statistic:.2f}, p ="
+        f" {test.p_value:.2g}"
+    )
     if not test.rejects:
-        return f"no sign that noise in the angles biases least squares ({numbers}): weighted_least_squares serves as well"
+        return (
+            f"no sign that noise in the angles biases least squares ({numbers}):"
+            " weighted_least_squares serves as well"
+        )
     matters = _matters(test, fit)
     if not matters.any():
         return (
-            f"noise in the angles shows in least squares ({numbers}) but does not matter: every parameter moves by "
-            f"less than a twentieth of its 95 % interval, or by less than {100 * SLIGHT_SHARE:g} % of itself; "
-            "weighted_least_squares serves as well"
+            f"noise in the angles shows in least squares ({numbers}) but does not matter: every"
+            " parameter moves by less than a twentieth of its 95 % interval, or by less than"
+            f" {100 * SLIGHT_SHARE:g} % of itself; weighted_least_squares serves as well"
         )
     worst = int(np.argmax(np.where(matters, np.abs(test.difference / test.std_error), 0.0)))
     return (
-        f"noise in the angles biases least squares ({numbers}), {names[worst]} most: least squares has it "
-        f"{100 * test.difference[worst] / abs(fit.values[worst]):+.1f} % off these values"
+        f"noise in the angles biases least squares ({numbers}), {names[worst]} most: least squares"
+        f" has it {100 * test.difference[worst] / abs(fit.values[worst]):+.1f} % off these values"
     )
 
 

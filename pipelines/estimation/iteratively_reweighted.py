@@ -93,18 +93,26 @@ class IterativelyReweighted(Estimator):
         joints = problem.runs[0][1].joints
         shares = dict(zip(joints, sums.rejected.tolist(), strict=True))
         return Fit(
-            values, sums.normal[free], sensitivity, carry_of(problem, sensitivity, sums.slope[problem.fitted]),
-            scale**-2.0, _scores(problem, values, scale),
-            {"iterations": first.iterations + second.iterations, "settled": settled, "scale_nm": scale.tolist(),
-             "rejected_share": shares},
+            values,
+            sums.normal[free],
+            sensitivity,
+            carry_of(problem, sensitivity, sums.slope[problem.fitted]),
+            scale**-2.0,
+            _scores(problem, values, scale),
+            {
+                "iterations": first.iterations + second.iterations,
+                "settled": settled,
+                "scale_nm": scale.tolist(),
+                "rejected_share": shares,
+            },
             distrust(settled, f"{ITERATIONS} iterations") + _of_outliers(shares),
-        )  # fmt: skip
+        )
 
 
 def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(
-        f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard deviations off "
-        "and count for nothing"
+        f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard"
+        " deviations off and count for nothing"
         for joint, share in shares.items()
         if share > WORTH_SAYING
     )
@@ -154,10 +162,12 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
             size.append(np.abs(residual[r.usable[:, j], j]))
     left = [np.concatenate(size) for size in sizes]
     return Sums(
-        normal, slope, right,
+        normal,
+        slope,
+        right,
         np.array([max(MAD * np.median(size), LEAST_NM) for size in left]),
         np.array([np.mean(size > BISQUARE * s) for size, s in zip(left, scale, strict=True)]),
-    )  # fmt: skip
+    )
 
 
 def _scores(problem: Problem, values: NDArray, scale: NDArray) -> Scores:

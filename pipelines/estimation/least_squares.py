@@ -42,9 +42,14 @@ class WeightedLeastSquares(Estimator):
         values = sensitivity @ right
         slope = normal_equations(rows, weights)[0][problem.fitted]
         return Fit(
-            values, normal, sensitivity, carry_of(problem, sensitivity, slope), weights,
-            scores_of(problem, values, weights), {"joint_weights_1_nm2": weights.tolist()},
-        )  # fmt: skip
+            values,
+            normal,
+            sensitivity,
+            carry_of(problem, sensitivity, slope),
+            weights,
+            scores_of(problem, values, weights),
+            {"joint_weights_1_nm2": weights.tolist()},
+        )
 
     def _weights(self, rows: Compressed, names: list[str]) -> NDArray:
         weights = np.ones(len(rows.count))

@@ -24,15 +24,15 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
     if not np.all(size > 0):
         silent = [name for name, s in zip(names, size, strict=True) if s == 0]
         raise NotIdentifiable(
-            f"the motion does not excite {', '.join(silent)} at all: their columns are zero on every usable sample; "
-            "move every joint, in both directions, faster than it sticks"
+            f"the motion does not excite {', '.join(silent)} at all: their columns are zero on"
+            " every usable sample; move every joint, in both directions, faster than it sticks"
         )
     scaled = gram / np.outer(size, size)
     eigenvalues = np.linalg.eigvalsh(scaled)
     if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > SINGULAR:
         mixed = worst_direction(scaled, names)
         raise NotIdentifiable(
-            f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the others; "
-            "excite more harmonics and both joints at once, or lengthen the run"
+            f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
+            " others; excite more harmonics and both joints at once, or lengthen the run"
         )
     return np.linalg.inv(scaled) / np.outer(size, size)

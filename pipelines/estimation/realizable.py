@@ -51,8 +51,9 @@ class Realizable(Estimator):
             for joint, before, after in zip(problem.runs[0][1].joints, *rises, strict=True)
         )
         remark = (
-            f"least squares alone finds no machine that can exist; the nearest that can leaves more torque: {raised}. "
-            "That is evidence of an effect that the model lacks: `exoid diagnose` looks for it"
+            "least squares alone finds no machine that can exist; the nearest that can leaves more"
+            f" torque: {raised}. That is evidence of an effect that the model lacks: `exoid"
+            " diagnose` looks for it"
         )
         told = {**free.told, "constrained": True, "least_squares_values": free.values.tolist()}
         return replace(free, values=values, told=told, remarks=(remark,))
@@ -82,8 +83,9 @@ def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
     ).solve()
     if str(solution.status) not in ("Solved", "AlmostSolved"):
         raise NotIdentifiable(
-            f"no realizable model was found near the fit ({solution.status}): with the values that are held none can "
-            "exist; choose --method weighted_least_squares and look at what it says of realizability"
+            f"no realizable model was found near the fit ({solution.status}): with the values that"
+            " are held none can exist; choose --method weighted_least_squares and look at what it"
+            " says of realizability"
         )
     return values + size * np.array(solution.x)
 

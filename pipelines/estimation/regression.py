@@ -69,9 +69,9 @@ def block_average(motion: Run) -> BlockAverage:
     kind = chosen.get("kind", "block_average")
     if kind != "block_average":
         raise InputError(
-            f'{motion.file or "the motion"}: metadata regression_filter.kind: found "{kind}", '
-            'expected "block_average"; '
-            "filter the recording with `exoid filter`, or leave regression_filter out for blocks of 25 ms"
+            f'{motion.file or "the motion"}: metadata regression_filter.kind: found "{kind}",'
+            ' expected "block_average"; filter the recording with `exoid filter`, or leave'
+            " regression_filter out for blocks of 25 ms"
         )
     if "decimation" in chosen:
         return BlockAverage(int(chosen["decimation"]))

@@ -6,7 +6,8 @@ centre and inertia of each segment: a mass can go from the shank to the thigh's 
 Simulators ask for all of these. With m the masses, c the centres along and a across the segments, I
 the inertias about the centres,
 
-    X2 = m2 (c2² + a2²) + I2,  X3 = m2 c2,  X4 = m1 c1 + m2 L1,  X1 = m1 (c1² + a1²) + I1 + m2 L1² + X2
+    X2 = m2 (c2² + a2²) + I2,  X3 = m2 c2,  X4 = m1 c1 + m2 L1,
+    X1 = m1 (c1² + a1²) + I1 + m2 L1² + X2
 
 is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X2) / L1² and m1 is
 large enough; there is such an m2 exactly where the mass matrix is positive definite. Here m2 is the
@@ -91,8 +92,8 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     mechanism = exported.machine.mechanism
     if mechanism not in MADE:
         raise InputError(
-            f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose masses for; "
-            "export to c, matlab or json, which need no bodies"
+            f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose"
+            " masses for; export to c, matlab or json, which need no bodies"
         )
     return MADE[exported.machine.mechanism](exported)
 
@@ -121,9 +122,10 @@ def _in_series(
     of_shank = np.hypot(X3, across[1])
     if X2 <= 0 or X2 * (X1 - X2) <= (length * of_shank) ** 2:
         raise InputError(
-            f"no two bodies have the rigid body of {exported.run}: X2 = {X2:.4g} kg·m², X2 (X1 - X2) = "
-            f"{X2 * (X1 - X2):.4g}, expected above (L1 X3)² = {(length * of_shank) ** 2:.4g} kg²·m⁴; identify again "
-            "from motions that separate X1, X2 and X3 better, or export to c, matlab or json, which need no bodies"
+            f"no two bodies have the rigid body of {exported.run}: X2 = {X2:.4g} kg·m², X2 (X1 -"
+            f" X2) = {X2 * (X1 - X2):.4g}, expected above (L1 X3)² = {(length * of_shank) ** 2:.4g}"
+            " kg²·m⁴; identify again from motions that separate X1, X2 and X3 better, or export to"
+            " c, matlab or json, which need no bodies"
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
     left, along = X1 - X2 - m2 * length**2, 0.0 if X4 is None else X4 - m2 * length
@@ -171,6 +173,11 @@ def _moment_across(exported: Exported, joint: Joint) -> float:
 
 
 MADE: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
-    LEG: _leg, LEVEL_LEG: _level_leg, PENDULUM: _pendulum, TURNTABLE: _turntable, LIFT: _lift, SLIDE: _slide,
-}  # fmt: skip
+    LEG: _leg,
+    LEVEL_LEG: _level_leg,
+    PENDULUM: _pendulum,
+    TURNTABLE: _turntable,
+    LIFT: _lift,
+    SLIDE: _slide,
+}
 """How each mechanism's bodies are chosen."""

@@ -13,9 +13,12 @@ LANGUAGE = Language(
     power=lambda base, exponent: f"pow({base}, {exponent})",
     unequal="!=",
     choice=lambda question, yes, no: [
-        f"if ({question}) {{", *_indented(yes), *(["} else {", *_indented(no)] if no else []), "}",
+        f"if ({question}) {{",
+        *_indented(yes),
+        *(["} else {", *_indented(no)] if no else []),
+        "}",
     ],
-)  # fmt: skip
+)
 
 HEADER = """\
 {comment}
@@ -29,22 +32,23 @@ extern "C" {{
 #define {NAME}_JOINTS {joints}
 #define {NAME}_MEMORY {room} {memory_comment}
 
-/* Torque that the drives must deliver. t: seconds since the run began; q, dq, ddq: angles as the encoders give them,
- * their rates, SI units; memory: {NAME}_MEMORY numbers, 0 to begin with. Friction that depends on the load makes it
- * other than affine in ddq. */
-void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}], const double ddq[{joints}],
-                             const double memory[{room}], double tau[{joints}]);
+/* Torque that the drives must deliver. t: seconds since the run began; q, dq, ddq: angles as
+ * the encoders give them, their rates, SI units; memory: {NAME}_MEMORY numbers, 0 to begin with.
+ * Friction that depends on the load makes it other than affine in ddq. */
+void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}],
+                             const double ddq[{joints}], const double memory[{room}],
+                             double tau[{joints}]);
 
 /* The same at ddq = 0: Coriolis and centrifugal torque, gravity, friction, springs. */
-void {name}_bias(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
-                 double tau[{joints}]);
+void {name}_bias(double t, const double q[{joints}], const double dq[{joints}],
+                 const double memory[{room}], double tau[{joints}]);
 
 /* Mass matrix, rotors included. */
 void {name}_mass_matrix(double t, const double q[{joints}], double M[{joints}][{joints}]);
 
 /* Rate of the memory, for whoever integrates it. */
-void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
-                        double rate[{room}]);
+void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}],
+                        const double memory[{room}], double rate[{room}]);
 
 /* What the torque channels say where the drives deliver tau; in place. */
 void {name}_torque_reading(double t, double tau[{joints}]);
@@ -64,11 +68,13 @@ SOURCE = """\
 {constants}
 
 static const double sensor_shift[{joints}] = {sensor_shift}; /* encoders less motors, rad */
-static const double link_shift[{joints}] = {link_shift}; /* motors less angles from the vertical, rad */
+/* Motors less angles from the vertical, rad. */
+static const double link_shift[{joints}] = {link_shift};
 
 struct instant {{
     double t;
-    double q[{joints}], motor[{joints}], dq[{joints}], ddq[{joints}], direction[{joints}], load[{joints}];
+    double q[{joints}], motor[{joints}], dq[{joints}], ddq[{joints}];
+    double direction[{joints}], load[{joints}];
     double memory[{room}];
 }};
 
@@ -94,8 +100,9 @@ static struct instant instant_of(double t, const double *q, const double *dq, co
 
 {groups}
 
-void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}], const double ddq[{joints}],
-                             const double memory[{room}], double tau[{joints}]) {{
+void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}],
+                             const double ddq[{joints}], const double memory[{room}],
+                             double tau[{joints}]) {{
     struct instant at = instant_of(t, q, dq, ddq, memory);
     for (int j = 0; j < {joints}; j++) {{
         tau[j] = 0.0;
@@ -109,8 +116,8 @@ void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq
     drive_torque(&at, tau);
 }}
 
-void {name}_bias(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
-                 double tau[{joints}]) {{
+void {name}_bias(double t, const double q[{joints}], const double dq[{joints}],
+                 const double memory[{room}], double tau[{joints}]) {{
     const double still[{joints}] = {{0.0}};
     {name}_inverse_dynamics(t, q, dq, still, memory, tau);
 }}
@@ -133,8 +140,8 @@ void {name}_mass_matrix(double t, const double q[{joints}], double M[{joints}][{
     }}
 }}
 
-void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
-                        double rate[{room}]) {{
+void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}],
+                        const double memory[{room}], double rate[{room}]) {{
     const double still[{joints}] = {{0.0}};
     struct instant now = instant_of(t, q, dq, still, memory), *at = &now;
     (void)at;

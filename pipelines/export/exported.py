@@ -72,8 +72,8 @@ class Exported:
         """Return which friction would drive its joint, which a simulation or a controller must not
         be given unseen."""
         return [
-            f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the joint, and a simulation "
-            "of it may run away; identify again, or set it to 0"
+            f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the"
+            " joint, and a simulation of it may run away; identify again, or set it to 0"
             for term in self.terms
             if isinstance(term.effect, Friction)
             for p, value in zip(term.effect.parameters, term.values, strict=True)
@@ -93,7 +93,10 @@ class Exported:
         """Yield what every written file says of itself, line by line."""
         yield f"{format.title} of an identified machine, written by exoid {__version__}"
         if self.table.path:
-            yield f"from {self.table.path.name} (SHA-256 {sha256(self.table.path)[:16]}), run {self.run}"
+            yield (
+                f"from {self.table.path.name} (SHA-256 {sha256(self.table.path)[:16]}), run"
+                f" {self.run}"
+            )
         yield "SI units; angles as the encoders give them, torques as the drives deliver them"
         yield ""
         yield from (f"WARNING: {sentence}" for sentence in self.driving())
@@ -157,7 +160,8 @@ def exported(
     with about(table.path):
         if run not in bodies:
             raise InputError(
-                f"holds no rigid body for run {run!r}, only for {', '.join(sorted(bodies))}; set --run"
+                f"holds no rigid body for run {run!r}, only for {', '.join(sorted(bodies))}; set"
+                " --run"
             )
         whole = model_from_parameters(table.frame, run, machine)
         present, absent = [], []

@@ -312,8 +312,11 @@ def _substitute(thing: Any, done: dict[FunctionType, FunctionType]) -> Any:
 
 def _function(name: str) -> Callable[..., Any]:
     of_numbers: dict[str, Callable[..., Any]] = {
-        "abs": abs, "max": max, "min": min, "sign": lambda x: (x > 0) - (x < 0),
-    }  # fmt: skip
+        "abs": abs,
+        "max": max,
+        "min": min,
+        "sign": lambda x: (x > 0) - (x < 0),
+    }
     at_once = of_numbers[name] if name in of_numbers else getattr(math, name)
 
     def call(*arguments):

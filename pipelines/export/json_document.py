@@ -16,10 +16,19 @@ CONTRACT = "model/1"
 
 CONVENTIONS = {
     "units": "SI",
-    "angles": "of the first revolute joint from the downward vertical, forward positive, of the next relative to the "
-    "link before; a prismatic joint rises where gravity acts; all as their encoders give them",
-    "torques": "positive torque accelerates its angle upward; an effect's equation gives what the drive must add",
-    "covariance": "of the parameters' values, rows and columns in their order; null where it was not estimated",
+    "angles": (
+        "of the first revolute joint from the downward vertical, forward positive, of the next"
+        " relative to the link before; a prismatic joint rises where gravity acts; all as their"
+        " encoders give them"
+    ),
+    "torques": (
+        "positive torque accelerates its angle upward; an effect's equation gives what the drive"
+        " must add"
+    ),
+    "covariance": (
+        "of the parameters' values, rows and columns in their order; null where it was not"
+        " estimated"
+    ),
 }
 
 

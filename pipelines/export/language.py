@@ -104,8 +104,9 @@ def function_name(stem: str, suffix: str, keywords: Iterable[str] = ()) -> str:
     """
     if stem != identifier(stem) or stem in keywords:
         raise InputError(
-            f"{one_line(stem)}{suffix}: its functions are called as the file is, expected letters and digits of ASCII "
-            "and single underscores, a letter first, and no word of the language; name it by -o"
+            f"{one_line(stem)}{suffix}: its functions are called as the file is, expected letters"
+            " and digits of ASCII and single underscores, a letter first, and no word of the"
+            " language; name it by -o"
         )
     return stem
 

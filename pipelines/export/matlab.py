@@ -8,10 +8,30 @@ from pipelines.export.exported import Exported
 from pipelines.export.format import Format
 from pipelines.export.language import Language, function_name, one_line
 
-KEYWORDS = frozenset((
-    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global",
-    "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
-))  # fmt: skip
+KEYWORDS = frozenset(
+    (
+        "break",
+        "case",
+        "catch",
+        "classdef",
+        "continue",
+        "else",
+        "elseif",
+        "end",
+        "for",
+        "function",
+        "global",
+        "if",
+        "otherwise",
+        "parfor",
+        "persistent",
+        "return",
+        "spmd",
+        "switch",
+        "try",
+        "while",
+    )
+)
 
 LANGUAGE = Language(
     names={},
@@ -19,9 +39,12 @@ LANGUAGE = Language(
     power=lambda base, exponent: f"{base}^{exponent}",
     unequal="~=",
     choice=lambda question, yes, no: [
-        f"if {question}", *_indented(yes), *(["else", *_indented(no)] if no else []), "end",
+        f"if {question}",
+        *_indented(yes),
+        *(["else", *_indented(no)] if no else []),
+        "end",
     ],
-)  # fmt: skip
+)
 
 FILE = """\
 function [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
@@ -72,8 +95,8 @@ if nargout > 1
         unit = zeros({joints}, 1);
         unit(k) = 1;
         % The velocity torque is a quadratic form in dq; its polarisation is the Christoffel matrix.
-        C(:, k) = 0.5 * (velocity_torque(still, at.dq + unit, G) - velocity_torque(still, at.dq, G) ...
-            - velocity_torque(still, unit, G));
+        C(:, k) = 0.5 * (velocity_torque(still, at.dq + unit, G) ...
+            - velocity_torque(still, at.dq, G) - velocity_torque(still, unit, G));
     end
     rate = memory_rate(at);
     reading = torque_reading(at, tau);

@@ -29,7 +29,8 @@ def _friction(term: Term) -> Holding:
     return held_friction(
         term,
         approximate(
-            "joint damping and frictionloss: exact while the joint moves, stuck joints creep a little"
+            "joint damping and frictionloss: exact while the joint moves, stuck joints creep a"
+            " little"
         ),
     )
 
@@ -75,7 +76,10 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         _spring_across(springs, (name, twist), joint, exported)
         _actuator(actuators, name, joint, exported)
     root.extend([part for part in (springs, actuators) if len(part)])
-    masses = "Masses are nominal where X does not determine them: what joints feel is kept. Shapes are drawn only."
+    masses = (
+        "Masses are nominal where X does not determine them: what joints feel is kept. Shapes are"
+        " drawn only."
+    )
     return {".xml": document(root, [*exported.heading(MJCF), "", masses])}
 
 
@@ -185,8 +189,14 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
         at_nought *= per_unit
     bias = numbers(at_nought, 0.0, 0.0)
     ET.SubElement(
-        actuators, "general", name=name, joint=name, gainprm=number(per_unit), biastype="affine", biasprm=bias
-    )  # fmt: skip
+        actuators,
+        "general",
+        name=name,
+        joint=name,
+        gainprm=number(per_unit),
+        biastype="affine",
+        biasprm=bias,
+    )
 
 
 def _comes_before(exported: Exported, first: Term, second: Term) -> bool:

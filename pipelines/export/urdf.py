@@ -47,7 +47,10 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     # Of a lift, whose weight a counterweight carries in part, that part of gravity.
     gravity = number(exported.geometry.gravity_m_s2 * (1.0 - made[0].carried))
     said = [
-        "Masses are nominal where X does not determine them: what joints feel is kept. Limits are not the machine's.",
+        (
+            "Masses are nominal where X does not determine them: what joints feel is kept. Limits"
+            " are not the machine's."
+        ),
         f"Gravity is the reader's to set: {gravity} m/s² along -z.",
     ]
     return {".urdf": document(root, [*exported.heading(URDF), "", *said])}

@@ -13,7 +13,10 @@ def document(root: ET.Element, comment: Iterable[str]) -> str:
     text = "\n".join(f"  {line}".rstrip() for line in map(one_line, comment))
     # Two hyphens end a comment, and so does one before its end.
     safe = re.sub(r"-(?=-)", "- ", text)
-    return f'<?xml version="1.0" encoding="utf-8"?>\n<!--\n{safe}\n-->\n{ET.tostring(root, encoding="unicode")}\n'
+    return (
+        '<?xml version="1.0"'
+        f' encoding="utf-8"?>\n<!--\n{safe}\n-->\n{ET.tostring(root, encoding="unicode")}\n'
+    )
 
 
 def number(value: float) -> str:

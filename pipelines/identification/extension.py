@@ -24,7 +24,10 @@ from pipelines.model import BASELINE, Term, terms_beside_bodies
 from pipelines.model.per_run import guess, own_term
 from pipelines.wording.label import effect_at
 
-WHY = "others have shapes that a diagnosis finds (--causes), or cannot be told from rigid body and friction"
+WHY = (
+    "others have shapes that a diagnosis finds (--causes), or cannot be told from rigid body and"
+    " friction"
+)
 
 
 @dataclass(frozen=True)
@@ -180,8 +183,8 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
     remedy = "give the parameters.parquet of a diagnosis of the same machine"
     if theirs != ours or mechanism != run.machine.mechanism.name:
         raise InputError(
-            f"{table.path}: is of a {mechanism} with the joints {', '.join(theirs)}, the runs are of a "
-            f"{run.machine.mechanism.name} with {', '.join(ours)}; {remedy}"
+            f"{table.path}: is of a {mechanism} with the joints {', '.join(theirs)}, the runs are"
+            f" of a {run.machine.mechanism.name} with {', '.join(ours)}; {remedy}"
         )
     geometry = table.metadata.get("geometry") or {}
     for name, length in run.machine.told(run.geometry).items():
@@ -200,8 +203,8 @@ def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: st
     said = [guessed for guessed in guesses if guessed]
     if learnt and run.purpose == "validate":
         said.append(
-            f"{run.file}: what it has for itself of {' and '.join(learnt)} was learnt from this run, so its error is "
-            "not quite that of a run no fit has seen; the verdict's is"
+            f"{run.file}: what it has for itself of {' and '.join(learnt)} was learnt from this"
+            " run, so its error is not quite that of a run no fit has seen; the verdict's is"
         )
     return said
 
@@ -238,5 +241,8 @@ def _critical(table: Table) -> float:
 
 def _bodies(table: Table) -> dict[str, NDArray]:
     frame = table.frame[table.frame["effect"] == RigidBody.name]
-    return {kind: frame.loc[frame["run"] == kind, "value"].to_numpy(float) for kind in (*RUNS, "human")
-            if (frame["run"] == kind).any()}  # fmt: skip
+    return {
+        kind: frame.loc[frame["run"] == kind, "value"].to_numpy(float)
+        for kind in (*RUNS, "human")
+        if (frame["run"] == kind).any()
+    }

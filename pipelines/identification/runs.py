@@ -31,18 +31,18 @@ def checked(motions: Sequence[Run]) -> Runs:
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     if not runs.of("train", "exo_alone"):
         raise InputError(
-            f"found no exo_alone run to train on among: {listed}; friction is fitted with nobody in the machine: "
-            f"{giving('train', motions)}"
+            f"found no exo_alone run to train on among: {listed}; friction is fitted with nobody in"
+            f" the machine: {giving('train', motions)}"
         )
     if not runs.of("validate"):
         raise InputError(
-            f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: "
-            f"{giving('validate', motions)}"
+            f"found no run to validate on among: {listed}; a fit is judged on data it has not seen:"
+            f" {giving('validate', motions)}"
         )
     if not any(run.run in runs.kinds for run in runs.of("validate")):
         raise InputError(
-            f"found no run to validate on of a kind that is trained on ({', '.join(runs.kinds)}) among: {listed}; "
-            f"record one, or give a {runs.of('validate')[0].run} run to train on"
+            f"found no run to validate on of a kind that is trained on ({', '.join(runs.kinds)})"
+            f" among: {listed}; record one, or give a {runs.of('validate')[0].run} run to train on"
         )
     refuse_several_machines(motions)
     return runs

@@ -32,8 +32,8 @@ from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
 
 BIASED = (
-    f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
-    "to encoder counts and time stamps"
+    f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz ="
+    f" {CUTOFF_HZ:g}, and see to encoder counts and time stamps"
 )
 SLOWLY = f"{IN_WORDS}, so that nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the diagnosis"
 STEP = 0.25
@@ -42,8 +42,9 @@ ROUNDS, RESTS = 12, 1e-3
 """In which loads follow the rigid bodies that they are of, and the relative change at which these
 are at rest."""
 RESTLESS = (
-    f"the rigid bodies and the loads that they make did not come to agree in {ROUNDS} rounds, so these values are not "
-    "to be trusted: some shape that is held, as a soft spring's, does not go with these runs"
+    f"the rigid bodies and the loads that they make did not come to agree in {ROUNDS} rounds, so"
+    " these values are not to be trusted: some shape that is held, as a soft spring's, does not go"
+    " with these runs"
 )
 
 Found = TypeVar("Found", bound=Fit, covariant=True)
@@ -103,9 +104,15 @@ class Identified:
                     term = self.training.term_of(run, i, self.values)
                     values = None if term is None else effect.physical(term.values)
                     told.setdefault(effect.label, []).append(
-                        {"name": run.file, "sha256": self.extension.recordings[run.file],
-                         "values": {name: None if values is None else float(values[at]) for at, name in own}}
-                    )  # fmt: skip
+                        {
+                            "name": run.file,
+                            "sha256": self.extension.recordings[run.file],
+                            "values": {
+                                name: None if values is None else float(values[at])
+                                for at, name in own
+                            },
+                        }
+                    )
         return told
 
 
@@ -381,8 +388,9 @@ def _critical(
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
     driving = table[(table["effect"] == "friction") & (table["ci95_high"] < 0.0)]
     return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
-        f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']} ({row['ci95_low']:.3g} to "
-        f"{row['ci95_high']:.3g}) and would drive the joint; look for a wrong sign of its torque or its angle, or for "
-        "what is taken for friction (exoid diagnose)"
+        f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']}"
+        f" ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) and would drive the joint; look for a"
+        " wrong sign of its torque or its angle, or for what is taken for friction (exoid"
+        " diagnose)"
         for row in driving.to_dict("records")
     ]

@@ -77,7 +77,8 @@ class Log:
         told = self.columns[channel.enabled]
         if len(told) != self.rows:
             raise InputError(
-                f"{channel.enabled!r} has {len(told)} rows where the clock has {self.rows}, expected as many"
+                f"{channel.enabled!r} has {len(told)} rows where the clock has {self.rows},"
+                " expected as many"
             )
         said = told[run.rows]
         off, blank = said == 0.0, np.isnan(said)
@@ -88,8 +89,8 @@ class Log:
                 else "says of no row that the drive was on"
             )
             raise InputError(
-                f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number where it was on; "
-                "correct joint.enabled in the map, or leave it out"
+                f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number"
+                " where it was on; correct joint.enabled in the map, or leave it out"
             )
         for rows, says, so in (
             (off, "is 0", "the drive was off"),
@@ -109,13 +110,14 @@ class Log:
             values = self.columns[name]
             if len(values) not in (1, self.rows) or (len(values) == 1 and channel.reading.column):
                 raise InputError(
-                    f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it was sampled by a clock of "
-                    f"its own, name that in the map: {channel.where}.time"
+                    f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it was"
+                    f" sampled by a clock of its own, name that in the map: {channel.where}.time"
                 )
             picked[name] = values if len(values) == 1 else values[run.rows]
         if all(len(self.columns[name]) == 1 for name in names):
             raise InputError(
-                f"{channel.where}: {', '.join(names)} have one row each, expected one column with a row of each stamp"
+                f"{channel.where}: {', '.join(names)} have one row each, expected one column with a"
+                " row of each stamp"
             )
         return quantity(channel.reading, channel.gain, picked, channel.target, findings)
 
@@ -127,7 +129,8 @@ class Log:
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(
-                f"{channel.where} and its clock {reading.time!r} differ in length; name the one that it was sampled by"
+                f"{channel.where} and its clock {reading.time!r} differ in length; name the one"
+                " that it was sampled by"
             )
         values = quantity(reading, channel.gain, columns, channel.target, findings)
         known = np.isfinite(values)
@@ -138,7 +141,8 @@ class Log:
         )
         if len(own) != 1:
             raise InputError(
-                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the file"
+                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the"
+                " file"
             )
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
@@ -169,12 +173,13 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     for name, where in needed.items():
         if f"{name}#1" in source.names:
             raise SettingsError(
-                f"has {name!r} twice, which {where} in {map_path} names, and nobody knows which is meant; name "
-                f"{name}#1, {name}#2 ... in the map, or rename one in the file"
+                f"has {name!r} twice, which {where} in {map_path} names, and nobody knows which is"
+                f" meant; name {name}#1, {name}#2 ... in the map, or rename one in the file"
             )
         if name not in source.names:
             raise SettingsError(
-                f"has no column {name!r}, which {where} in {map_path} names; {suggestion(name, list(source.names))}"
+                f"has no column {name!r}, which {where} in {map_path} names;"
+                f" {suggestion(name, list(source.names))}"
             )
     columns = source.load(list(needed))
     findings: list[Finding] = []

@@ -109,8 +109,8 @@ def _refuse_short(log: Log) -> None:
     longest = max(map(len, log.runs), default=0)
     if longest < FEWEST:
         raise InputError(
-            f"no run of its clock has {FEWEST} rows, which a recording needs: the longest has {longest} of "
-            f"{log.rows}; correct [time] in the map"
+            f"no run of its clock has {FEWEST} rows, which a recording needs: the longest has"
+            f" {longest} of {log.rows}; correct [time] in the map"
         )
 
 
@@ -193,14 +193,16 @@ def _whole_rows(
             texts = [str(finding) for finding in findings if finding.done == TAKEN_FOR_MISSING]
             seen = f" ({'; '.join(texts)})" if texts else ""
             raise InputError(
-                f"{name} has no value in any row{seen}; correct its column, range or time in the map"
+                f"{name} has no value in any row{seen}; correct its column, range or time in"
+                " the map"
             )
     whole = np.all([known[name] for name in required], axis=0)
     if np.count_nonzero(whole) < FEWEST:
         shares = ", ".join(f"{name} in {np.mean(known[name]):.0%}" for name in required)
         raise InputError(
-            f"only {np.count_nonzero(whole)} rows have all of them ({shares} of the rows): they were sampled at "
-            "different instants; give those that are to be interpolated a time of their own in the map"
+            f"only {np.count_nonzero(whole)} rows have all of them ({shares} of the rows): they"
+            " were sampled at different instants; give those that are to be interpolated a time of"
+            " their own in the map"
         )
     for name, present in known.items():
         missing = len(present) - int(np.count_nonzero(present))
@@ -216,7 +218,10 @@ def _whole_rows(
 def _sampling_findings(sampling: Sampling) -> list[Finding]:
     found = []
     if not SLOWEST_HZ <= sampling.rate_hz <= FASTEST_HZ:
-        seen = f"{sampling.rate_hz:.4g} Hz, where machines are sampled at {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz"
+        seen = (
+            f"{sampling.rate_hz:.4g} Hz, where machines are sampled at {SLOWEST_HZ:g} to"
+            f" {FASTEST_HZ:g} Hz"
+        )
         found.append(Finding("time", seen, "kept; check time.unit, s or ms, or time.rate_hz"))
     if sampling.irregular > 0.05:
         shortest, median, longest = (1e3 * step for step in sampling.steps_s)
@@ -233,7 +238,10 @@ def _sampling_findings(sampling: Sampling) -> list[Finding]:
         )
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
-        seen = f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest {longest_gap:.3g} s"
+        seen = (
+            f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest"
+            f" {longest_gap:.3g} s"
+        )
         found.append(Finding("time", seen, "told in `gaps`; nothing is filled in"))
     return found
 
@@ -253,7 +261,10 @@ def _period_findings(
     period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in motion]))
     if period_s is None:
         return []
-    to_do = f"period_s = {period_s:.6g} in [[recording]] lets diagnose measure the noise instead of guessing it"
+    to_do = (
+        f"period_s = {period_s:.6g} in [[recording]] lets diagnose measure the noise instead of"
+        " guessing it"
+    )
     return [
         Finding(
             "time",
@@ -270,10 +281,11 @@ def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -
         if joint.kind == "revolute" and len(absurd):
             first = f"{angle[absurd[0]]:.4g} at {columns['time_s'][absurd[0]]:.6g} s"
             raise SettingsError(
-                f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad, expected at most "
-                f"{LARGEST_ANGLE_RAD:.3g} to both sides; beyond it in {counted(len(absurd), 'row')} of {len(angle)}, "
-                f"the first {first}; leave slips out with range, or correct its unit, zero, counts_per_turn or "
-                "wraps_at in the map"
+                f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad,"
+                f" expected at most {LARGEST_ANGLE_RAD:.3g} to both sides; beyond it in"
+                f" {counted(len(absurd), 'row')} of {len(angle)}, the first {first}; leave slips"
+                " out with range, or correct its unit, zero, counts_per_turn or wraps_at in"
+                " the map"
             )
 
 
@@ -287,9 +299,9 @@ def _refuse_absurd_torques(columns: Mapping[str, NDArray], settings: ImportMap) 
         if len(absurd):
             first = f"{torque[absurd[0]]:.4g} {unit} at {columns['time_s'][absurd[0]]:.6g} s"
             raise SettingsError(
-                f"joint[{i}].torque: would be {first}, and "
-                f"beyond {LARGEST_TORQUE:g} {unit}, which no drive delivers, in {counted(len(absurd), 'row')}; leave "
-                "slips out with range, or correct unit, scale and what follows it in the map"
+                f"joint[{i}].torque: would be {first}, and beyond {LARGEST_TORQUE:g} {unit}, which"
+                f" no drive delivers, in {counted(len(absurd), 'row')}; leave slips out with range,"
+                " or correct unit, scale and what follows it in the map"
             )
 
 
@@ -297,8 +309,9 @@ def _refuse_long_periods(wanted: Sequence[RecordingSettings], duration_s: float)
     for recording in wanted:
         if recording.period_s is not None and recording.period_s > LONGEST_PERIOD * duration_s:
             raise SettingsError(
-                f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected at most the "
-                f"{duration_s:.6g} s of the run, for an excitation that repeats; correct it, or remove it"
+                f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected"
+                f" at most the {duration_s:.6g} s of the run, for an excitation that repeats;"
+                " correct it, or remove it"
             )
 
 
@@ -314,8 +327,8 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
     if last - first < FEWEST:
         end = end if np.isfinite(end) else duration_s
         raise InputError(
-            f"{recording.purpose} from {begin:g} to {end:g} s has {last - first} rows of a run of {duration_s:.6g} s, "
-            f"expected at least {FEWEST}; correct its span in the map"
+            f"{recording.purpose} from {begin:g} to {end:g} s has {last - first} rows of a run of"
+            f" {duration_s:.6g} s, expected at least {FEWEST}; correct its span in the map"
         )
     return slice(int(first), int(last))
 
@@ -329,8 +342,9 @@ def _refuse_overlap(
         if one.purpose != other.purpose and both.start < both.stop:
             begin, end = time[both][[0, -1]]
             raise SettingsError(
-                f"{begin:.6g} to {end:.6g} s would be to train and to validate, expected no sample in both: a fit is "
-                "judged on data that it has not seen; correct the spans of [[recording]] in the map"
+                f"{begin:.6g} to {end:.6g} s would be to train and to validate, expected no sample"
+                " in both: a fit is judged on data that it has not seen; correct the spans of"
+                " [[recording]] in the map"
             )
 
 
@@ -338,9 +352,12 @@ def _metadata(
     settings: ImportMap, recording: RecordingSettings, sampling: Sampling
 ) -> dict[str, Any]:
     known = {
-        "rig": settings.rig, "subject": recording.subject, "session": recording.session,
-        "period_s": recording.period_s, "geometry": settings.geometry.model_dump(exclude_none=True) or None,
-    }  # fmt: skip
+        "rig": settings.rig,
+        "subject": recording.subject,
+        "session": recording.session,
+        "period_s": recording.period_s,
+        "geometry": settings.geometry.model_dump(exclude_none=True) or None,
+    }
     return {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in settings.joint],
         "run": recording.run,
@@ -357,5 +374,6 @@ def refuse_to_overwrite(path: Path) -> None:
     told = told_by(path)
     if told.get("contract") == RECORDING.label and "imported" not in told:
         raise ContractError(
-            f"{path}: holds a recording that was not imported, not overwritten; choose another folder"
+            f"{path}: holds a recording that was not imported, not overwritten; choose another"
+            " folder"
         )

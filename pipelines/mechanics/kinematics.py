@@ -109,8 +109,11 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
         cutoff = _cutoff(recording, stretches, rate_hz, settings)
         _refuse_stretches_that_are_all_edge(stretches, rate_hz, cutoff)
     how = {
-        "kind": "butterworth_zero_phase", "order": settings.order, "cutoff_hz": cutoff.hz, "why": cutoff.reason,
-    }  # fmt: skip
+        "kind": "butterworth_zero_phase",
+        "order": settings.order,
+        "cutoff_hz": cutoff.hz,
+        "why": cutoff.reason,
+    }
     block = BlockAverage.lasting(settings.block_s, rate_hz)
     metadata = {
         **recording.metadata,
@@ -128,8 +131,8 @@ def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
             else "sample_rate_hz in the rig file"
         )
         raise InputError(
-            f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g} MHz, for a "
-            f"joint's motion to be seen; correct {where}, or record it anew"
+            f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g}"
+            f" MHz, for a joint's motion to be seen; correct {where}, or record it anew"
         )
 
 
@@ -146,8 +149,8 @@ def _cutoff(
         samples = int(stretches.samples[stretches.longest])
         if samples < 2 * shortest(rate_hz, rate_hz / 8):
             raise InputError(
-                f"the longest stretch without a gap has {_count(samples)}, too few to choose a cut-off from; "
-                "record longer runs, or set filter.cutoff_hz"
+                f"the longest stretch without a gap has {_count(samples)}, too few to choose a"
+                " cut-off from; record longer runs, or set filter.cutoff_hz"
             )
         if not stretches.uniform[stretches.longest]:
             # A uniform grid has more or fewer places than there are samples; never less than half
@@ -157,8 +160,8 @@ def _cutoff(
         return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
     if settings.cutoff_hz >= rate_hz / 2:
         raise InputError(
-            f"filter.cutoff_hz is {settings.cutoff_hz:g}, expected less than half the sample rate of "
-            f"{rate_hz:g} Hz; lower it"
+            f"filter.cutoff_hz is {settings.cutoff_hz:g}, expected less than half the sample rate"
+            f" of {rate_hz:g} Hz; lower it"
         )
     return Cutoff(settings.cutoff_hz, "set by hand")
 
@@ -170,9 +173,9 @@ def _refuse_stretches_that_are_all_edge(
     longest = int(stretches.samples[stretches.longest])
     if longest <= 2 * edge or longest < shortest(rate_hz, cutoff.hz):
         raise InputError(
-            f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f} Hz filter needs; "
-            "the longest has "
-            f"{_count(longest)}: record longer runs, or raise filter.cutoff_hz"
+            f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f}"
+            f" Hz filter needs; the longest has {_count(longest)}: record longer runs, or raise"
+            " filter.cutoff_hz"
         )
 
 

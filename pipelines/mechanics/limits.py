@@ -41,8 +41,8 @@ class Margin:
     def __str__(self) -> str:
         """One sentence."""
         return (
-            f"{self.joint} {self.quantity} goes from {self.lowest:.4g} to {self.highest:.4g} {self.unit}, "
-            f"allowed is {self.low:g} to {self.high:g}"
+            f"{self.joint} {self.quantity} goes from {self.lowest:.4g} to {self.highest:.4g}"
+            f" {self.unit}, allowed is {self.low:g} to {self.high:g}"
         )
 
 

@@ -33,9 +33,10 @@ def _collected() -> tuple[Mechanism, ...]:
         gravity = (one.has_gravity, other.has_gravity)
         if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
             raise InputError(
-                f"two mechanisms have the joints {', '.join(one.kinds)}: {one.name} ({one.joints_in_words}) and "
-                f"{other.name} ({other.joints_in_words}), and no recording could say of which it is; remove one of "
-                "their files from pipelines/mechanics/mechanisms, or let has_gravity tell them apart"
+                f"two mechanisms have the joints {', '.join(one.kinds)}: {one.name}"
+                f" ({one.joints_in_words}) and {other.name} ({other.joints_in_words}), and no"
+                " recording could say of which it is; remove one of their files from"
+                " pipelines/mechanics/mechanisms, or let has_gravity tell them apart"
             )
     return tuple(found)
 
@@ -121,7 +122,8 @@ def machine_of(
         if mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):
             return Machine(mechanism, tuple(joints), scales)
     raise InputError(
-        f"{source or 'the machine'} has joints {in_words(joints)} and gravity {geometry.gravity_m_s2:g} m/s², expected "
-        f"those of a mechanism that exoid knows: {known_in_words()}; correct the metadata, record one joint alone, or "
-        "add a mechanism (docs/mechanisms.md)"
+        f"{source or 'the machine'} has joints {in_words(joints)} and gravity"
+        f" {geometry.gravity_m_s2:g} m/s², expected those of a mechanism that exoid knows:"
+        f" {known_in_words()}; correct the metadata, record one joint alone, or add a mechanism"
+        " (docs/mechanisms.md)"
     )

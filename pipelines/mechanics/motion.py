@@ -288,8 +288,9 @@ def _period(table: Table) -> float | None:
         return None
     if period_s * rate_hz < SHORTEST_PERIOD:
         raise InputError(
-            f"{table.path or 'recording'}: period_s is {period_s:g} s, at {rate_hz:g} Hz less than "
-            f"{SHORTEST_PERIOD} samples, expected the period of the excitation; correct or remove it"
+            f"{table.path or 'recording'}: period_s is {period_s:g} s, at {rate_hz:g} Hz less than"
+            f" {SHORTEST_PERIOD} samples, expected the period of the excitation; correct or"
+            " remove it"
         )
     return float(period_s)
 

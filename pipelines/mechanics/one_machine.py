@@ -13,14 +13,15 @@ def refuse_several_machines(motions: Sequence[Run]) -> None:
     for other in motions[1:]:
         if other.machine.joints != first.machine.joints:
             raise InputError(
-                f"{other.file} has joints {_named(other)}, {first.file} has {_named(first)}; give runs of one machine"
+                f"{other.file} has joints {_named(other)}, {first.file} has {_named(first)}; give"
+                " runs of one machine"
             )
         for key in ("thigh_length_m", "gravity_m_s2"):
             ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
             if ours != theirs:
                 raise InputError(
-                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of one machine, "
-                    "or correct the metadata"
+                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of"
+                    " one machine, or correct the metadata"
                 )
 
 

@@ -43,8 +43,8 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
     names = list(dict.fromkeys(mechanism.name for mechanism in MECHANISMS))
     if settings.name not in names:
         raise SettingsError(
-            f"mechanism.name: found {settings.name!r}, expected a mechanism's name, or a file for a new one "
-            f"(docs/mechanisms.md); {suggestion(settings.name, names)}"
+            f"mechanism.name: found {settings.name!r}, expected a mechanism's name, or a file for a"
+            f" new one (docs/mechanisms.md); {suggestion(settings.name, names)}"
         )
     its = dict.fromkeys(
         mechanism.kinds for mechanism in MECHANISMS if mechanism.name == settings.name
@@ -52,8 +52,9 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
     if settings.kinds not in its:
         others = dict.fromkeys(mechanism.name for mechanism in mechanisms_of(settings.all_joints))
         raise SettingsError(
-            f"mechanism.joints: found {in_words(settings.all_joints)}, expected {' or '.join(map(', '.join, its))} for "
-            f"{settings.name}; correct the joints{''.join(f', or set name to {name}' for name in others)}"
+            f"mechanism.joints: found {in_words(settings.all_joints)}, expected"
+            f" {' or '.join(map(', '.join, its))} for {settings.name}; correct the"
+            f" joints{''.join(f', or set name to {name}' for name in others)}"
         )
 
 
@@ -62,9 +63,9 @@ def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -
     for run in runs if settings.model_fields_set else ():
         if run.machine.mechanism.kinds != settings.kinds:
             raise InputError(
-                f"{run.file} has joints {in_words(run.machine.joints)}, expected those of exoid.toml's [mechanism]: "
-                f"{', '.join(settings.kinds)}; correct its name and joints, or give no exoid.toml: "
-                "files say themselves what they are of"
+                f"{run.file} has joints {in_words(run.machine.joints)}, expected those of"
+                f" exoid.toml's [mechanism]: {', '.join(settings.kinds)}; correct its name and"
+                " joints, or give no exoid.toml: files say themselves what they are of"
             )
 
 

@@ -13,7 +13,8 @@ def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError
     """Return what is wrong with runs in which the torque (N·m or N) of a joint is one ``value`` all
     along."""
     return InputError(
-        f"{', '.join(run.file for run in runs)}: the {'torque' if joint.kind == 'revolute' else 'force'} of "
-        f"{the(joint.name)} is {value:.4g} {joint.unit('torque')} in every row, expected what a drive exerts; check "
-        f"that it was on, and which channel {settings_of(runs[0])} reads"
+        f"{', '.join(run.file for run in runs)}: the"
+        f" {'torque' if joint.kind == 'revolute' else 'force'} of {the(joint.name)} is {value:.4g}"
+        f" {joint.unit('torque')} in every row, expected what a drive exerts; check that it was on,"
+        f" and which channel {settings_of(runs[0])} reads"
     )

@@ -56,7 +56,15 @@ def below(motion: Motion, cutoff_hz: float) -> Motion:
             dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
     valid = motion.valid & ~unsure(motion, cutoff_hz)
     return replace(
-        motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=cutoff_hz,
+        motion,
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        valid=valid,
+        cutoff_hz=cutoff_hz,
         # What a fit to the faster motion estimated is not that of this one.
-        load=None, limb_load=None, body=None, limb_body=None,
-    )  # fmt: skip
+        load=None,
+        limb_load=None,
+        body=None,
+        limb_body=None,
+    )

@@ -48,7 +48,8 @@ class CoefficientFile(Settings):
                 for joint, row in enumerate(getattr(self, name))
             )
             raise ValueError(
-                f"found rows of different length or empty ({counts}), expected as many harmonics in each"
+                f"found rows of different length or empty ({counts}), expected as many harmonics in"
+                " each"
             )
         return self
 
@@ -59,8 +60,8 @@ class CoefficientFile(Settings):
                 for k, value in enumerate(row):
                     if self.unit == "rad" and abs(value) > LARGEST_ANGLE_RAD:
                         raise ValueError(
-                            f'{name}[{joint}][{k}]: found {value} with unit = "rad", which looks like degrees; '
-                            'write unit = "deg"'
+                            f'{name}[{joint}][{k}]: found {value} with unit = "rad", which looks'
+                            ' like degrees; write unit = "deg"'
                         )
         return self
 
@@ -76,7 +77,8 @@ def read_trajectory(path: Path | str) -> Trajectory:
 def _from_toml(path: Path) -> FourierTrajectory:
     if not path.exists():
         raise SettingsError(
-            f"{path}: no such file; {similar_file(path) or 'check the name, or make one with `exoid design`'}"
+            f"{path}: no such file;"
+            f" {similar_file(path) or 'check the name, or make one with `exoid design`'}"
         )
     file = load_toml(path, CoefficientFile)
     to_rad = np.pi / 180.0 if file.unit == "deg" else 1.0
@@ -134,14 +136,16 @@ def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
         len(table.joints),
     ):
         raise ContractError(
-            f"{table.path}: metadata a, b, theta0_rad: found {trajectory.a.shape[0]} rows and "
-            f"{trajectory.theta0.size} mean angles, expected one for each of the {len(table.joints)} joints"
+            f"{table.path}: metadata a, b, theta0_rad: found {trajectory.a.shape[0]} rows and"
+            f" {trajectory.theta0.size} mean angles, expected one for each of the"
+            f" {len(table.joints)} joints"
         )
     told = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
     found = table.stacked("angle")
     row, joint = np.unravel_index(np.argmax(np.abs(found - told)), found.shape)
     if abs(found[row, joint] - told[row, joint]) > ROUNDING_RAD:
         raise ContractError(
-            f"{table.path}: column {table.joints[joint].column('angle')}, row {row}: found {found[row, joint]:.6g}, "
-            f"but the metadata's coefficients give {told[row, joint]:.6g}; drop a and b, or compute the rows from them"
+            f"{table.path}: column {table.joints[joint].column('angle')}, row {row}: found"
+            f" {found[row, joint]:.6g}, but the metadata's coefficients give"
+            f" {told[row, joint]:.6g}; drop a and b, or compute the rows from them"
         )

@@ -24,9 +24,10 @@ def refuse_seen(runs: Sequence[Run]) -> None:
         shared = _shared_rows(one, other) if one.purpose != other.purpose else 0
         if shared > IN_ORDER:
             raise InputError(
-                f"{other.file} ({other.purpose}) and {one.file} ({one.purpose}) have {shared} rows of "
-                f"{one.metadata['imported']['source']} in common, expected none: a model is judged on data that no fit "
-                "has seen; import them again with spans that do not overlap"
+                f"{other.file} ({other.purpose}) and {one.file} ({one.purpose}) have {shared} rows"
+                f" of {one.metadata['imported']['source']} in common, expected none: a model is"
+                " judged on data that no fit has seen; import them again with spans that do not"
+                " overlap"
             )
 
 

@@ -8,9 +8,15 @@ from operator import itemgetter
 from pipelines.settings.rig import Register
 
 _FORMAT = {
-    "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
     "float64": "d",
-}  # fmt: skip
+}
 
 _STEP = {"big": 1, "little": -1}
 

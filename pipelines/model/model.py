@@ -243,7 +243,8 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
             near for name in values if name not in known and (near := closest(name, list(known)))
         ]
         raise InputError(
-            f"{effect.label} has values {', '.join(values) or 'none'}, expected {', '.join(known)}; "
+            f"{effect.label} has values {', '.join(values) or 'none'}, expected"
+            f" {', '.join(known)}; "
             + (f"did you mean {', '.join(meant)}?" if meant else "correct them")
         )
     physical = np.array(

@@ -32,8 +32,9 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
         # Machine and limb move apart: each needs its own.
         parts = [
-            (RigidBody(on=machine), bodies["exo_alone"]), (RigidBody(run="with_human", on=machine), bodies["human"]),
-        ]  # fmt: skip
+            (RigidBody(on=machine), bodies["exo_alone"]),
+            (RigidBody(run="with_human", on=machine), bodies["human"]),
+        ]
     else:
         parts = [(RigidBody(run=run if run in RUNS else None, on=machine), bodies[run])]
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
@@ -52,8 +53,8 @@ def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Ter
     if (twice := beside[["effect", "joint", "run", "name"]].duplicated()).any():
         row = beside[twice].iloc[0]
         raise InputError(
-            f"the parameters table: row {row.name} tells {row['name']} of {row['effect']} again, expected every value "
-            "once; delete one of both rows"
+            f"the parameters table: row {row.name} tells {row['name']} of {row['effect']} again,"
+            " expected every value once; delete one of both rows"
         )
     others = beside.groupby(["effect", "joint", "run"], sort=False, dropna=False)
     return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
@@ -67,8 +68,8 @@ def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     if joint not in ([None] if of.whole_leg else machine.names):
         expected = "none: it is the whole machine's" if of.whole_leg else " or ".join(machine.names)
         raise InputError(
-            f"the parameters table: {of.name} has the joint {joint or 'none'}, expected {expected}; correct its column "
-            "joint, or the joints in its metadata"
+            f"the parameters table: {of.name} has the joint {joint or 'none'}, expected {expected};"
+            " correct its column joint, or the joints in its metadata"
         )
     each_run = bool(of.may_differ and "each_run" in rows and rows["each_run"].any())
     return of(joint=joint, run=run, on=machine, each_run=each_run)
@@ -111,8 +112,9 @@ def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
         (parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)
     ]
     return [
-        f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) has "
-        "mass above the axis where the angle is zero, which is to be hanging straight down: unless the link is "
-        "overbalanced or stands up, the zero is half a turn off, a sign is wrong, or a spring is taken for gravity"
+        f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to"
+        f" {row['ci95_high']:.3g}) has mass above the axis where the angle is zero, which is to be"
+        " hanging straight down: unless the link is overbalanced or stands up, the zero is half a"
+        " turn off, a sign is wrong, or a spring is taken for gravity"
         for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")
     ]

@@ -147,10 +147,12 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
 def _what_changed(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
     """Return the headline: the verdict's change before that of the parameters."""
     of_parameters = (
-        f"{beyond} of {judged} parameters changed beyond their intervals" if beyond
-        else "no parameter changed beyond its interval" if judged
+        f"{beyond} of {judged} parameters changed beyond their intervals"
+        if beyond
+        else "no parameter changed beyond its interval"
+        if judged
         else "nothing that both sessions have can be compared"
-    )  # fmt: skip
+    )
     of_verdict = _verdict_changed(pair)
     said = f"{of_verdict}; {of_parameters}" if of_verdict else of_parameters
     return said[:1].upper() + said[1:]
@@ -187,8 +189,10 @@ class BesideFloor:
     @property
     def words(self) -> str:
         """Say it in a line."""
-        told = [f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
-                for v, f in zip(self.values, self.floors, strict=True)]  # fmt: skip
+        told = [
+            f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
+            for v, f in zip(self.values, self.floors, strict=True)
+        ]
         return f"{self.joint}, {self.model}: {told[0]} → {told[1]}"
 
 
@@ -202,12 +206,15 @@ def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
         kinds.append(("with what each names", "extended_rmse_nm"))
     return [
         BesideFloor(
-            joint, words, torque_unit(first, joint), (first[key][joint], second[key][joint]),
+            joint,
+            words,
+            torque_unit(first, joint),
+            (first[key][joint], second[key][joint]),
             (first["noise_floor_nm"][joint], second["noise_floor_nm"][joint]),
         )
         for joint in first["baseline_rmse_nm"]
         for words, key in kinds
-    ]  # fmt: skip
+    ]
 
 
 def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
@@ -217,8 +224,8 @@ def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, 
         one, other = (told(session) for session in pair)
         if one and other and one != other:
             raise InputError(
-                f"{titles[0]} is of another machine than {titles[1]} ({what}{one}, and {what}{other}), expected two "
-                "sessions of one machine; compare those"
+                f"{titles[0]} is of another machine than {titles[1]} ({what}{one}, and"
+                f" {what}{other}), expected two sessions of one machine; compare those"
             )
 
 
@@ -239,8 +246,9 @@ def refuse_different_units(models: Iterable[ModelChanges]) -> None:
         for change in model.changes:
             if change.first.unit != change.second.unit:
                 raise InputError(
-                    f"{model.files[0]} and {model.files[1]}: {change.words} is in {change.first.unit} and in "
-                    f"{change.second.unit}, expected one unit; compare sessions of one machine"
+                    f"{model.files[0]} and {model.files[1]}: {change.words} is in"
+                    f" {change.first.unit} and in {change.second.unit}, expected one unit; compare"
+                    " sessions of one machine"
                 )
 
 
@@ -275,9 +283,11 @@ def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
     """Return the parameters that a session has alone, those of the causes that it names as such."""
     named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
     return tuple(
-        f"{e.words} of {any_label_in_words(label)}, which it names"
-        if (label := _label(e)) in named
-        else e.words
+        (
+            f"{e.words} of {any_label_in_words(label)}, which it names"
+            if (label := _label(e)) in named
+            else e.words
+        )
         for e in alone
     )
 

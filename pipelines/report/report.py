@@ -348,7 +348,8 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
             "verdict": row["verdict"],
             "tone": TONES.get(row["verdict"], ""),
             "falls": [
-                f"{joint.name} {digits(row[joint.column('rmse_before')])} → {digits(row[joint.column('rmse_after')])}"
+                f"{joint.name} {digits(row[joint.column('rmse_before')])} →"
+                f" {digits(row[joint.column('rmse_after')])}"
                 for joint in session.joints
                 if np.isfinite(row[joint.column("rmse_after")])
             ],
@@ -414,5 +415,9 @@ def _control(verdict: dict[str, Any]) -> dict[str, Any] | None:
     ]
     if not rows:
         return None
-    return {"run": told["run"].replace("_", " "), "joints": list(rows[0]["torque"]), "rows": rows,
-            "settled_s": (told.get("controller") or {}).get("settled_after_s")}  # fmt: skip
+    return {
+        "run": told["run"].replace("_", " "),
+        "joints": list(rows[0]["torque"]),
+        "rows": rows,
+        "settled_s": (told.get("controller") or {}).get("settled_after_s"),
+    }

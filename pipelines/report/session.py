@@ -146,8 +146,8 @@ class Session:
         if len(found) > 1:
             names = ", ".join(self.shown(one.path) for one in found)
             raise InputError(
-                f"{self.folders[0]}: holds {len(found)} verdicts ({names}), expected one; name the folders of one "
-                "diagnosis, or lay two sessions side by side with --compare"
+                f"{self.folders[0]}: holds {len(found)} verdicts ({names}), expected one; name the"
+                " folders of one diagnosis, or lay two sessions side by side with --compare"
             )
         return found[0] if found else None
 
@@ -215,8 +215,14 @@ class Session:
 
     def recorded(self, artifact: Artifact) -> Artifact | None:
         """Return the recording or motion that a replay was made of."""
-        return next((one for one in self.artifacts if one.kind in ("recording", "motion") and artifact.is_made_of(one)),
-                    None)  # fmt: skip
+        return next(
+            (
+                one
+                for one in self.artifacts
+                if one.kind in ("recording", "motion") and artifact.is_made_of(one)
+            ),
+            None,
+        )
 
     def _beside_verdict(self, kind: str) -> Artifact | None:
         if self.verdict_file is None:
@@ -241,7 +247,8 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
         if not folder.is_dir():
             what = "is a file" if folder.exists() else "no such folder"
             raise InputError(
-                f"{folder}: {what}, expected an experiment's folder; name the one that its stages wrote to"
+                f"{folder}: {what}, expected an experiment's folder; name the one that its stages"
+                " wrote to"
             )
         for path in _files(folder):
             try:

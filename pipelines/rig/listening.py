@@ -88,7 +88,8 @@ async def _serving(
     try:
         if not await guarded(server).listen():
             raise DeviceError(
-                f"{place}: cannot listen there; choose a free port with --port, another address with --bind"
+                f"{place}: cannot listen there; choose a free port with --port, another address"
+                " with --bind"
             )
         yield
     finally:
@@ -116,8 +117,8 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         ) from error
     except OSError as error:
         raise DeviceError(
-            f"{link}: cannot become the link to the virtual rig's pseudo-terminal ({error.strerror}); name another "
-            "path in serial_port, or ask for --port 0"
+            f"{link}: cannot become the link to the virtual rig's pseudo-terminal"
+            f" ({error.strerror}); name another path in serial_port, or ask for --port 0"
         ) from error
     try:
         yield wanted
@@ -130,8 +131,8 @@ def _what_is_there(link: Path) -> str:
     # may be its leftover.
     if link.is_symlink():
         return (
-            f"is a link to {link.readlink()} already, as a virtual rig makes one; end the rig that is served there or, "
-            "if none is and a killed one left it, delete the link"
+            f"is a link to {link.readlink()} already, as a virtual rig makes one; end the rig that"
+            " is served there or, if none is and a killed one left it, delete the link"
         )
     return (
         "is there already, where the link to the virtual rig's pseudo-terminal was to be; remove it"
@@ -143,7 +144,8 @@ def _tls_context(line: TlsLine) -> ssl.SSLContext:
     show."""
     if line.rig_certificate is None or line.rig_key is None:
         raise SettingsError(
-            "a virtual rig on a TLS line shows a certificate too; give the line rig_certificate and rig_key"
+            "a virtual rig on a TLS line shows a certificate too; give the line rig_certificate and"
+            " rig_key"
         )
     context, file = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), line.rig_certificate
     try:

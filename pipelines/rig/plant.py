@@ -86,9 +86,13 @@ class Plant:
         self._assembly = assemble(self.model, self.geometry, JOINTS)
         self._of_human = np.array([term.effect.on_limb for term in in_order(self.model)])
         self._drives = make_drives(
-            np.array(settings.kp_nm_rad), np.array(settings.kd_nm_s_rad), np.array(settings.limit_nm),
-            np.array(settings.counts_per_turn), settings.drive_rate_hz, self.sample_rate_hz,
-        )  # fmt: skip
+            np.array(settings.kp_nm_rad),
+            np.array(settings.kd_nm_s_rad),
+            np.array(settings.limit_nm),
+            np.array(settings.counts_per_turn),
+            settings.drive_rate_hz,
+            self.sample_rate_hz,
+        )
         self._loop = loop_at_rest(self._assembly, np.array(settings.rest_rad))
         self._scratch = workspace(len(JOINTS)), stages(len(JOINTS), len(self._loop.memory))
         self._noise = np.random.default_rng(seed)
@@ -120,9 +124,17 @@ class Plant:
         period = 1.0 / self.sample_rate_hz
         reference = np.ascontiguousarray(reference, dtype=float)
         out = _run(
-            self._assembly, self._drives, *self._scratch, self._loop, self._samples, period, reference, enabled,
-            self._of_human, self._warming,
-        )  # fmt: skip
+            self._assembly,
+            self._drives,
+            *self._scratch,
+            self._loop,
+            self._samples,
+            period,
+            reference,
+            enabled,
+            self._of_human,
+            self._warming,
+        )
         angle, velocity, torque, temperature, truth, human = out
         sequence = self._samples + np.arange(n)
         self._samples += n
@@ -239,8 +251,14 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
             a.temperature[j] += period / time_constant * (final - a.temperature[j])
             direction[j] = np.sign(truth[k, DQ, j])
         at = Instant(
-            t + 0.5 * period, truth[k, Q], truth[k, DQ], truth[k, 2], direction, loop.load, temperature[k]
-        )  # fmt: skip
+            t + 0.5 * period,
+            truth[k, Q],
+            truth[k, DQ],
+            truth[k, 2],
+            direction,
+            loop.load,
+            temperature[k],
+        )
         for i in range(a.bounds[4]):
             if of_human[i]:
                 values = a.values[a.value_at[i] : a.value_at[i + 1]]

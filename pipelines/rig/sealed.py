@@ -39,7 +39,8 @@ class SealedFile(Settings):
     def _there_are_enough(self) -> Self:
         if self.hidden > len(self.possibility):
             raise ValueError(
-                f"hidden: found {self.hidden}, expected at most the {len(self.possibility)} possibilities"
+                f"hidden: found {self.hidden}, expected at most the {len(self.possibility)}"
+                " possibilities"
             )
         return self
 

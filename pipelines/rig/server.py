@@ -67,7 +67,8 @@ def build_plant(
     """
     if rig.plant is None:
         raise SettingsError(
-            f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md"
+            f"{path}: plant: missing, so there is no machine to play; add a [plant], see"
+            " docs/rig.md"
         )
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
     cycle_hz = sample_rate_hz or rig.plant.sample_rate_hz
@@ -403,13 +404,13 @@ async def serve(
             queues[key][device.unit] = device.queue
     if port and len(on_line) > 1:
         raise SettingsError(
-            f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the "
-            "rig file names, or give 0 for free ones"
+            f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for"
+            " the places that the rig file names, or give 0 for free ones"
         )
     if port and isinstance(line := rig.line.get(str(next(iter(on_line)))), RtuLine):
         raise SettingsError(
-            f"--port: found {port}, but the rig is on a serial line, {line.serial_port}; leave it out, or give 0 for a "
-            "pseudo-terminal of any name"
+            f"--port: found {port}, but the rig is on a serial line, {line.serial_port}; leave it"
+            " out, or give 0 for a pseudo-terminal of any name"
         )
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:

@@ -35,6 +35,9 @@ class RunSettings(Settings):
     )
     trajectory: str | None = Field(
         None,
-        description="An excitation of its own (Parquet or TOML), relative to this file; else the designed one.",
+        description=(
+            "An excitation of its own (Parquet or TOML), relative to this file; else the designed"
+            " one."
+        ),
     )
     seed: int = Field(0, ge=0, description="Seed of a virtual rig's noise.")

@@ -59,7 +59,8 @@ def load_toml(path: Path | str, model: type[Model]) -> Model:
 def _content(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise SettingsError(
-            f"{path}: no such file; {similar_file(path) or '`exoid init DIR` writes a commented one to start from'}"
+            f"{path}: no such file;"
+            f" {similar_file(path) or '`exoid init DIR` writes a commented one to start from'}"
         )
     if path.is_dir():
         raise SettingsError(f"{path}: is a folder, expected a TOML file; name the file in it")

@@ -10,9 +10,13 @@ if TYPE_CHECKING:
 
 DRIVE = {"speed_rad_s": 20.0, "torque_nm": 500.0}
 SAFETY = {
-    "cuff_force_n": 2000.0, "following_error_rad": 0.5, "watchdog_s": 1.0, "connect_s": 60.0, "control_s": 30.0,
+    "cuff_force_n": 2000.0,
+    "following_error_rad": 0.5,
+    "watchdog_s": 1.0,
+    "connect_s": 60.0,
+    "control_s": 30.0,
     "settle_s": 600.0,
-}  # fmt: skip
+}
 """The most that each may be."""
 MOST_GRAVITY_M_S2 = 30.0
 """More than any planet has; 9.81 in cm/s² is beyond it."""
@@ -34,7 +38,10 @@ def _complaints(rig: "RigSettings") -> Iterator[str]:
             yield from _above(f"drive[{i}].{name}", getattr(drive, name), most)
         for angle in drive.angle_rad:
             if not abs(angle) <= 2 * pi:
-                yield f"drive[{i}].angle_rad: found {angle:g}, expected radians, at most one turn either way"
+                yield (
+                    f"drive[{i}].angle_rad: found {angle:g}, expected radians, at most one turn"
+                    " either way"
+                )
     for name, most in SAFETY.items():
         yield from _above(f"safety.{name}", getattr(rig.safety, name), most)
     for run in ("exo_alone", "with_human"):
@@ -58,7 +65,8 @@ def _slow_stop(drive: "DriveSettings", safety: "SafetySettings", run: str) -> It
     needed = max(speed / STOP_S, speed**2 / 2.0 / room)
     if slowing < needed:
         yield (
-            f"safety.deceleration_rad_s2: found {slowing:g}, with which the {drive.joint} takes {speed / slowing:.3g} "
-            f"s and {speed**2 / 2.0 / slowing:.3g} rad to stop from its {speed:g} rad/s ({run}), expected at least "
-            f"{needed:.3g}: {STOP_S:g} s, and no more than its angle_rad"
+            f"safety.deceleration_rad_s2: found {slowing:g}, with which the {drive.joint} takes"
+            f" {speed / slowing:.3g} s and {speed**2 / 2.0 / slowing:.3g} rad to stop from its"
+            f" {speed:g} rad/s ({run}), expected at least {needed:.3g}: {STOP_S:g} s, and no more"
+            " than its angle_rad"
         )

@@ -26,8 +26,8 @@ class Bounds(Settings):
             )
         if max(abs(low), abs(high)) > 2 * math.pi:
             raise ValueError(
-                f"angle_rad: found [{low}, {high}], expected radians, at most one turn; it looks like degrees, "
-                f"write [{math.radians(low):.4f}, {math.radians(high):.4f}]"
+                f"angle_rad: found [{low}, {high}], expected radians, at most one turn; it looks"
+                f" like degrees, write [{math.radians(low):.4f}, {math.radians(high):.4f}]"
             )
         return self
 
@@ -52,7 +52,9 @@ class NoiseSettings(Settings):
     correlation_s: float = Field(
         0.02,
         ge=0.0,
-        description="Time after which the noise's correlation has fallen to 1/e; 0 for white noise.",
+        description=(
+            "Time after which the noise's correlation has fallen to 1/e; 0 for white noise."
+        ),
     )
     duration_s: float = Field(40.0, gt=0.0, description="Length of the record that will be fitted.")
 
@@ -69,8 +71,10 @@ class DesignSettings(Settings):
     )
     criterion: Literal["log_det", "condition", "scaled_condition"] = Field(
         "log_det",
-        description="What makes a good excitation: log det of A'A/N, or the condition number of the regressor, "
-        "raw (the paper's) or with its columns scaled to unit norm.",
+        description=(
+            "What makes a good excitation: log det of A'A/N, or the condition number of the"
+            " regressor, raw (the paper's) or with its columns scaled to unit norm."
+        ),
     )
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
     bounds: JointBounds = Field(
@@ -86,7 +90,9 @@ class DesignSettings(Settings):
     seconds: float = Field(
         60.0,
         gt=0.0,
-        description="Longest search, wall time; a search it cuts short depends on the machine's speed.",
+        description=(
+            "Longest search, wall time; a search it cuts short depends on the machine's speed."
+        ),
     )
     seed: int = Field(1, ge=0, description="Seed of the search; equal seeds give equal designs.")
     sample_rate_hz: float = Field(
@@ -104,8 +110,8 @@ class DesignSettings(Settings):
             low, high = joint.angle_rad
             if not low < theta0 < high:
                 raise ValueError(
-                    f"theta0_rad: found {theta0} at the {name}, expected between its bounds {low} and {high}; "
-                    'change one of them, or write "free"'
+                    f"theta0_rad: found {theta0} at the {name}, expected between its bounds {low}"
+                    f' and {high}; change one of them, or write "free"'
                 )
         return self
 

@@ -10,6 +10,9 @@ class DiagnoseSettings(Settings):
 
     known: tuple[str, ...] = Field(
         (),
-        description="What the machine's drawings show beside rigid body and friction, as `rotor_inertia@knee` or "
-        "`parallel_spring@hip`: part of the model that everything is held against, its size fitted.",
+        description=(
+            "What the machine's drawings show beside rigid body and friction, as"
+            " `rotor_inertia@knee` or `parallel_spring@hip`: part of the model that everything is"
+            " held against, its size fitted."
+        ),
     )

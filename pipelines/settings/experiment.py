@@ -127,5 +127,6 @@ class Experiment(Settings):
             if run.name == name:
                 return run
         raise SettingsError(
-            f"{self._path}: has no [[run]] named {name}; {suggestion(name, [run.name for run in self.run])}"
+            f"{self._path}: has no [[run]] named {name};"
+            f" {suggestion(name, [run.name for run in self.run])}"
         )

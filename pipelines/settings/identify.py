@@ -24,11 +24,17 @@ class IdentifySettings(Settings):
     )
     method: Method = Field(
         "weighted_least_squares",
-        description="Estimator of both steps; docs/estimators.md says which to use when. Instrumental variables need "
-        "set-points in the recording; they and output error hold whole runs in memory.",
+        description=(
+            "Estimator of both steps; docs/estimators.md says which to use when. Instrumental"
+            " variables need set-points in the recording; they and output error hold whole runs in"
+            " memory."
+        ),
     )
     reversals: bool = Field(
         False,
-        description="Fit samples near a joint's reversals, too. No friction of the model describes what is there, so "
-        "parameters are biased by it; for comparing with what others fit to every sample.",
+        description=(
+            "Fit samples near a joint's reversals, too. No friction of the model describes what is"
+            " there, so parameters are biased by it; for comparing with what others fit to every"
+            " sample."
+        ),
     )

@@ -44,7 +44,10 @@ class SourceSettings(Settings):
     encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
     table: str | None = Field(
         None,
-        description="Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic (ROS).",
+        description=(
+            "Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic"
+            " (ROS)."
+        ),
     )
 
     @field_validator("delimiter")
@@ -52,8 +55,8 @@ class SourceSettings(Settings):
     def _is_one_character(cls, delimiter: str | None) -> str | None:
         if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n\0'):
             raise ValueError(
-                f'found {delimiter!r}, expected one character, such as "," or ";" or "\\t" for tabs; " " stands for '
-                "any number of blanks and tabs"
+                f'found {delimiter!r}, expected one character, such as "," or ";" or "\\t" for'
+                ' tabs; " " stands for any number of blanks and tabs'
             )
         return delimiter
 
@@ -73,7 +76,9 @@ class TimeSettings(Settings):
     )
     restarts: Literal["longest", "split"] = Field(
         "longest",
-        description="Where the clock starts over: keep the longest run, or make a recording of each.",
+        description=(
+            "Where the clock starts over: keep the longest run, or make a recording of each."
+        ),
     )
 
     @model_validator(mode="after")
@@ -92,7 +97,9 @@ class ReadingSettings(Settings):
     column: str | None = Field(None, description="Name of the column.")
     expression: str | None = Field(
         None,
-        description='In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".',
+        description=(
+            'In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".'
+        ),
     )
     unit: str = Field(description="Unit of the readings, after `scale`.")
     scale: float = Field(
@@ -107,20 +114,29 @@ class ReadingSettings(Settings):
     )
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
         None,
-        description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1.",
+        description=(
+            "Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits"
+            " is -1."
+        ),
     )
     wraps_at: float | None = Field(
         None,
         gt=0.0,
         le=LARGEST,
-        description="Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on, from the "
-        "one in which the log begins nearest to `zero`. `signed_bits` beside it changes nothing.",
+        description=(
+            "Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on,"
+            " from the one in which the log begins nearest to `zero`. `signed_bits` beside it"
+            " changes nothing."
+        ),
     )
     begins_at: float | None = Field(
         None,
         ge=-LARGEST,
         le=LARGEST,
-        description="About what raw reading each log begins at, turns counted, where that is not near `zero`.",
+        description=(
+            "About what raw reading each log begins at, turns counted, where that is not near"
+            " `zero`."
+        ),
     )
     range: tuple[float, float] | None = Field(
         None,
@@ -128,7 +144,9 @@ class ReadingSettings(Settings):
     )
     time: str | None = Field(
         None,
-        description="Column with this channel's own time stamps, where it was sampled at other instants.",
+        description=(
+            "Column with this channel's own time stamps, where it was sampled at other instants."
+        ),
     )
 
     @model_validator(mode="after")
@@ -220,7 +238,10 @@ class JointSettings(Settings):
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
     enabled: str | None = Field(
         None,
-        description="Column that is 0 (false) while the drive is off; rows whose torque so says nothing are left out.",
+        description=(
+            "Column that is 0 (false) while the drive is off; rows whose torque so says nothing are"
+            " left out."
+        ),
     )
     angle: JointReadingSettings = Field(
         description="Measured angle, or position of a prismatic joint."
@@ -266,11 +287,16 @@ class RecordingSettings(Settings):
 
     name: str = Field(
         "{file}_{purpose}",
-        description="Its name; {file} is the source's, without its ending, and {folder} that of the folder it lies in.",
+        description=(
+            "Its name; {file} is the source's, without its ending, and {folder} that of the folder"
+            " it lies in."
+        ),
     )
     files: str = Field(
         "*",
-        description='Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".',
+        description=(
+            'Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".'
+        ),
     )
     purpose: Literal["train", "validate"] = Field(
         description="To be fitted to, or to be judged on."
@@ -295,12 +321,13 @@ class RecordingSettings(Settings):
     def _is_a_files_name(cls, name: str) -> str:
         if re.fullmatch(r"""[^\x00-\x1f/\\:*?"<>|]+""", name) is None:
             raise ValueError(
-                f"found {name!r}, expected a file's name without its folder, and without control characters and "
-                '/ \\ : * ? " < > |; -o names the folder'
+                f"found {name!r}, expected a file's name without its folder, and without control"
+                ' characters and / \\ : * ? " < > |; -o names the folder'
             )
         if strange := set(re.findall(r"\{(.*?)\}", name)) - NAMED_AFTER:
             raise ValueError(
-                f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or {{purpose}}"
+                f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or"
+                " {purpose}"
             )
         return name
 
@@ -363,14 +390,16 @@ class ImportMap(Settings):
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:
                 raise ValueError(
-                    f"{place}.time: found {reading.time!r} beside time.rate_hz, expected time.column: nobody knows "
-                    "when on that clock the rows began; name the column of a clock of theirs, or leave this out"
+                    f"{place}.time: found {reading.time!r} beside time.rate_hz, expected"
+                    " time.column: nobody knows when on that clock the rows began; name the column"
+                    " of a clock of theirs, or leave this out"
                 )
             if reading.column is not None:
                 owner = owners.setdefault(reading.column, place)
                 if owner != place:
                     raise ValueError(
-                        f"{place}.column: found {reading.column!r}, which is {owner} already; correct one of them"
+                        f"{place}.column: found {reading.column!r}, which is {owner} already;"
+                        " correct one of them"
                     )
         return self
 

@@ -115,8 +115,9 @@ def refuse_passphrase(key: Path | None) -> Callable[[], str]:
 
     def refuse() -> str:
         raise SettingsError(
-            f"{key}: is protected by a passphrase, expected a key without one, as nobody is asked while a leg moves; "
-            f"`openssl pkey -in {key} -out FILE` makes one, to be kept where nobody else may read it"
+            f"{key}: is protected by a passphrase, expected a key without one, as nobody is asked"
+            f" while a leg moves; `openssl pkey -in {key} -out FILE` makes one, to be kept where"
+            " nobody else may read it"
         )
 
     return refuse

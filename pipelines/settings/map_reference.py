@@ -14,7 +14,8 @@ from pipelines.settings.units import ALIASES, UNITS
 INTRODUCTION = """\
 # Every key of a map for `exoid import`
 
-Written by `make docs` from `pipelines/settings/`; change it there. [import.md](import.md) tells how to write a map.
+Written by `make docs` from `pipelines/settings/`; change it there. [import.md](import.md) tells how
+to write a map.
 
 Outside of all tables stands `rig`, the name of the machine.
 """
@@ -34,11 +35,10 @@ def reference() -> str:
 
 
 def _units() -> str:
-    dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
-    rows = [
-        f"| {dimension} | {', '.join(f'`{name}`' for name, unit in UNITS.items() if unit.dimension == dimension)} |"
-        for dimension in dimensions
-    ]
+    names: dict[str, list[str]] = {}
+    for name, unit in UNITS.items():
+        names.setdefault(unit.dimension, []).append(f"`{name}`")
+    rows = [f"| {dimension} | {', '.join(own)} |" for dimension, own in names.items()]
     also = ", ".join(f"`{alias}` for `{name}`" for alias, name in ALIASES.items())
     return (
         "## Units\n\n| of | written |\n|---|---|\n" + "\n".join(rows) + f"\n\nAlso known: {also}."
@@ -49,7 +49,8 @@ def _drive_trains() -> str:
     """Return which keys lead from a unit to what a joint's quantity is."""
     dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
     rows = [
-        f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} | {_geared(target)} |"
+        f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} |"
+        f" {_geared(target)} |"
         for target in dict.fromkeys(
             target for kinds in TARGETS.values() for target in kinds.values()
         )

@@ -30,13 +30,17 @@ class MechanismSettings(Settings):
     name: str = Field(
         "leg",
         pattern=r"^[a-z][a-z0-9_]*$",
-        description='"leg": two revolute joints in series, any double pendulum. "single": one joint. '
-        "Or a mechanism of your own, by its name.",
+        description=(
+            '"leg": two revolute joints in series, any double pendulum. "single": one joint. '
+            "Or a mechanism of your own, by its name."
+        ),
     )
     joints: tuple[JointSettings, ...] = Field(
         (),
-        description="Name and kind of each joint from the base on; a leg without it has hip and knee, a single one "
-        "revolute joint.",
+        description=(
+            "Name and kind of each joint from the base on; a leg without it has hip and knee, a"
+            " single one revolute joint."
+        ),
     )
     thigh_length_m: float = Field(
         0.38952,
@@ -48,7 +52,10 @@ class MechanismSettings(Settings):
         9.8,
         ge=0.0,
         le=MOST_GRAVITY_M_S2,
-        description="Acceleration of gravity; the paper's value. 0 for joints with vertical axes and for level slides.",
+        description=(
+            "Acceleration of gravity; the paper's value. 0 for joints with vertical axes and for"
+            " level slides."
+        ),
     )
 
     @model_validator(mode="after")
@@ -57,8 +64,9 @@ class MechanismSettings(Settings):
         (``mechanics/read.py``)."""
         if not self.joints and self.name not in USUAL_JOINTS:
             raise ValueError(
-                f"name: found {self.name!r} without joints, which only {' and '.join(USUAL_JOINTS)} may leave out; "
-                f"add [[mechanism.joints]], or correct the name: {suggestion(self.name, list(USUAL_JOINTS))}"
+                f"name: found {self.name!r} without joints, which only {' and '.join(USUAL_JOINTS)}"
+                " may leave out; add [[mechanism.joints]], or correct the name:"
+                f" {suggestion(self.name, list(USUAL_JOINTS))}"
             )
         if len({joint.name for joint in self.joints}) < len(self.joints):
             raise ValueError("joints: found a name twice, expected each once")
@@ -68,9 +76,10 @@ class MechanismSettings(Settings):
         """Refuse what a command that works on hip and knee alone cannot do."""
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
-                f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg with hip and knee: "
-                f"{command} is for these alone; record other machines with their own tools, and give the recordings to "
-                "`exoid identify` and `exoid diagnose`"
+                f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg"
+                f" with hip and knee: {command} is for these alone; record other machines with"
+                " their own tools, and give the recordings to `exoid identify` and `exoid"
+                " diagnose`"
             )
 
     @property

@@ -63,7 +63,9 @@ class PlantSettings(Settings):
     effects: tuple[PlantEffect, ...] = Field((), description="What else the plant has, openly.")
     sealed: str | None = Field(
         None,
-        description="File with effects that only the rig reads, relative to this one; see docs/rig.md.",
+        description=(
+            "File with effects that only the rig reads, relative to this one; see docs/rig.md."
+        ),
     )
     thigh_length_m: float = Field(
         0.38952, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis."
@@ -80,7 +82,9 @@ class PlantSettings(Settings):
     heartbeat_s: float | None = Field(
         None,
         gt=0.0,
-        description="How long a drive may be told nothing before it slows down and disables itself.",
+        description=(
+            "How long a drive may be told nothing before it slows down and disables itself."
+        ),
     )
     clock_ppm: Pair = Field(
         (0.0, 0.0), description="How much faster than the host's each drive's clock runs."

@@ -34,22 +34,43 @@ REGISTERS = {
 """Registers of 16 bits that a value takes."""
 
 UNITS = {
-    "1": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295,
-    "rad/s": 1.0, "deg/s": 0.017453292519943295, "rpm": 0.10471975511965977,
-    "A": 1.0, "mA": 1e-3, "N": 1.0, "kN": 1e3, "°C": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6,
-}  # fmt: skip
+    "1": 1.0,
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": 0.017453292519943295,
+    "rad/s": 1.0,
+    "deg/s": 0.017453292519943295,
+    "rpm": 0.10471975511965977,
+    "A": 1.0,
+    "mA": 1e-3,
+    "N": 1.0,
+    "kN": 1e3,
+    "°C": 1.0,
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+}
 """SI value of one of each unit that a register can hold."""
 
 Unit = Literal[
     "1", "rad", "mrad", "deg", "rad/s", "deg/s", "rpm", "A", "mA", "N", "kN", "°C", "s", "ms", "us"
-]  # fmt: skip
+]
 
 DIMENSION = {
-    "sequence": ("1",), "status": ("1",), "control": ("1",), "heartbeat": ("1",), "time": ("s", "ms", "us"),
-    "angle": ("rad", "mrad", "deg"), "reference": ("rad", "mrad", "deg"), "velocity": ("rad/s", "deg/s", "rpm"),
-    "current": ("A", "mA"), "temperature": ("°C",),
-    "force_x": ("N", "kN"), "force_y": ("N", "kN"), "force_z": ("N", "kN"),
-}  # fmt: skip
+    "sequence": ("1",),
+    "status": ("1",),
+    "control": ("1",),
+    "heartbeat": ("1",),
+    "time": ("s", "ms", "us"),
+    "angle": ("rad", "mrad", "deg"),
+    "reference": ("rad", "mrad", "deg"),
+    "velocity": ("rad/s", "deg/s", "rpm"),
+    "current": ("A", "mA"),
+    "temperature": ("°C",),
+    "force_x": ("N", "kN"),
+    "force_y": ("N", "kN"),
+    "force_z": ("N", "kN"),
+}
 """Units in which each quantity can be had."""
 
 MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
@@ -221,8 +242,8 @@ class RingSettings(Settings):
         if (self.fifo is None) != (len(found) == 3) or (self.fifo is not None and found):
             found |= set() if self.fifo is None else {"fifo"}
             raise ValueError(
-                f"ring: found {', '.join(sorted(found)) or 'neither'}, "
-                "expected newest, address and capacity (a ring that FC03 reads), or fifo (a queue that FC24 reads)"
+                f"ring: found {', '.join(sorted(found)) or 'neither'}, expected newest, address and"
+                " capacity (a ring that FC03 reads), or fifo (a queue that FC24 reads)"
             )
         length = max(r.address + r.registers for r in registers_of(self.record).values())
         if length > self.words:
@@ -231,7 +252,8 @@ class RingSettings(Settings):
             )
         if self.fifo is not None and self.words > MOST_QUEUED:
             raise ValueError(
-                f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer carries"
+                f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer"
+                " carries"
             )
         if self.newest is not None:
             _refuse_what_does_not_count(self.newest, "newest")
@@ -248,7 +270,8 @@ class RingSettings(Settings):
         end = self.address + self.capacity * self.words
         if end > 65536:
             raise ValueError(
-                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535; lower it"
+                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535;"
+                " lower it"
             )
         if self.address <= newest.address < end:
             raise ValueError(
@@ -259,8 +282,9 @@ class RingSettings(Settings):
             # Else records would change places when the counter begins anew.
             if not register.type.startswith("u") or span % self.capacity:
                 raise ValueError(
-                    f"{name}.type: found {register.type} with a capacity of {self.capacity}, expected an unsigned "
-                    "counter whose range is a multiple of the capacity (any power of 2)"
+                    f"{name}.type: found {register.type} with a capacity of {self.capacity},"
+                    " expected an unsigned counter whose range is a multiple of the capacity (any"
+                    " power of 2)"
                 )
 
 
@@ -284,8 +308,10 @@ class DriveMap(Settings):
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     own_scale: bool = Field(
         False,
-        description="Set-points mean the same place as angles though their type, order, scale or offset is another; "
-        "else that is taken for a slip, and refused.",
+        description=(
+            "Set-points mean the same place as angles though their type, order, scale or offset is"
+            " another; else that is taken for a slip, and refused."
+        ),
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
@@ -323,8 +349,8 @@ class DriveMap(Settings):
         for bit in self.faults:
             if not self.fault_mask >> bit & 1:
                 raise ValueError(
-                    f"faults: bit {bit} is not one of fault_mask 0x{self.fault_mask:04X}; add 0x{1 << bit:04X} to the "
-                    "mask, or leave the name out"
+                    f"faults: bit {bit} is not one of fault_mask 0x{self.fault_mask:04X}; add"
+                    f" 0x{1 << bit:04X} to the mask, or leave the name out"
                 )
         if self.enabled_value & ~self.enabled_mask:
             raise ValueError(
@@ -340,8 +366,8 @@ class DriveMap(Settings):
         for name, counter in counters.items():
             if counter and counter.type != self.read.sequence.type:
                 raise ValueError(
-                    f"ring.{name}.type: found {counter.type}, expected {self.read.sequence.type} as in "
-                    "read.sequence: it is the same counter"
+                    f"ring.{name}.type: found {counter.type}, expected {self.read.sequence.type} as"
+                    " in read.sequence: it is the same counter"
                 )
         return self
 
@@ -350,19 +376,20 @@ class DriveMap(Settings):
         fault."""
         if self.enabled_mask and "enabled_value" not in self.model_fields_set:
             raise ValueError(
-                f"enabled_value: missing beside enabled_mask 0x{self.enabled_mask:04X}, expected what these bits are "
-                "while the drive is enabled, see its manual; give it"
+                f"enabled_value: missing beside enabled_mask 0x{self.enabled_mask:04X}, expected"
+                " what these bits are while the drive is enabled, see its manual; give it"
             )
         if both := self.enabled_value & self.fault_mask:
             raise ValueError(
-                f"fault_mask: found 0x{self.fault_mask:04X}, of which 0x{both:04X} is in enabled_value "
-                f"0x{self.enabled_value:04X} too, expected other bits: an enabled drive has no fault; correct one of "
-                "them"
+                f"fault_mask: found 0x{self.fault_mask:04X}, of which 0x{both:04X} is in"
+                f" enabled_value 0x{self.enabled_value:04X} too, expected other bits: an enabled"
+                " drive has no fault; correct one of them"
             )
         if self.enabled_mask and not self.enabled_mask & ~self.fault_mask:
             raise ValueError(
-                f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask 0x{self.fault_mask:04X}, "
-                "expected a bit that tells an enabled drive from a disabled one; correct one of them"
+                f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask"
+                f" 0x{self.fault_mask:04X}, expected a bit that tells an enabled drive from a"
+                " disabled one; correct one of them"
             )
 
     @model_validator(mode="after")
@@ -388,13 +415,15 @@ class DriveMap(Settings):
                 continue
             if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
                 raise ValueError(
-                    f"{name}: found {register.type} with scale {register.scale:g} and offset {register.offset:g}, "
-                    "expected uint16, uint32 or uint64 as it is: its bits have meanings of their own; correct it"
+                    f"{name}: found {register.type} with scale {register.scale:g} and offset"
+                    f" {register.offset:g}, expected uint16, uint32 or uint64 as it is: its bits"
+                    " have meanings of their own; correct it"
                 )
             for key, value in told.items():
                 if value is not None and not register.holds(value, value):
                     raise ValueError(
-                        f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of them"
+                        f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of"
+                        " them"
                     )
         return self
 
@@ -437,21 +466,24 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
         if register.unit not in DIMENSION[quantity]:
             allowed = " or ".join(DIMENSION[quantity])
             raise ValueError(
-                f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the unit"
+                f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the"
+                " unit"
             )
     for quantity in ("sequence", "heartbeat"):
         if quantity in registers:
             _refuse_what_does_not_count(registers[quantity], f"{name}.{quantity}")
     if "time" in registers and registers["time"].scale < 0.0:
         raise ValueError(
-            f"{name}.time.scale: found {registers['time'].scale:g}, expected a clock that goes forward; turn its sign"
+            f"{name}.time.scale: found {registers['time'].scale:g}, expected a clock that goes"
+            " forward; turn its sign"
         )
     taken: dict[int, str] = {}
     for quantity, register in registers.items():
         for address in range(register.address, register.address + register.registers):
             if address in taken:
                 raise ValueError(
-                    f"{name}.{quantity}: register {address} is part of {taken[address]} too; correct one address"
+                    f"{name}.{quantity}: register {address} is part of {taken[address]} too;"
+                    " correct one address"
                 )
             taken[address] = quantity
     length = max(taken) - min(taken) + 1
@@ -467,8 +499,9 @@ def _refuse_what_does_not_count(register: Register, name: str) -> None:
     guess."""
     if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
         raise ValueError(
-            f"{name}: found {register.type} with scale {register.scale:g} and offset {register.offset:g}, expected "
-            "uint16, uint32 or uint64 as it is: it is a count; correct it"
+            f"{name}: found {register.type} with scale {register.scale:g} and offset"
+            f" {register.offset:g}, expected uint16, uint32 or uint64 as it is: it is a count;"
+            " correct it"
         )
 
 
@@ -479,8 +512,9 @@ def _refuse_gap(block: Settings, name: str) -> None:
     }
     if nameless := sorted(set(range(min(named), max(named))) - named):
         raise ValueError(
-            f"{name}: names nothing at register {nameless[0]} between {min(named)} and {max(named)}, expected a block "
-            "without gaps, which is written as a whole; map the drive's registers side by side"
+            f"{name}: names nothing at register {nameless[0]} between {min(named)} and"
+            f" {max(named)}, expected a block without gaps, which is written as a whole; map the"
+            " drive's registers side by side"
         )
 
 
@@ -493,7 +527,8 @@ def _refuse_looser(settings: "DriveSettings | SafetySettings", *names: str) -> N
         found, allowed = getattr(settings.with_human, name), getattr(settings, name)
         if found is not None and found > allowed:
             raise ValueError(
-                f"with_human.{name}: found {found:g}, expected at most {name} ({allowed:g}); {TIGHTER}"
+                f"with_human.{name}: found {found:g}, expected at most {name} ({allowed:g});"
+                f" {TIGHTER}"
             )
 
 
@@ -517,7 +552,8 @@ class DeviceSettings(Settings):
         for key in ("host", "port"):
             if self.line is not None and key in self.model_fields_set:
                 raise ValueError(
-                    f"{key}: found beside line = {self.line!r}, which says where the device is; remove one"
+                    f"{key}: found beside line = {self.line!r}, which says where the device is;"
+                    " remove one"
                 )
         return self
 
@@ -570,8 +606,8 @@ class DriveSettings(DeviceSettings):
         low, high = self.with_human.angle_rad or self.angle_rad
         if low < self.angle_rad[0] or high > self.angle_rad[1]:
             raise ValueError(
-                f"with_human.angle_rad: found [{low:g}, {high:g}], expected within angle_rad [{self.angle_rad[0]:g}, "
-                f"{self.angle_rad[1]:g}]; {TIGHTER}"
+                f"with_human.angle_rad: found [{low:g}, {high:g}], expected within angle_rad"
+                f" [{self.angle_rad[0]:g}, {self.angle_rad[1]:g}]; {TIGHTER}"
             )
         _refuse_looser(self, "speed_rad_s", "torque_nm")
         return self
@@ -592,8 +628,10 @@ class SensorSettings(DeviceSettings):
         1,
         ge=1,
         le=MOST_EVERY,
-        description="Cycles from one reading to the next; rows between hold no force. Sensors with the same number "
-        "take turns.",
+        description=(
+            "Cycles from one reading to the next; rows between hold no force. Sensors with the same"
+            " number take turns."
+        ),
     )
 
 
@@ -642,12 +680,16 @@ class SafetySettings(Settings):
     reply_s: float | None = Field(
         None,
         gt=0.0,
-        description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s.",
+        description=(
+            "Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
+        ),
     )
     heartbeat_s: float | None = Field(
         None,
         gt=0.0,
-        description="Time-out of the drives' own watchdogs, as it is set in them; else it is not known.",
+        description=(
+            "Time-out of the drives' own watchdogs, as it is set in them; else it is not known."
+        ),
     )
     connect_s: float = Field(
         5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply."
@@ -677,8 +719,8 @@ class SafetySettings(Settings):
     def _a_reply_is_awaited_less_long_than_the_watchdog(self) -> Self:
         if self.longest_reply_s >= self.watchdog_s:
             raise ValueError(
-                f"reply_s: found {self.reply_s:g}, expected less than watchdog_s ({self.watchdog_s:g}), or one lost "
-                "reply stops the run; leave it out"
+                f"reply_s: found {self.reply_s:g}, expected less than watchdog_s"
+                f" ({self.watchdog_s:g}), or one lost reply stops the run; leave it out"
             )
         return self
 
@@ -713,7 +755,9 @@ class RigSettings(Settings):
     )
     sampling: Literal["cyclic", "recorder"] = Field(
         "cyclic",
-        description="Samples are fetched with each set-point, or drained from the drives' own rings.",
+        description=(
+            "Samples are fetched with each set-point, or drained from the drives' own rings."
+        ),
     )
     record_rate_hz: float | None = Field(
         None, gt=0.0, description="Samples a second in the drives' rings."
@@ -745,8 +789,8 @@ class RigSettings(Settings):
             for i, device in enumerate(getattr(self, kind)):
                 if device.map not in known:
                     raise ValueError(
-                        f"{kind}[{i}].map: found {device.map!r}, expected a table below [map.{kind}]: "
-                        f"{', '.join(known) or 'there is none'}"
+                        f"{kind}[{i}].map: found {device.map!r}, expected a table below"
+                        f" [map.{kind}]: {', '.join(known) or 'there is none'}"
                     )
         self._refuse_bad_lines()
         for cuff, times in Counter(sensor.cuff for sensor in self.sensor).items():
@@ -756,7 +800,8 @@ class RigSettings(Settings):
                 )
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError(
-                "plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays"
+                "plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it"
+                " plays"
             )
         self._refuse_impossible_sampling()
         self._refuse_torque_that_is_never_told()
@@ -777,9 +822,9 @@ class RigSettings(Settings):
             ):
                 if limits and not margin < (limits[1] - limits[0]) / 2.0:
                     raise ValueError(
-                        f"safety.angle_margin_rad: found {margin:g}, expected less than "
-                        f"{(limits[1] - limits[0]) / 2.0:g}, half of the {drive.joint}'s {key}, or no set-point keeps "
-                        "it; lower it"
+                        f"safety.angle_margin_rad: found {margin:g}, expected less than"
+                        f" {(limits[1] - limits[0]) / 2.0:g}, half of the {drive.joint}'s {key}, or"
+                        " no set-point keeps it; lower it"
                     )
 
     def _refuse_impossible_set_points(self) -> None:
@@ -792,16 +837,16 @@ class RigSettings(Settings):
             register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
             if not register.holds(low, high):
                 raise ValueError(
-                    f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
-                    "limits; correct its type or scale"
+                    f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad,"
+                    f" the {drive.joint}'s limits; correct its type or scale"
                 )
             low, high = drive.with_human.angle_rad or drive.angle_rad
             coarsest = min(following_rad, high - low) / 4.0
             if register.step > coarsest:
                 raise ValueError(
-                    f"map.drive.{drive.map}.write.reference: one count is {register.step:.3g} rad, expected at most "
-                    f"{coarsest:.3g} rad, a quarter of safety.following_error_rad or of the {drive.joint}'s range; "
-                    "correct its scale"
+                    f"map.drive.{drive.map}.write.reference: one count is {register.step:.3g} rad,"
+                    f" expected at most {coarsest:.3g} rad, a quarter of safety.following_error_rad"
+                    f" or of the {drive.joint}'s range; correct its scale"
                 )
 
     def _refuse_torque_that_is_never_told(self) -> None:
@@ -811,8 +856,9 @@ class RigSettings(Settings):
             loop = self.controller.get(drive.joint)
             if loop and loop.limit_nm is not None and drive.torque_nm >= loop.limit_nm:
                 raise ValueError(
-                    f"torque_nm: found {drive.torque_nm:g} of the {drive.joint}, expected less than its "
-                    f"controller.limit_nm ({loop.limit_nm:g}), which the drive never goes beyond; lower it"
+                    f"torque_nm: found {drive.torque_nm:g} of the {drive.joint}, expected less than"
+                    f" its controller.limit_nm ({loop.limit_nm:g}), which the drive never goes"
+                    " beyond; lower it"
                 )
 
     def _refuse_limits_that_registers_cannot_tell(self) -> None:
@@ -821,8 +867,10 @@ class RigSettings(Settings):
         for drive in self.drive:
             use, most = self.map.drive[drive.map], drive.torque_nm / drive.torque_per_ampere
             reach = {
-                "angle": drive.angle_rad, "velocity": (-drive.speed_rad_s, drive.speed_rad_s), "current": (-most, most),
-            }  # fmt: skip
+                "angle": drive.angle_rad,
+                "velocity": (-drive.speed_rad_s, drive.speed_rad_s),
+                "current": (-most, most),
+            }
             blocks = {"read": use.read} | ({"ring.record": use.ring.record} if use.ring else {})
             for block, registers in blocks.items():
                 for name, limits in reach.items():
@@ -845,8 +893,8 @@ class RigSettings(Settings):
         for device in devices:
             if device.line is not None and device.line not in self.line:
                 raise ValueError(
-                    f"line: found {device.line!r} at unit {device.unit}, expected a table below [line]: "
-                    f"{', '.join(self.line) or 'there is none'}"
+                    f"line: found {device.line!r} at unit {device.unit}, expected a table below"
+                    f" [line]: {', '.join(self.line) or 'there is none'}"
                 )
         for name in self.line:
             if name not in {device.line for device in devices}:
@@ -906,19 +954,21 @@ class RigSettings(Settings):
         drifts = self.plant is not None and any((*self.plant.clock_ppm, *self.plant.clock_offset_s))
         if self.clock == "lockstep" and (self.clocks == "own" or drifts):
             raise ValueError(
-                'clock: found "lockstep", in which no time goes by; clocks of their own need "real_time"'
+                'clock: found "lockstep", in which no time goes by; clocks of their own need'
+                ' "real_time"'
             )
         if self.sampling == "cyclic":
             return
         if self.record_rate_hz is None:
             raise ValueError(
-                'record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\' rings'
+                'record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\''
+                " rings"
             )
         for i, drive in enumerate(self.drive):
             if self.map.drive[drive.map].ring is None:
                 raise ValueError(
-                    f'drive[{i}].map: {drive.map} has no ring, which sampling = "recorder" drains; add '
-                    f'[map.drive.{drive.map}.ring], or set sampling = "cyclic"'
+                    f'drive[{i}].map: {drive.map} has no ring, which sampling = "recorder" drains;'
+                    f' add [map.drive.{drive.map}.ring], or set sampling = "cyclic"'
                 )
 
     def samples_per_cycle(self, sample_rate_hz: float) -> int:
@@ -929,15 +979,17 @@ class RigSettings(Settings):
         ratio = self.record_rate_hz / sample_rate_hz
         if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
             raise SettingsError(
-                f"record_rate_hz: found {self.record_rate_hz:g} with set-points at {sample_rate_hz:g} Hz, expected a "
-                "whole multiple; change it or acquire.sample_rate_hz"
+                f"record_rate_hz: found {self.record_rate_hz:g} with set-points at"
+                f" {sample_rate_hz:g} Hz, expected a whole multiple; change it or"
+                " acquire.sample_rate_hz"
             )
         for name, drive in self.map.drive.items():
             if drive.ring and drive.ring.capacity and drive.ring.capacity < 2 * ratio:
                 raise SettingsError(
-                    f"map.drive.{name}.ring.capacity: found {drive.ring.capacity} with {ratio:.0f} records from one "
-                    f"set-point to the next, expected at least {2 * ratio:.0f}, or they are overwritten before they "
-                    "are read; lower record_rate_hz or raise acquire.sample_rate_hz"
+                    f"map.drive.{name}.ring.capacity: found {drive.ring.capacity} with {ratio:.0f}"
+                    f" records from one set-point to the next, expected at least {2 * ratio:.0f},"
+                    " or they are overwritten before they are read; lower record_rate_hz or raise"
+                    " acquire.sample_rate_hz"
                 )
         return round(ratio)
 
@@ -992,7 +1044,7 @@ def _refuse_short(
     low, high = register.span
     if not (low < limits[0] and limits[1] < high):
         raise ValueError(
-            f"{key}: an {register.type} of this scale tells {low:.4g} to {high:.4g}, expected more than "
-            f"{limits[0]:.4g} to {limits[1]:.4g} (SI units), what the limits of {whose} are there; correct its type or "
-            "scale, or lower the limits"
+            f"{key}: an {register.type} of this scale tells {low:.4g} to {high:.4g}, expected more"
+            f" than {limits[0]:.4g} to {limits[1]:.4g} (SI units), what the limits of {whose} are"
+            " there; correct its type or scale, or lower the limits"
         )

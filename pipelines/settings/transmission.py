@@ -53,9 +53,15 @@ STEPS = (
 )
 KEYS = tuple(dict.fromkeys(step.key for step in STEPS))
 GEARED = {
-    "angle": -1, "length": -1, "angular velocity": -1, "velocity": -1, "torque": 1, "force": 1, "current": 0,
+    "angle": -1,
+    "length": -1,
+    "angular velocity": -1,
+    "velocity": -1,
+    "torque": 1,
+    "force": 1,
+    "current": 0,
     "temperature": 0,
-}  # fmt: skip
+}
 """Power of the gear ratio, by what arrives at the joint: motion is divided by it, torque is
 multiplied."""
 

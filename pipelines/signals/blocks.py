@@ -35,8 +35,11 @@ class BlockAverage:
     def as_metadata(self, rate_hz: float) -> dict[str, Any]:
         """Return what a motion's metadata say of this filter (CONTRACTS, motion/1)."""
         return {
-            "kind": "block_average", "order": 1, "cutoff_hz": self.cutoff_hz(rate_hz), "decimation": self.decimation,
-        }  # fmt: skip
+            "kind": "block_average",
+            "order": 1,
+            "cutoff_hz": self.cutoff_hz(rate_hz),
+            "decimation": self.decimation,
+        }
 
     def starts(self, segment: NDArray, before: int = 0) -> NDArray:
         """Return the first sample of each whole block, given each sample's segment number (n,).

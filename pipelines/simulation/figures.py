@@ -47,9 +47,14 @@ def draw_sweep(sweep: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, cho
             )
         axis.axvline(chosen, color=GREY, lw=0.9, ls=":")
         axis.annotate(
-            "chosen", (chosen, 0.97), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points",
-            color=GREY, va="top",
-        )  # fmt: skip
+            "chosen",
+            (chosen, 0.97),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            color=GREY,
+            va="top",
+        )
         axis.set(
             xlabel="feedback gain Kv, N·m·s/rad",
             ylabel="largest settled error, mrad",

@@ -48,7 +48,10 @@ def why_no_closed_loop(motion: Motion) -> str:
         if about is None:
             return f"its metadata names no controller of {the(joint)}"
         if about["type"].lower() != "pd":
-            return f"the controller of its {joint} is of type {about['type']}, and exoid simulates pd only"
+            return (
+                f"the controller of its {joint} is of type {about['type']}, and exoid simulates pd"
+                " only"
+            )
         if about.get("kp_nm_rad") is None or about.get("kd_nm_s_rad") is None:
             return f"the controller of its {joint} lacks kp_nm_rad or kd_nm_s_rad"
     if motion.reference is None:

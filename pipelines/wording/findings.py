@@ -108,7 +108,9 @@ def shares(verdict: Mapping[str, Any]) -> list[Shares]:
         depends = {one["variable"]: one["share_before"] for one in verdict["depends_on"][joint]}
         found.append(
             Shares(
-                joint, told["rms_nm"], {part: told[part] or 0.0 for part in PARTS},
+                joint,
+                told["rms_nm"],
+                {part: told[part] or 0.0 for part in PARTS},
                 told["with_person_only"],
                 {
                     "position" if slides and name == "angle" else name: depends[name]
@@ -116,7 +118,7 @@ def shares(verdict: Mapping[str, Any]) -> list[Shares]:
                     if name in depends
                 },
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -12,14 +12,23 @@ follows."""
 OTHER = "other"
 """In the kind of a law of what the other joint does."""
 FAMILIES = {
-    "angle": "angle", "other_angle": "angle", "both_angles": "angle",
-    "friction_by_angle": "angle", "friction_by_other_angle": "angle",
-    "speed": "speed", "other_speed": "speed",
-    "load": "load", "other_load": "load",
+    "angle": "angle",
+    "other_angle": "angle",
+    "both_angles": "angle",
+    "friction_by_angle": "angle",
+    "friction_by_other_angle": "angle",
+    "speed": "speed",
+    "other_speed": "speed",
+    "load": "load",
+    "other_load": "load",
     "inertia_by_angle": "transmission",
-    "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
-    "across_joints": "angle", "quantisation": "sensor",
-}  # fmt: skip
+    "gain_over_time": "time",
+    "friction_over_time": "time",
+    "time": "time",
+    "hum": "time",
+    "across_joints": "angle",
+    "quantisation": "sensor",
+}
 """The family of each kind of smooth law."""
 IN_WORDS = {
     "angle": "a law of {joint}'s angle",

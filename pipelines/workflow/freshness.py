@@ -113,7 +113,9 @@ class Judge:
         """Yield what the last try left in the place of a recording."""
         journal, aborted = journal_of(target), aborted_of(target)
         if journal.exists():
-            yield f"a killed run left {self._name(journal)}; `exoid recover` makes a recording of it"
+            yield (
+                f"a killed run left {self._name(journal)}; `exoid recover` makes a recording of it"
+            )
         if aborted.exists():
             yield f"a run was stopped early: {self._name(aborted)}"
 

@@ -87,13 +87,21 @@ def graph(
     motions = {name: out / "motions" / path.name for name, path in recordings.items()}
     trajectory, parameters = out / "trajectory.parquet", out / "identified" / "parameters.parquet"
 
-    recorded = [_recorded(experiment, run, recordings[run.name], trajectory, told) for run in runs
-                if run.name not in imported.names]  # fmt: skip
+    recorded = [
+        _recorded(experiment, run, recordings[run.name], trajectory, told)
+        for run in runs
+        if run.name not in imported.names
+    ]
 
     def step(
-        stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str,
-        run: str | None = None, beside: Iterable[str] = (),
-    ) -> Step:  # fmt: skip
+        stage: str,
+        target: Path,
+        inputs: Iterable[Path],
+        settings: Sequence[str],
+        *command: str,
+        run: str | None = None,
+        beside: Iterable[str] = (),
+    ) -> Step:
         sections = experiment.sections_about(imported.of_a_leg, *settings)
         # What nobody wrote is not compared with what a result tells.
         counted = {name: section for name, section in sections.items() if section is not None}

@@ -36,8 +36,9 @@ def damage(files: Sequence[Path]) -> str:
     """Say which recordings cannot be read, and what to do."""
     names, several = ", ".join(file.as_posix() for file in files), len(files) > 1
     return (
-        f"{names}: {DAMAGED}, and nothing is done without {'them' if several else 'it'}; "
-        f"{'import them' if several else 'import it'} again, or remove {'them' if several else 'it'}"
+        f"{names}: {DAMAGED}, and nothing is done without {'them' if several else 'it'};"
+        f" {'import them' if several else 'import it'} again, or remove"
+        f" {'them' if several else 'it'}"
     )
 
 

@@ -12,6 +12,6 @@ def refuse_recorded(path: Path) -> None:
     rig = told_by(path).get("config", {}).get("rig", {})
     if rig and not rig["embedded"]:
         raise InputError(
-            f"{path}: is a recording of the rig {rig['name']}, not overwritten; --overwrite replaces it, -o writes "
-            "another file"
+            f"{path}: is a recording of the rig {rig['name']}, not overwritten; --overwrite"
+            " replaces it, -o writes another file"
         )

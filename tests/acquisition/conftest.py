@@ -150,9 +150,16 @@ def record(tmp_path, excitation, rig_file, serve):
     """Record a run on a rig served in this process; returns the recording."""
 
     def run(
-        duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, hooks=None,
+        duration_s=1.0,
+        run="exo_alone",
+        seed=0,
+        fault=None,
+        served_as=None,
+        believed=None,
+        rate_hz=200.0,
+        hooks=None,
         **changes,
-    ):  # fmt: skip
+    ):
         """``believed`` are changes of the rig file that acquisition reads, not of the rig that is
         there.
 

@@ -173,10 +173,15 @@ class SimulatedDrive:
 
     def words(self):
         values = {
-            "sequence": max(self.count + self.ahead, 0), "time": max(self.count / RATE + self.clock_ahead, 0.0),
-            "angle": self.seen, "velocity": self.velocity, "current": 0.1 * sin(self.count), "temperature": 20.0,
-            "reference": self.angle, "status": self.says_enabled | 8 * self.fault,
-        }  # fmt: skip
+            "sequence": max(self.count + self.ahead, 0),
+            "time": max(self.count / RATE + self.clock_ahead, 0.0),
+            "angle": self.seen,
+            "velocity": self.velocity,
+            "current": 0.1 * sin(self.count),
+            "temperature": 20.0,
+            "reference": self.angle,
+            "status": self.says_enabled | 8 * self.fault,
+        }
         return self.read.encode(values | self.wrong)
 
 

@@ -139,9 +139,15 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     slow = {"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "}
     # Missed samples jerk the leg: they shall be counted here, not end the run.
     table = record(
-        shipped="real_time", run="with_human", duration_s=2.0, rate_hz=50.0, replace=slow, torque_nm=1e4,
-        cuff_force_n=1e4, speed_rad_s=50.0,
-    )  # fmt: skip
+        shipped="real_time",
+        run="with_human",
+        duration_s=2.0,
+        rate_hz=50.0,
+        replace=slow,
+        torque_nm=1e4,
+        cuff_force_n=1e4,
+        speed_rad_s=50.0,
+    )
     frame, gaps = table.frame, table.metadata["gaps"]
     missed = sum(count for _, count in gaps)
     assert len(frame) + missed == 100

@@ -75,7 +75,8 @@ def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monke
     with pytest.raises(DeviceError) as caught:
         record(served_as=served, control_s=0.5)
     assert str(caught.value).startswith(
-        "drive hip: was told to enable, but its status word does not say that it is after 0.5 s; see the drive's manual"
+        "drive hip: was told to enable, but its status word does not say that it is after 0.5 s;"
+        " see the drive's manual"
     )
     assert set(moved) == {0.0}
     assert served[0].enabled == [False, False]
@@ -109,7 +110,8 @@ def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record,
     with pytest.raises(DeviceError) as caught:
         record(control_s=0.3)
     assert str(caught.value).startswith(
-        "USE THE EMERGENCY STOP: the run is complete; and could not be disabled: drive hip (127.0.0.1:"
+        "USE THE EMERGENCY STOP: the run is complete; and could not be disabled: drive hip"
+        " (127.0.0.1:"
     )
     assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(
         caught.value

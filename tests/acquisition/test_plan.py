@@ -57,9 +57,10 @@ def test_a_motion_that_runs_once_is_not_asked_to_repeat(rig_file):
     assert make_plan(load_rig(rig_file()), once, REST, 1.9, RATE).stop > 0
     with pytest.raises(InputError) as caught:
         make_plan(load_rig(rig_file()), once, REST, 3.0, RATE)
-    assert str(caught.value) == (
-        "the trajectory lasts 1.99 s and does not repeat, but the run's duration_s is 3; shorten the run, or give "
-        "the trajectory's omega_rad_s if it repeats"
+    assert (
+        str(caught.value)
+        == "the trajectory lasts 1.99 s and does not repeat, but the run's duration_s is 3; shorten"
+        " the run, or give the trajectory's omega_rad_s if it repeats"
     )
 
 

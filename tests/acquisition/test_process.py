@@ -38,8 +38,8 @@ def experiment(tmp_path, excitation):
         (tmp_path / "sealed" / "default.toml").write_text(sealed.read_text())
         config = tmp_path / "exoid.toml"
         config.write_text(
-            f'[acquire]\nrig = "rig.toml"\nsample_rate_hz = {sample_rate_hz}\n'
-            f'[[run]]\nname = "one"\nrun = "{run}"\npurpose = "train"\nduration_s = {duration_s}\nseed = 3\n'
+            f'[acquire]\nrig = "rig.toml"\nsample_rate_hz = {sample_rate_hz}\n[[run]]\nname ='
+            f' "one"\nrun = "{run}"\npurpose = "train"\nduration_s = {duration_s}\nseed = 3\n'
         )
         output = tmp_path / "recordings" / "one.parquet"
         return [
@@ -164,8 +164,10 @@ def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(
     kept = output.with_name("one.aborted.parquet")
     table = RECORDING.read(kept)
     assert process.returncode == 3
-    assert said(err).strip() == (
-        f"exoid: stopped by {name}; the leg was stopped, its {len(table.frame)} samples so far are in {kept}"
+    assert (
+        said(err).strip()
+        == f"exoid: stopped by {name}; the leg was stopped, its {len(table.frame)} samples so far"
+        f" are in {kept}"
     )
     assert table.metadata["abort"] == f"stopped by {name}"
     assert len(table.frame) >= 100
@@ -182,9 +184,14 @@ def start_on_a_terminal():
         here, there = os.openpty()
         command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
         process = subprocess.Popen(
-            command, stdin=there, stdout=there, stderr=there, env=os.environ | {"TERM": "xterm"},
-            start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
-        )  # fmt: skip
+            command,
+            stdin=there,
+            stdout=there,
+            stderr=there,
+            env=os.environ | {"TERM": "xterm"},
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        )
         os.close(there)
         started.append(process)
         return process, here
@@ -230,8 +237,8 @@ def test_a_signal_while_a_silent_device_is_waited_for_before_anything_moves_ends
         rig = rig_file(shipped="real_time", port=silent.getsockname()[1], connect_s=50.0)
         config = tmp_path / "exoid.toml"
         config.write_text(
-            f'[acquire]\nrig = "{rig.name}"\n[[run]]\nname = "one"\nrun = "exo_alone"\npurpose = "train"\n'
-            "duration_s = 1.0\nseed = 3\n"
+            f'[acquire]\nrig = "{rig.name}"\n[[run]]\nname = "one"\nrun = "exo_alone"\npurpose ='
+            ' "train"\nduration_s = 1.0\nseed = 3\n'
         )
         process = start(
             [
@@ -313,8 +320,8 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
     )
     config = tmp_path / "exoid.toml"
     config.write_text(
-        f'[acquire]\nrig = "{rig.name}"\nsample_rate_hz = {SLOW_HZ}\n'
-        '[[run]]\nname = "one"\nrun = "exo_alone"\npurpose = "train"\nduration_s = 300.0\nseed = 3\n'
+        f'[acquire]\nrig = "{rig.name}"\nsample_rate_hz = {SLOW_HZ}\n[[run]]\nname = "one"\nrun ='
+        ' "exo_alone"\npurpose = "train"\nduration_s = 300.0\nseed = 3\n'
     )
     serving = start(["rig", "serve", rig, "--run", "exo_alone", "--rate-hz", SLOW_HZ])
     assert str(port) in serving.stdout.readline() + serving.stdout.readline()

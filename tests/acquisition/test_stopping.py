@@ -50,9 +50,15 @@ def times(share):
 
 @pytest.mark.parametrize(
     ("joint", "found"),
-    [(0, {"torque": 151.0}), (1, {"torque": -111.0}), (1, {"torque": np.nan}),
-     (0, {"angle": 0.16}), (1, {"angle": -0.16}), (0, {"angle": np.nan})],
-)  # fmt: skip
+    [
+        (0, {"torque": 151.0}),
+        (1, {"torque": -111.0}),
+        (1, {"torque": np.nan}),
+        (0, {"angle": 0.16}),
+        (1, {"angle": -0.16}),
+        (0, {"angle": np.nan}),
+    ],
+)
 def test_a_stop_lets_go_of_a_leg_that_is_pressed_or_does_not_follow(joint, found):
     supervisor = Supervisor(load_rig(datasets() / "rigs" / "real_time.toml"), 200.0)
     supervisor.check()

@@ -15,7 +15,7 @@ from tests.bench import (
     bench_operator_view,
     bench_simulate,
     bench_stream,
-)  # fmt: skip
+)
 from tests.bench.report import show
 
 show("exoid design", bench_design.rows())

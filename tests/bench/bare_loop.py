@@ -32,15 +32,23 @@ async def _cycles_a_second(rig: RigSettings) -> float:
     began = time.perf_counter()
     for _ in range(CYCLES):
         await asyncio.gather(
-            *(client.read_holding_registers(read.address, count=read.count, device_id=unit)
-              for client, unit, read in sensors)
-        )  # fmt: skip
+            *(
+                client.read_holding_registers(read.address, count=read.count, device_id=unit)
+                for client, unit, read in sensors
+            )
+        )
         await asyncio.gather(
-            *(client.readwrite_registers(
-                read_address=read.address, read_count=read.count, write_address=write.address,
-                values=[0] * write.count, device_id=unit)
-              for client, unit, read, write in drives)
-        )  # fmt: skip
+            *(
+                client.readwrite_registers(
+                    read_address=read.address,
+                    read_count=read.count,
+                    write_address=write.address,
+                    values=[0] * write.count,
+                    device_id=unit,
+                )
+                for client, unit, read, write in drives
+            )
+        )
     rate = CYCLES / (time.perf_counter() - began)
     for client, *_ in (*drives, *sensors):
         client.close()

@@ -40,7 +40,10 @@ def rows() -> Iterator[Row]:
     yield Row(f"real time, 200 Hz, 60 s ({samples} samples)", f"{missed} missed", wanted="0 missed")
     for set_points_hz, duration_s in RECORDER:
         samples, missed, load = recorder(set_points_hz, duration_s)
-        what = f"recorder, 1 kHz, two drives told {set_points_hz:g} times a second, {duration_s / 60:g} min"
+        what = (
+            f"recorder, 1 kHz, two drives told {set_points_hz:g} times a second,"
+            f" {duration_s / 60:g} min"
+        )
         told = f"{missed} of {samples} missed, {100 * load:.0f} % of a core"
         yield Row(what, told, wanted="0 missed, 40 %")
 

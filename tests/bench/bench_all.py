@@ -34,8 +34,10 @@ def seconds(folder: str, environment: dict[str, str]) -> float:
     began = time.monotonic()
     subprocess.run(
         [*command, f"CONFIG={experiments / 'default.toml'}", f"OUT={folder}/out", "all"],
-        env=environment, check=True, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        env=environment,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return time.monotonic() - began
 
 

@@ -30,9 +30,15 @@ PATIENCE_S = 30.0
 GEOMETRY, BOUNDS = Geometry(), bounds_array(JointBounds())
 TIME = np.arange(SAMPLES) * 2.0 * np.pi / OMEGA / SAMPLES
 OF = problem(
-    omega=OMEGA, harmonics=HARMONICS, bounds=BOUNDS, geometry=GEOMETRY, criterion="condition", theta0=None,
-    basis=basis_of(HARMONICS, rest_to_rest=False), samples=SAMPLES,
-)  # fmt: skip
+    omega=OMEGA,
+    harmonics=HARMONICS,
+    bounds=BOUNDS,
+    geometry=GEOMETRY,
+    criterion="condition",
+    theta0=None,
+    basis=basis_of(HARMONICS, rest_to_rest=False),
+    samples=SAMPLES,
+)
 SPREAD = spread_of(OF)
 
 

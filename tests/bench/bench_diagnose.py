@@ -84,8 +84,9 @@ def posterior_rows(motions: Sequence[Motion], sample: int) -> Iterator[Row]:
     naive, pairs = refits_of_pairs(library, evidence, sample)
     yield Row(
         f"lstsq on all {pairs} pairs of elements, scaled up from {sample}",
-        f"{naive:.1f} s", naive / ours,
-    )  # fmt: skip
+        f"{naive:.1f} s",
+        naive / ours,
+    )
 
 
 def refits_of_pairs(library: Library, evidence: Evidence, sample: int) -> tuple[float, int]:
@@ -112,8 +113,9 @@ def length_rows(lengths: Sequence[float]) -> Iterator[Row]:
         wanted = "10 s" if seconds == SECONDS else ""
         yield Row(
             f"diagnosis of 4 x {seconds:g} s ({len(found.causes)} named)",
-            f"{taken:.1f} s, {taken / first:.1f} times the first's", wanted=wanted,
-        )  # fmt: skip
+            f"{taken:.1f} s, {taken / first:.1f} times the first's",
+            wanted=wanted,
+        )
 
 
 def catalogue_rows(motions: Sequence[Motion], every: Sequence[int]) -> Iterator[Row]:

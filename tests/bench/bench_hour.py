@@ -45,7 +45,8 @@ def rows(duration_s: float = HOUR_S) -> Iterator[Row]:
     )
     yield Row(
         "most memory of exoid",
-        f"{early:.0f} MiB after {EARLY:.0%} of it, {used[-1][1]:.0f} at its end, {peak_mib():.0f} with the file made",
+        f"{early:.0f} MiB after {EARLY:.0%} of it, {used[-1][1]:.0f} at its end, {peak_mib():.0f}"
+        " with the file made",
         wanted="does not grow",
     )
 

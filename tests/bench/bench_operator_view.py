@@ -35,7 +35,8 @@ def rows() -> Iterator[Row]:
             drawing = milliseconds(screen, view)
     share = 100 * median(a / b for a, b in zip(with_view, without, strict=True))
     yield Row(
-        f"lockstep, two drives and four sensors, watched: of the cycles unwatched, in turn {PAIRS} times",
+        f"lockstep, two drives and four sensors, watched: of the cycles unwatched, in turn {PAIRS}"
+        " times",
         f"{share:.0f} %: {median(with_view):.0f} of {median(without):.0f} cycles/s",
     )
     yield Row("one picture, 80 x 24, ten a second", f"{drawing:.1f} ms of processor time")

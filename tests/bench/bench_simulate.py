@@ -164,9 +164,15 @@ def replay_rows() -> Iterator[Row]:
     )
     q = low_pass(angle, rate, 12.0)
     motion = Motion(
-        t, q, derivative(q, rate, 1), derivative(q, rate, 2), torque, np.zeros(8000, dtype=np.int64),
-        np.ones(8000, dtype=bool), run="with_human",
-    )  # fmt: skip
+        t,
+        q,
+        derivative(q, rate, 1),
+        derivative(q, rate, 2),
+        torque,
+        np.zeros(8000, dtype=np.int64),
+        np.ones(8000, dtype=bool),
+        run="with_human",
+    )
     windows = len(replay(leg.model, motion).first)
     yield Row(
         f"replay of 40 s, {windows} windows of 1 s",

@@ -54,9 +54,11 @@ def write_recordings(folder: Path, samples: int) -> list[Path]:
     one."""
     paths = []
     for run, purpose, length in (
-        ("exo_alone", "train", 0), ("exo_alone", "validate", 0), ("with_human", "validate", 0),
+        ("exo_alone", "train", 0),
+        ("exo_alone", "validate", 0),
+        ("with_human", "validate", 0),
         ("with_human", "train", samples),
-    ):  # fmt: skip
+    ):
         trajectory = read_trajectory(datasets() / "paper" / "trajectory.toml")
         frame, metadata = record(
             Plant(PlantSettings(), run, seed=len(paths)), trajectory, TILE_S, purpose

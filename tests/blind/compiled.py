@@ -13,9 +13,17 @@ import numba
 
 HERE = Path(__file__).parent
 SOURCES = (
-    "body", "dry", "encoders", "further_torques", "loop", "planar", "smooth", "transmissions",
-    "two_link", "two_mass",
-)  # fmt: skip
+    "body",
+    "dry",
+    "encoders",
+    "further_torques",
+    "loop",
+    "planar",
+    "smooth",
+    "transmissions",
+    "two_link",
+    "two_mass",
+)
 """Files with compiled functions."""
 
 njit = partial(numba.njit, cache=True)

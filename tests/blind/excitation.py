@@ -51,7 +51,7 @@ def _feasible(rng: Generator, harmonics: int) -> Excitation:
     room = np.minimum((HIGHEST - theta0) / q.max(axis=0), (LOWEST - theta0) / q.min(axis=0))
     scale = MARGIN * np.min(
         [room, FASTEST / np.abs(dq).max(axis=0), STEEPEST / np.abs(ddq).max(axis=0)], axis=0
-    )  # fmt: skip
+    )
     return Excitation(theta0, a * scale[:, np.newaxis], b * scale[:, np.newaxis])
 
 

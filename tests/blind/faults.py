@@ -112,9 +112,17 @@ def _keep(columns: Columns, rows: np.ndarray) -> None:
 
 Fault = Callable[[Columns, Generator, int], str | None]
 FAULTS: tuple[Fault, ...] = (
-    gap, stuck_encoder, saturated_torque, swapped_joints, degrees, torque_in_another_unit,
-    sign_flipped, clock_jitter, repeated_samples, dropped_samples,
-)  # fmt: skip
+    gap,
+    stuck_encoder,
+    saturated_torque,
+    swapped_joints,
+    degrees,
+    torque_in_another_unit,
+    sign_flipped,
+    clock_jitter,
+    repeated_samples,
+    dropped_samples,
+)
 IN_EVERY_RUN = ("swapped_joints", "torque_in_another_unit", "sign_flipped")
 """Wiring and configuration are the same in all runs of a session."""
 

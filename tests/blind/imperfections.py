@@ -10,12 +10,25 @@ from tests.blind.conditions import IMPERFECTIONS, LARGEST, SMALLEST
 from tests.blind.plan import HIP, KNEE
 
 SMALL = (
-    ("encoder_offset", HIP), ("encoder_offset", KNEE), ("torque_gain", HIP), ("torque_gain", KNEE),
-    ("torque_offset", HIP), ("torque_offset", KNEE), ("time_delay", HIP), ("time_delay", KNEE),
-    ("base_tilt", None), ("cogging", HIP), ("cogging", KNEE), ("mass_off_axis", KNEE),
-    ("torque_drift", HIP), ("torque_drift", KNEE), ("joint_elasticity", HIP),
-    ("rotor_inertia", KNEE), ("parallel_spring", HIP), ("parallel_spring", KNEE),
-)  # fmt: skip
+    ("encoder_offset", HIP),
+    ("encoder_offset", KNEE),
+    ("torque_gain", HIP),
+    ("torque_gain", KNEE),
+    ("torque_offset", HIP),
+    ("torque_offset", KNEE),
+    ("time_delay", HIP),
+    ("time_delay", KNEE),
+    ("base_tilt", None),
+    ("cogging", HIP),
+    ("cogging", KNEE),
+    ("mass_off_axis", KNEE),
+    ("torque_drift", HIP),
+    ("torque_drift", KNEE),
+    ("joint_elasticity", HIP),
+    ("rotor_inertia", KNEE),
+    ("parallel_spring", HIP),
+    ("parallel_spring", KNEE),
+)
 LEAST, MOST = 0.002, 0.009
 
 
@@ -48,9 +61,13 @@ def random_background(
 
 
 FRICTION = (
-    "presliding_hysteresis", "coulomb_asymmetry", "viscous_asymmetry", "load_dependent_friction",
-    "stribeck_friction", "friction_warmup",
-)  # fmt: skip
+    "presliding_hysteresis",
+    "coulomb_asymmetry",
+    "viscous_asymmetry",
+    "load_dependent_friction",
+    "stribeck_friction",
+    "friction_warmup",
+)
 GOOD_RIG = (
     *(one for one in SMALL if one[0] != "joint_elasticity"),
     *((effect, joint) for effect in FRICTION for joint in (HIP, KNEE)),

@@ -66,9 +66,12 @@ class Machine:
     def controller(self, joint: int) -> dict:
         """Return what a recording says of a drive."""
         return {
-            "type": "pd", "kp_nm_rad": float(self.kp[joint]), "kd_nm_s_rad": float(self.kd[joint]),
-            "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(self.limit[joint]),
-        }  # fmt: skip
+            "type": "pd",
+            "kp_nm_rad": float(self.kp[joint]),
+            "kd_nm_s_rad": float(self.kd[joint]),
+            "rate_hz": DRIVE_RATE_HZ,
+            "limit_nm": float(self.limit[joint]),
+        }
 
 
 def random_rich_machine(rng: Generator, thigh_length: float) -> Machine:

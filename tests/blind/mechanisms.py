@@ -195,10 +195,21 @@ class OneJoint:
 
 
 ANYWHERE = (
-    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag",
-    "presliding_hysteresis", "friction_warmup", "cogging", "joint_elasticity", "parallel_spring",
-    "torque_drift", "time_delay", "end_stop", "position_dependent_friction", "gain_drift",
-)  # fmt: skip
+    "stribeck_friction",
+    "viscous_asymmetry",
+    "load_dependent_friction",
+    "quadratic_drag",
+    "presliding_hysteresis",
+    "friction_warmup",
+    "cogging",
+    "joint_elasticity",
+    "parallel_spring",
+    "torque_drift",
+    "time_delay",
+    "end_stop",
+    "position_dependent_friction",
+    "gain_drift",
+)
 """Causes that a joint can have wherever it stands."""
 ONE_JOINT: dict[str, OneJoint] = {
     "pendulum": OneJoint("revolute", 9.81),
@@ -224,9 +235,11 @@ def _named(
 ) -> Callable[[Recorded], list[_Quantity]]:
     def of(r: Recorded) -> list[_Quantity]:
         return [
-            _Quantity(angle, r.angle, 0, 1), _Quantity(torque, r.torque, 1, 0),
-            _Quantity(reference, r.reference, 0, 1), _Quantity(speed, r.drive_speed, 0, 1),
-        ]  # fmt: skip
+            _Quantity(angle, r.angle, 0, 1),
+            _Quantity(torque, r.torque, 1, 0),
+            _Quantity(reference, r.reference, 0, 1),
+            _Quantity(speed, r.drive_speed, 0, 1),
+        ]
 
     return of
 

@@ -232,9 +232,18 @@ def wandering_viscosity(rng, joint):
 OUTSIDE = tuple(KINDS)
 """Names of all kinds; the first four are those of the fixed set, in its order."""
 OF_ONE_JOINT = (
-    "tone", "cable_drag", "ringing", "kicks", "dead_zone_damper", "detent", "bent_gain",
-    "creeping_spring", "torque_steps", "held_torque", "wandering_viscosity",
-)  # fmt: skip
+    "tone",
+    "cable_drag",
+    "ringing",
+    "kicks",
+    "dead_zone_damper",
+    "detent",
+    "bent_gain",
+    "creeping_spring",
+    "torque_steps",
+    "held_torque",
+    "wandering_viscosity",
+)
 """What a machine of one joint can have of it."""
 
 

@@ -15,11 +15,25 @@ from tests.blind.scoring import Score
 from tests.blind.tables import Page
 
 TABLES = (
-    tables.summary, tables.by_world, tables.by_cause, tables.by_magnitude, tables.by_visibility,
-    tables.by_form, tables.by_machine, tables.by_kinds, tables.pairs, tables.alarms, tables.outside,
-    tables.families, tables.faults, tables.misses, tables.confusion, tables.residuals,
-    tables.probabilities, tables.coverage,
-)  # fmt: skip
+    tables.summary,
+    tables.by_world,
+    tables.by_cause,
+    tables.by_magnitude,
+    tables.by_visibility,
+    tables.by_form,
+    tables.by_machine,
+    tables.by_kinds,
+    tables.pairs,
+    tables.alarms,
+    tables.outside,
+    tables.families,
+    tables.faults,
+    tables.misses,
+    tables.confusion,
+    tables.residuals,
+    tables.probabilities,
+    tables.coverage,
+)
 
 
 @dataclass(frozen=True)

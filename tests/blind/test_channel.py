@@ -49,8 +49,10 @@ def test_an_error_is_what_it_is_called_and_leaves_the_other_joint_alone(values, 
 
 def test_a_delay_and_two_lags_make_a_slow_torque_late_by_their_sum():
     out = told(delay_s=0.01, lag_s=0.02, second_lag_s=0.005)[500:, HIP]
-    late = [np.mean((np.interp(T[500:] - s, T, TORQUE[:, HIP]) - out) ** 2) for s in
-            (0.025, 0.035, 0.045)]  # fmt: skip
+    late = [
+        np.mean((np.interp(T[500:] - s, T, TORQUE[:, HIP]) - out) ** 2)
+        for s in (0.025, 0.035, 0.045)
+    ]
     assert np.argmin(late) == 1
 
 

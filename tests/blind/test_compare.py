@@ -9,10 +9,20 @@ from tests.blind.report import Examination, write
 from tests.blind.scoring import Score
 
 CASE = Score(
-    seed=1, category="single", truth=(("backlash", "knee"),), forms=("some",), own_form=False,
-    magnitude=0.1, visibility=1.0, kinds=("exo_alone",), status="explained",
-    named=(("backlash", "knee"),), right=True, probabilities=((0.9, True),), world="planar",
-)  # fmt: skip
+    seed=1,
+    category="single",
+    truth=(("backlash", "knee"),),
+    forms=("some",),
+    own_form=False,
+    magnitude=0.1,
+    visibility=1.0,
+    kinds=("exo_alone",),
+    status="explained",
+    named=(("backlash", "knee"),),
+    right=True,
+    probabilities=((0.9, True),),
+    world="planar",
+)
 WRONG = {"right": False, "named": (("cogging", "hip"),), "probabilities": ((0.9, False),)}
 
 

@@ -128,9 +128,15 @@ def test_recordings_say_nothing_of_the_truth(tmp_path):
         assert not [secret for secret in secrets if secret in said]
         header = json.loads(schema.metadata[b"exoid"])
         assert set(header) == {
-            "contract", "run", "purpose", "sample_rate_hz", "period_s", "session", "controller",
+            "contract",
+            "run",
+            "purpose",
+            "sample_rate_hz",
+            "period_s",
+            "session",
+            "controller",
             "geometry",
-        }  # fmt: skip
+        }
 
 
 def test_every_cause_of_the_contract_can_be_hidden(pytestconfig):

@@ -37,9 +37,9 @@ def after(exoid, tmp_path, monkeypatch):
 def test_set_points_that_were_left_out_are_warned_of_though_no_sample_is_missing(after):
     """A recorder keeps every sample while the leg moves unevenly."""
     assert (
-        "3 set-points were left out, since cycles took longer than 10 ms or answers were lost: the leg moved unevenly "
-        "there; lower acquire.sample_rate_hz"
-    ) in after(missed=0, left_out=3)
+        "3 set-points were left out, since cycles took longer than 10 ms or answers were lost: the"
+        " leg moved unevenly there; lower acquire.sample_rate_hz" in after(missed=0, left_out=3)
+    )
 
 
 def test_set_points_that_went_with_their_samples_are_told_once(after):

@@ -32,7 +32,10 @@ def test_the_list_of_commands_tells_each_whole(exoid):
 
 
 def test_help_loads_nothing_heavy():
-    code = "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if m in sys.modules])"
+    code = (
+        "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if"
+        " m in sys.modules])"
+    )
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
@@ -84,8 +87,10 @@ def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
         (
             PermissionError(13, "Permission denied", "out.parquet"),
             2,
-            "exoid: out.parquet: Permission denied; you may not read or write there; change the permissions or "
-            "choose another place\n",
+            (
+                "exoid: out.parquet: Permission denied; you may not read or write there; change the"
+                " permissions or choose another place\n"
+            ),
         ),
         (
             OSError(28, "No space left on device"),
@@ -267,8 +272,10 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
     outcome = exoid("show")
     (log,) = tmp_path.glob("exoid-*.log")
     assert outcome.code == 1
-    assert outcome.err == (
-        f"exoid: exoid itself failed: ZeroDivisionError: division by zero; please report it, with {log}\n"
+    assert (
+        outcome.err
+        == "exoid: exoid itself failed: ZeroDivisionError: division by zero; please report it,"
+        f" with {log}\n"
     )
     assert "Traceback" in log.read_text()
 
@@ -294,7 +301,10 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
         (["export", "x"], "exoid: --to: missing; see `exoid export --help`\n"),
         (
             ["design", "--criterion", "logdet"],
-            "exoid: --criterion: found logdet, expected log_det, condition, scaled_condition; did you mean log_det?\n",
+            (
+                "exoid: --criterion: found logdet, expected log_det, condition, scaled_condition;"
+                " did you mean log_det?\n"
+            ),
         ),
         (
             ["detect", "x", "--power", "2"],

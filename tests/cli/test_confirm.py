@@ -27,7 +27,8 @@ def experiment(tmp_path):
         (tmp_path / "rig.toml").write_text(text)
         config = tmp_path / "exoid.toml"
         config.write_text(
-            f'[acquire]\nrig = "rig.toml"\n[[run]]\nname = "one"\nrun = "{run}"\npurpose = "train"\nduration_s = 10.0\n'
+            f'[acquire]\nrig = "rig.toml"\n[[run]]\nname = "one"\nrun = "{run}"\npurpose ='
+            ' "train"\nduration_s = 10.0\n'
         )
         trajectory = datasets() / "paper" / "trajectory.toml"
         return [
@@ -114,9 +115,10 @@ def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     outcome = exoid(*experiment())
     assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err == (
-        "exoid: run one moves somebody, which wants to be confirmed on a terminal; give --yes where a script starts "
-        "it; nothing was moved\n"
+    assert (
+        outcome.err
+        == "exoid: run one moves somebody, which wants to be confirmed on a terminal; give --yes"
+        " where a script starts it; nothing was moved\n"
     )
 
 
@@ -136,12 +138,20 @@ def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_questio
     assert outcome.code == 3 and WENT_ON in outcome.err
     shown = outcome.err.partition(" [y/N] ")[0]
     for words in (
-        "Run one moves somebody on the rig real_time along", "trajectory.toml for 10 s",
-        "limits -0.35 to +1.75 rad, 2.2 rad/s, 100 N·m", "limits -2.1 to +0.35 rad, 2.2 rad/s, 60 N·m",
-        "a stop takes up to 0.28 s, then the drives hold for 0.1 s before their torque is taken away",
-        "stopped after", "of silence, or 0.1 rad from a set-point",
-        "force 250 N on 4 cuff sensors", "Ctrl-C stops it", "the emergency stop at hand?",
-    ):  # fmt: skip
+        "Run one moves somebody on the rig real_time along",
+        "trajectory.toml for 10 s",
+        "limits -0.35 to +1.75 rad, 2.2 rad/s, 100 N·m",
+        "limits -2.1 to +0.35 rad, 2.2 rad/s, 60 N·m",
+        (
+            "a stop takes up to 0.28 s, then the drives hold for 0.1 s before their torque is taken"
+            " away"
+        ),
+        "stopped after",
+        "of silence, or 0.1 rad from a set-point",
+        "force 250 N on 4 cuff sensors",
+        "Ctrl-C stops it",
+        "the emergency stop at hand?",
+    ):
         assert words in shown
 
 
@@ -192,8 +202,10 @@ def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_somebody_in_it(
         "rig", "check", datasets() / "rigs" / "plain.toml", "--run", "with_human", option, "--yes"
     )
     assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err == (
-        f"exoid: {option} wants nobody in the machine, but --run with_human says that somebody is; drop one\n"
+    assert (
+        outcome.err
+        == f"exoid: {option} wants nobody in the machine, but --run with_human says that somebody"
+        " is; drop one\n"
     )
 
 
@@ -275,8 +287,10 @@ def test_a_recording_of_a_real_rig_is_replaced_only_where_that_is_said(exoid, ex
     refused = exoid(*arguments, "--yes")
     assert (refused.code, refused.err) == (
         2,
-        f"exoid: {path}: is a recording of the rig leg, not overwritten; --overwrite replaces it, -o writes another "
-        "file\n",
+        (
+            f"exoid: {path}: is a recording of the rig leg, not overwritten; --overwrite replaces"
+            " it, -o writes another file\n"
+        ),
     )
     assert WENT_ON in exoid(*arguments, "--overwrite").err
     assert path.read_bytes() == before

@@ -2,7 +2,10 @@
 
 import pytest
 
-MOTION = 'unit = "rad"\nomega_rad_s = 0.628\ntheta0_rad = [0.6, -0.9]\na = [[{hip}], [0.0]]\nb = [[0.0], [0.0]]\n'
+MOTION = (
+    'unit = "rad"\nomega_rad_s = 0.628\ntheta0_rad = [0.6, -0.9]\na = [[{hip}], [0.0]]\nb = [[0.0],'
+    " [0.0]]\n"
+)
 
 
 @pytest.mark.parametrize(("hip", "still"), [(0.0, "hip"), (0.3, "knee")])

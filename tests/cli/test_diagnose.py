@@ -99,8 +99,10 @@ def test_tied_causes_are_printed_each_and_their_probabilities_add_up_to_the_join
     (at,) = [k for k, (_, words, _) in enumerate(lines) if "cannot tell apart" in words]
     together, members = lines[at], lines[at + 1 : at + 4]
     assert [words for _, words, _ in members] == [
-        "cogging at the knee", "parallel spring at the knee", "end stop at the knee",
-    ]  # fmt: skip
+        "cogging at the knee",
+        "parallel spring at the knee",
+        "end stop at the knee",
+    ]
     assert all(indent == together[0] + 2 for indent, *_ in members)
     assert abs(sum(p for *_, p in members) - together[2]) <= 1  # each is rounded
 
@@ -133,9 +135,13 @@ def test_two_findings_share_the_lines_above_both(capsys):
         for _, words, _ in probabilities(shown(capsys, **told | {"findings": [first, second]}))[3:]
     ]
     assert words == [
-        "something that repeats with the motion", "something at the knee", "a law of the knee's angle",
-        "cogging at the knee", "a law of the knee's load", "unlisted: a law of the knee's load",
-    ]  # fmt: skip
+        "something that repeats with the motion",
+        "something at the knee",
+        "a law of the knee's angle",
+        "cogging at the knee",
+        "a law of the knee's load",
+        "unlisted: a law of the knee's load",
+    ]
 
 
 def test_what_is_known_to_be_missing_and_no_more_has_a_line(capsys):

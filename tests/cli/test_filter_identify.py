@@ -335,9 +335,18 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
     assert exoid("identify", *files, "-o", tmp_path / "plain", *given).code == 0
     plain = PARAMETERS.read(tmp_path / "plain" / "parameters.parquet")
     elastic = plain.frame.iloc[[0]].assign(
-        name="stiffness", symbol="k", joint="knee", run=None, value=900.0, unit="N·m/rad", std_error=40.0,
-        ci95_low=820.0, ci95_high=980.0, step="extension", effect="joint_elasticity",
-    )  # fmt: skip
+        name="stiffness",
+        symbol="k",
+        joint="knee",
+        run=None,
+        value=900.0,
+        unit="N·m/rad",
+        std_error=40.0,
+        ci95_low=820.0,
+        ci95_high=980.0,
+        step="extension",
+        effect="joint_elasticity",
+    )
     frame = pd.concat([plain.frame, elastic], ignore_index=True)
     metadata = {
         key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")
@@ -417,8 +426,13 @@ def test_a_damaged_table_of_causes_is_refused_with_its_name(
         key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")
     }
     elastic = plain.frame.iloc[[0]].assign(
-        name="stiffness", joint="knee", run=None, value=900.0, effect="joint_elasticity", step="extension"
-    )  # fmt: skip
+        name="stiffness",
+        joint="knee",
+        run=None,
+        value=900.0,
+        effect="joint_elasticity",
+        step="extension",
+    )
     frame = damage(pd.concat([plain.frame, elastic], ignore_index=True))
     table = pa.Table.from_pandas(frame, preserve_index=False)
     about = {b"exoid": json.dumps(metadata | {"contract": "parameters/1"}).encode()}

@@ -28,9 +28,12 @@ def folder(tmp_path, monkeypatch):
         )
         frame["arm_torque_nm"] = torque + 0.05 * random.standard_normal(len(time))
         metadata = {
-            "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ, "imported": {"log": "arm.csv"},
+            "run": "exo_alone",
+            "purpose": purpose,
+            "sample_rate_hz": RATE_HZ,
+            "imported": {"log": "arm.csv"},
             "joints": [{"name": "arm", "kind": "revolute"}],
-        }  # fmt: skip
+        }
         RECORDING.write(tmp_path / "recordings" / f"{name}.parquet", frame, metadata)
     (tmp_path / "exoid.toml").touch()
     monkeypatch.chdir(tmp_path)
@@ -92,9 +95,12 @@ def test_a_machine_that_is_no_leg_is_not_asked_to_follow_a_gait(exoid, folder):
     assert "simulate" not in {one["stage"] for one in json.loads(exoid("status", "--json").out)}
     outcome = exoid("run", "simulate")
     assert (outcome.code, outcome.err) == (
-        2, "exoid: simulate: `exoid simulate` follows a leg's gait, and the recordings are of another machine; "
-        "leave it out\n",
-    )  # fmt: skip
+        2,
+        (
+            "exoid: simulate: `exoid simulate` follows a leg's gait, and the recordings are of"
+            " another machine; leave it out\n"
+        ),
+    )
 
 
 def test_steps_that_cannot_be_done_are_told_with_the_reason_after_the_count_of_those_that_were(
@@ -107,9 +113,10 @@ def test_steps_that_cannot_be_done_are_told_with_the_reason_after_the_count_of_t
     outcome = exoid("run", "replay")
     assert outcome.code == 0
     assert outcome.out.splitlines()[-2].startswith("3 of 4 steps done in ")
-    assert outcome.out.splitlines()[-1] == (
-        "1 could not be done and is left out, simulated/replay-Monday-2.parquet: backlash@arm: no simulation holds it; "
-        "simulate the model without it"
+    assert (
+        outcome.out.splitlines()[-1]
+        == "1 could not be done and is left out, simulated/replay-Monday-2.parquet: backlash@arm:"
+        " no simulation holds it; simulate the model without it"
     )
     assert "0 of 4 steps done in 0 s; 3 were up to date" in exoid("run", "replay").out
 
@@ -139,9 +146,12 @@ def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, fold
     ):
         outcome = exoid(*words)
         assert (outcome.code, outcome.err) == (
-            2, "exoid: recordings/Monday-1.parquet: damaged or truncated, and nothing is done without it; import it "
-            "again, or remove it\n",
-        )  # fmt: skip
+            2,
+            (
+                "exoid: recordings/Monday-1.parquet: damaged or truncated, and nothing is done"
+                " without it; import it again, or remove it\n"
+            ),
+        )
         assert "up to date" not in outcome.out
     assert not (folder / "motions").exists()
     first = exoid("status").out.splitlines()[1]
@@ -155,9 +165,10 @@ def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, fold
 def test_where_every_recording_is_damaged_all_are_named(exoid, folder):
     for path in (folder / "recordings").iterdir():
         path.write_bytes(b"PAR1")
-    assert exoid("run").err == (
-        "exoid: recordings/Monday-1.parquet, recordings/Monday-2.parquet: damaged or truncated, and nothing is done "
-        "without them; import them again, or remove them\n"
+    assert (
+        exoid("run").err
+        == "exoid: recordings/Monday-1.parquet, recordings/Monday-2.parquet: damaged or truncated,"
+        " and nothing is done without them; import them again, or remove them\n"
     )
 
 

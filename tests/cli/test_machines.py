@@ -50,8 +50,8 @@ def test_a_simulation_of_a_slide_asks_what_to_follow(exoid, recordings, tmp_path
     )
     assert outcome.code == 2
     assert (
-        "is of axis, expected hip and knee: the gait is a leg's; name what to follow with --reference"
-        in " ".join(outcome.err.split())
+        "is of axis, expected hip and knee: the gait is a leg's; name what to follow with"
+        " --reference" in " ".join(outcome.err.split())
     )
 
 

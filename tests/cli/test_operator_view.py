@@ -110,9 +110,17 @@ def test_the_ankle_is_on_the_canvas_wherever_the_limits_let_it_go(hip, knee):
 
 @pytest.mark.parametrize(
     ("value", "near", "place"),
-    [(-10.0, True, 0), (-8.9, False, 1), (0.0, False, 6), (8.9, False, 11), (9.2, True, 12), (10.0, True, 12),
-     (50.0, True, 12), (-50.0, True, 0)],
-)  # fmt: skip
+    [
+        (-10.0, True, 0),
+        (-8.9, False, 1),
+        (0.0, False, 6),
+        (8.9, False, 11),
+        (9.2, True, 12),
+        (10.0, True, 12),
+        (50.0, True, 12),
+        (-50.0, True, 0),
+    ],
+)
 def test_a_bar_is_at_its_end_at_a_limit_and_marks_what_is_near(value, near, place):
     gauge = Gauge("hip torque", value, -10.0, 10.0, "N·m")
     text = "".join(part for part, _ in gauge.line())
@@ -168,12 +176,19 @@ def test_samples_that_were_missed_are_said_and_counted():
     assert any("3 missed in 2 gaps" in line for line in picture(made))
 
 
-@pytest.mark.parametrize("taken", [
-    progress(State.CHECK, row=None), progress(), progress(hip=1.74, knee=-2.09, torque=-149.0, force=-399.0),
-    progress(State.ABORT, abort=" ".join(ABORTS), missed=123456, gaps=9999, samples=10**8),
-    progress(State.ABORT, abort="x" * 300, still_enabled=True), progress(time_s=86399.9, duration_s=86400.0),
-    progress(hip=-1234.5, torque=1e6), progress(hip=np.nan, torque=np.nan),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "taken",
+    [
+        progress(State.CHECK, row=None),
+        progress(),
+        progress(hip=1.74, knee=-2.09, torque=-149.0, force=-399.0),
+        progress(State.ABORT, abort=" ".join(ABORTS), missed=123456, gaps=9999, samples=10**8),
+        progress(State.ABORT, abort="x" * 300, still_enabled=True),
+        progress(time_s=86399.9, duration_s=86400.0),
+        progress(hip=-1234.5, torque=1e6),
+        progress(hip=np.nan, torque=np.nan),
+    ],
+)
 @pytest.mark.parametrize("size", [(80, 24), (120, 40), (81, 10), (200, 60)])
 def test_no_picture_leaves_its_screen(taken, size):
     lines = picture(view(taken), *size)
@@ -199,8 +214,9 @@ def test_without_colour_the_same_is_told(monkeypatch):
 
 
 def test_without_a_terminal_a_line_tells_the_same():
-    assert plain_line(progress(knee=-2.08, missed=1)) == (
-        "run          12.3/40.0 s  +0.500, -2.080 rad  +31.0, -4.0 N·m  200 Hz  1 missed"
+    assert (
+        plain_line(progress(knee=-2.08, missed=1))
+        == "run          12.3/40.0 s  +0.500, -2.080 rad  +31.0, -4.0 N·m  200 Hz  1 missed"
     )
     assert plain_line(progress(State.ABORT, row=None, abort="stopped by Ctrl-C")).endswith(
         "stopped by Ctrl-C"

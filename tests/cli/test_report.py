@@ -58,8 +58,9 @@ def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
 def test_a_mistyped_figure_gets_a_suggestion(exoid, folder):
     outcome = exoid("figures", folder, "--only", "error-bugdet")
     assert (outcome.code, outcome.err) == (
-        2, "exoid: --only error-bugdet: there is no such figure here; did you mean error-budget?\n"
-    )  # fmt: skip
+        2,
+        "exoid: --only error-bugdet: there is no such figure here; did you mean error-budget?\n",
+    )
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,10 @@ def test_a_mistyped_figure_gets_a_suggestion(exoid, folder):
     [
         (
             ["nowhere"],
-            "nowhere: no such folder, expected an experiment's folder; name the one that its stages wrote to",
+            (
+                "nowhere: no such folder, expected an experiment's folder; name the one that its"
+                " stages wrote to"
+            ),
         ),
         (
             ["demo", "-o", "demo"],

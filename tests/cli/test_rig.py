@@ -58,9 +58,10 @@ def test_a_rig_on_a_serial_line_has_no_port_to_be_served_at(exoid, tmp_path):
     rig.write_text(f'{text}\n[line.bus]\ntransport = "rtu"\nserial_port = "{link}"\n')
     outcome = exoid("rig", "serve", rig, "--port", 5000)
     assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err == (
-        f"exoid: --port: found 5000, but the rig is on a serial line, {link}; leave it out, or give 0 for a "
-        "pseudo-terminal of any name\n"
+    assert (
+        outcome.err
+        == f"exoid: --port: found 5000, but the rig is on a serial line, {link}; leave it out, or"
+        " give 0 for a pseudo-terminal of any name\n"
     )
 
 

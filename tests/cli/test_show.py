@@ -65,8 +65,13 @@ def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
     path.write_text(json.dumps(said))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
-    for words in ("Missing from the simulation: cogging", "cogging at the knee (drive), probability 0.90",
-                  "  amplitude 1.5 N·m (1.4 … 1.6)", "  - it takes 0.50 of 0.82", "at the floor"):  # fmt: skip
+    for words in (
+        "Missing from the simulation: cogging",
+        "cogging at the knee (drive), probability 0.90",
+        "  amplitude 1.5 N·m (1.4 … 1.6)",
+        "  - it takes 0.50 of 0.82",
+        "at the floor",
+    ):
         assert words in outcome.out
 
 
@@ -75,10 +80,12 @@ def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
     [
         ('{"contract": "verdict/1", "status"', "is no whole JSON document (line 1, column 35:"),
         ('{"contract": "verdict/1"}', "status: missing; add it"),
-        (json.dumps(verdict_of(noise_floor_nm={"hip": 0.1, "knee": float("nan")})),
-         "noise_floor_nm.knee: found nan, expected a finite number"),
+        (
+            json.dumps(verdict_of(noise_floor_nm={"hip": 0.1, "knee": float("nan")})),
+            "noise_floor_nm.knee: found nan, expected a finite number",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_damaged_verdict_is_refused_in_a_line_that_names_the_key(exoid, tmp_path, text, says):
     path = tmp_path / "verdict.json"
     path.write_text(text)
@@ -100,8 +107,9 @@ def test_a_file_that_breaks_its_contract_is_shown_and_then_refused(exoid, tmp_pa
     outcome = exoid("show", path)
     assert outcome.code == 2
     assert "trajectory/1" in outcome.out
-    assert outcome.err == (
-        f"exoid: {path}: column hip_angle_rad is missing, expected joint angle (rad); "
+    assert (
+        outcome.err
+        == f"exoid: {path}: column hip_angle_rad is missing, expected joint angle (rad); "
         "a trajectory/1 table must have it\n"
     )
 

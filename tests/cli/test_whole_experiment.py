@@ -160,8 +160,10 @@ def test_a_command_alone_does_its_stage_and_warns_of_what_it_builds_on(exoid, ex
     change(experiment / "exoid.toml", "order = 4\n", "order = 2\n")
     outcome = exoid("identify")
     assert outcome.code == 0
-    assert outcome.err == (
-        "warning: filter is stale: filter.order was 4, is 2; `exoid run identify` brings it up to date too\n"
+    assert (
+        outcome.err
+        == "warning: filter is stale: filter.order was 4, is 2; `exoid run identify` brings it up"
+        " to date too\n"
     )
     outcome = exoid("filter")
     assert outcome.code == 0
@@ -185,9 +187,10 @@ def test_a_command_alone_says_which_command_makes_what_is_missing(exoid, experim
     (experiment / "motions" / "exo_alone_train.parquet").unlink()
     outcome = exoid("identify")
     assert outcome.code == 2
-    assert outcome.err == (
-        "exoid: motions/exo_alone_train.parquet: no such file yet; `exoid filter` makes it, `exoid run identify` "
-        "makes all that is needed\n"
+    assert (
+        outcome.err
+        == "exoid: motions/exo_alone_train.parquet: no such file yet; `exoid filter` makes it,"
+        " `exoid run identify` makes all that is needed\n"
     )
 
 

@@ -23,7 +23,9 @@ def imported(name, globals=None, *rest, imports=builtins.__import__, **named):
     if ours and name in ("fcntl", "termios", "pty", "tty", "resource", "pwd", "grp"):
         raise ImportError(name)
     if ours and name == "msvcrt":
-        return types.SimpleNamespace(LK_LOCK=1, LK_NBLCK=2, locking=lambda *told: locks.append(told))
+        return types.SimpleNamespace(
+            LK_LOCK=1, LK_NBLCK=2, locking=lambda *arguments: locks.append(arguments)
+        )
     return imports(name, globals, *rest, **named)
 
 def refuse_open(does):
@@ -43,7 +45,9 @@ os.unlink, os.remove, os.replace = map(refuse_open, (os.unlink, os.remove, os.re
 def no_pipes(*told): raise OSError("only sockets can be waited for")
 select.select = no_pipes
 # Nothing can be taken away from an enumeration, so another stands in its place.
-hidden = types.MappingProxyType({n: s for n, s in signal.Signals.__members__.items() if n not in ("SIGHUP", "SIGQUIT")})
+absent = ("SIGHUP", "SIGQUIT")
+present = {n: s for n, s in signal.Signals.__members__.items() if n not in absent}
+hidden = types.MappingProxyType(present)
 real = signal.Signals
 class Signals:
     __members__ = hidden
@@ -54,7 +58,7 @@ del signal.SIGHUP, signal.SIGQUIT
 
 from exoid_cli.app import run
 code = run(sys.argv[1:])
-assert len(locks) == 4, "each of two runs locks its journal while it records, and while it makes a recording of it"
+assert len(locks) == 4, "two runs lock their journals while they record and while they convert"
 sys.exit(code)
 """
 

@@ -57,8 +57,10 @@ def test_unit_and_meaning_travel_with_the_column(tmp_path, swinging_leg, run_met
 def test_a_prismatic_axis_has_columns_of_its_own(tmp_path, swinging_leg, run_metadata):
     axis = Joint("axis", "prismatic")
     assert [axis.column(q) for q in ("angle", "torque", "velocity")] == [
-        "axis_position_m", "axis_force_n", "axis_velocity_m_s",
-    ]  # fmt: skip
+        "axis_position_m",
+        "axis_force_n",
+        "axis_velocity_m_s",
+    ]
     # 12 m is no angle in degrees.
     frame = swinging_leg[["time_s"]].assign(axis_position_m=12.0, axis_force_n=1.0)
     metadata = {**run_metadata, "joints": [{"name": "axis", "kind": "prismatic"}]}
@@ -119,12 +121,15 @@ def test_lists_and_structs_keep_their_types_even_when_empty(tmp_path):
         (b"", "is empty (0 bytes), expected a Parquet file; copy or make it again"),
         (
             b"time,angle\n",
-            "is not a Parquet file (it starts with b'time', expected b'PAR1'); name a file that exoid wrote",
+            (
+                "is not a Parquet file (it starts with b'time', expected b'PAR1'); name a file that"
+                " exoid wrote"
+            ),
         ),
         (b"PAR1 and no more", "is a damaged or truncated Parquet file; copy or make it again"),
     ],
     ids=["missing", "empty", "text", "truncated"],
-)  # fmt: skip
+)
 def test_what_is_no_parquet_file_is_refused(tmp_path, content, told):
     path = tmp_path / "a.parquet"
     if content is not None:
@@ -149,8 +154,9 @@ def test_a_folder_is_refused(tmp_path, swinging_leg, run_metadata):
         refusal(RECORDING.read, tmp_path)
         == f"{tmp_path}: is a folder, expected a Parquet file; name a file in it"
     )
-    assert refusal(RECORDING.write, tmp_path, swinging_leg, run_metadata) == (
-        f"{tmp_path}: is a folder, expected the name of a Parquet file to write"
+    assert (
+        refusal(RECORDING.write, tmp_path, swinging_leg, run_metadata)
+        == f"{tmp_path}: is a folder, expected the name of a Parquet file to write"
     )
 
 
@@ -167,20 +173,39 @@ def test_a_mistyped_name_is_told_from_one_of_another_file(tmp_path, swinging_leg
     [
         (
             None,
-            "has no `exoid` entry in its schema metadata, so exoid did not write it; `exoid import` makes a recording "
-            'of a log; for a table of your own add {"contract": "<name>/<version>"}, see docs/contracts.md',
+            (
+                "has no `exoid` entry in its schema metadata, so exoid did not write it; `exoid"
+                ' import` makes a recording of a log; for a table of your own add {"contract":'
+                ' "<name>/<version>"}, see docs/contracts.md'
+            ),
         ),
-        (b"{", "its `exoid` metadata is not JSON (Expecting property name enclosed in double quotes: "
-               "line 1 column 2 (char 1)); write it again"),
-        (b"[]", 'its `exoid` metadata names no contract; it must hold at least {"contract": "<name>/<version>"}'),
-        (b'{"contract": "motion/1"}', "holds motion/1, expected recording/1; `exoid acquire` makes a recording file"),
+        (
+            b"{",
+            (
+                "its `exoid` metadata is not JSON (Expecting property name enclosed in double"
+                " quotes: line 1 column 2 (char 1)); write it again"
+            ),
+        ),
+        (
+            b"[]",
+            (
+                'its `exoid` metadata names no contract; it must hold at least {"contract":'
+                ' "<name>/<version>"}'
+            ),
+        ),
+        (
+            b'{"contract": "motion/1"}',
+            "holds motion/1, expected recording/1; `exoid acquire` makes a recording file",
+        ),
         (
             b'{"contract": "recording/9"}',
-            "holds recording/9, but exoid 0.1.0 knows recording/1; "
-            "update exoid, or make the file again with `exoid acquire`",
+            (
+                "holds recording/9, but exoid 0.1.0 knows recording/1; "
+                "update exoid, or make the file again with `exoid acquire`"
+            ),
         ),
     ],
-)  # fmt: skip
+)
 def test_a_file_of_another_contract_is_refused(tmp_path, swinging_leg, entry, told):
     path = tmp_path / "a.parquet"
     table = pa.Table.from_pandas(swinging_leg)
@@ -191,9 +216,10 @@ def test_a_file_of_another_contract_is_refused(tmp_path, swinging_leg, entry, to
 def test_an_unknown_contract_is_told_with_the_known_ones(tmp_path, swinging_leg):
     path = tmp_path / "a.parquet"
     storage.save(path, [pa.Table.from_pandas(swinging_leg)], {"contract": "gait/1"})
-    assert refusal(contract_of, path) == (
-        f"{path}: holds gait/1, which exoid does not know; it knows trajectory/1, recording/1, motion/1, "
-        "parameters/1, residuals/1, candidates/1, simulation/1"
+    assert (
+        refusal(contract_of, path)
+        == f"{path}: holds gait/1, which exoid does not know; it knows trajectory/1, recording/1,"
+        " motion/1, parameters/1, residuals/1, candidates/1, simulation/1"
     )
 
 
@@ -210,12 +236,17 @@ def _set(name, row, value):
 REFUSED_FRAMES = {
     "missing column": (
         lambda frame: frame.drop(columns="knee_torque_nm"),
-        "column knee_torque_nm is missing, expected what the drive delivers at the joint (N·m); "
-        "a recording/1 table must have it",
+        (
+            "column knee_torque_nm is missing, expected what the drive delivers at the joint (N·m);"
+            " a recording/1 table must have it"
+        ),
     ),
     "text for a number": (
         lambda frame: frame.assign(hip_angle_rad="0.1"),
-        "column hip_angle_rad: found type large_string, expected float64; write the column as float64",
+        (
+            "column hip_angle_rad: found type large_string, expected float64; write the column as"
+            " float64"
+        ),
     ),
     "a truth for a number": (
         lambda frame: frame.assign(hip_angle_rad=True),
@@ -223,53 +254,72 @@ REFUSED_FRAMES = {
     ),
     "a number that does not fit": (
         lambda frame: frame.assign(sequence=0.5),
-        "column sequence: found type float64, whose values int64 cannot hold "
-        "(Float value 0.500000 was truncated converting to int64); write the column as int64",
+        (
+            "column sequence: found type float64, whose values int64 cannot hold "
+            "(Float value 0.500000 was truncated converting to int64); write the column as int64"
+        ),
     ),
     "mixed values": (
         _set("hip_angle_rad", 3, "x"),
-        "column hip_angle_rad: its values have no common type "
-        "(Could not convert 'x' with type str: tried to convert to double); give them one",
+        (
+            "column hip_angle_rad: its values have no common type "
+            "(Could not convert 'x' with type str: tried to convert to double); give them one"
+        ),
     ),
     "NaN": (
         _set("hip_angle_rad", 12, np.nan),
-        "column hip_angle_rad, row 12: found NaN, expected a finite number; mend or drop the row and write the "
-        "file again",
+        (
+            "column hip_angle_rad, row 12: found NaN, expected a finite number; mend or drop the"
+            " row and write the file again"
+        ),
     ),
     "infinity": (
         _set("hip_torque_nm", 7, -np.inf),
-        "column hip_torque_nm, row 7: found -inf, expected a finite number; mend or drop the row and write the "
-        "file again",
+        (
+            "column hip_torque_nm, row 7: found -inf, expected a finite number; mend or drop the"
+            " row and write the file again"
+        ),
     ),
     "infinity where NaN may be": (
         lambda frame: _set("hip_current_a", 5, np.inf)(frame.assign(hip_current_a=np.nan)),
-        "column hip_current_a, row 5: found inf, expected a finite number; mend or drop the row and write the "
-        "file again",
+        (
+            "column hip_current_a, row 5: found inf, expected a finite number; mend or drop the row"
+            " and write the file again"
+        ),
     ),
     "time backwards": (
         _set("time_s", 40, 0.05),
-        "column time_s, row 40: found 0.05 after 0.195, expected strictly increasing time; sort the rows and drop "
-        "repeated ones",
+        (
+            "column time_s, row 40: found 0.05 after 0.195, expected strictly increasing time; sort"
+            " the rows and drop repeated ones"
+        ),
     ),
     "time that stands still": (
         _set("time_s", 40, 0.195),
-        "column time_s, row 40: found 0.195 after 0.195, expected strictly increasing time; sort the rows and drop "
-        "repeated ones",
+        (
+            "column time_s, row 40: found 0.195 after 0.195, expected strictly increasing time;"
+            " sort the rows and drop repeated ones"
+        ),
     ),
     "more than any machine has": (
         _set("hip_torque_nm", 7, -1e300),
-        "column hip_torque_nm, row 7: found -1e+300, expected at most 1e+12; correct the unit or scale of the column, "
-        "or drop the row",
+        (
+            "column hip_torque_nm, row 7: found -1e+300, expected at most 1e+12; correct the unit"
+            " or scale of the column, or drop the row"
+        ),
     ),
     "degrees": (
         lambda frame: frame.assign(knee_angle_rad=np.linspace(-5, -60, 100)),
-        "column knee_angle_rad, row 8: found -9.44444, which looks like degrees; expected radians, multiply by pi/180",
+        (
+            "column knee_angle_rad, row 8: found -9.44444, which looks like degrees; expected"
+            " radians, multiply by pi/180"
+        ),
     ),
     "no rows": (
         lambda frame: frame.iloc[:0],
         "holds no rows, expected at least one; `exoid acquire` makes it again",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", REFUSED_FRAMES)
@@ -292,8 +342,9 @@ def test_reading_refuses_what_writing_refuses(tmp_path, swinging_leg, run_metada
 
 def test_a_name_that_stands_twice_is_refused(swinging_leg, run_metadata):
     frame = swinging_leg.rename(columns={"knee_angle_rad": "hip_angle_rad"})
-    assert refusal(RECORDING.check, frame, run_metadata, "a.parquet") == (
-        "a.parquet: column hip_angle_rad stands twice, expected each name once; rename one"
+    assert (
+        refusal(RECORDING.check, frame, run_metadata, "a.parquet")
+        == "a.parquet: column hip_angle_rad stands twice, expected each name once; rename one"
     )
 
 
@@ -313,13 +364,22 @@ REFUSED_METADATA = [
         "metadata controller.hip.kp_nm_rad: found 'stiff', expected a valid number",
     ),
     ({"controller": {"hip": {}}}, "metadata controller.hip.type: missing; add it"),
-    ({"joints": [{"name": "Hip"}]}, "metadata joints[0].name: found 'Hip', expected text matching '^[a-z][a-z0-9_]*$'"),
-    ({"joints": [{"name": "a"}, {"name": "a"}]}, "metadata joints: found joints a, a, expected each name once"),
+    (
+        {"joints": [{"name": "Hip"}]},
+        "metadata joints[0].name: found 'Hip', expected text matching '^[a-z][a-z0-9_]*$'",
+    ),
+    (
+        {"joints": [{"name": "a"}, {"name": "a"}]},
+        "metadata joints: found joints a, a, expected each name once",
+    ),
     (
         {"created_at": "noon"},
-        "metadata created_at: found 'noon', expected an ISO 8601 time such as 2025-01-31T12:00:00+00:00",
+        (
+            "metadata created_at: found 'noon', expected an ISO 8601 time such as"
+            " 2025-01-31T12:00:00+00:00"
+        ),
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("keys", "told"), REFUSED_METADATA)
@@ -338,8 +398,11 @@ def test_metadata_that_json_cannot_hold_are_refused(swinging_leg, run_metadata):
 
 
 def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
-    state = {f"{joint}_{quantity}": 0.0 for joint in ("hip", "knee") for quantity in
-             ("velocity_rad_s", "acceleration_rad_s2", "predicted_nm", "residual_nm")}  # fmt: skip
+    state = {
+        f"{joint}_{quantity}": 0.0
+        for joint in ("hip", "knee")
+        for quantity in ("velocity_rad_s", "acceleration_rad_s2", "predicted_nm", "residual_nm")
+    }
     frame = swinging_leg.assign(
         **state, run="exo_alone", purpose="train", segment=0, model="baseline", scored=True
     )
@@ -347,8 +410,10 @@ def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
     RESIDUALS.check(both, {})
     told = refusal(RESIDUALS.check, both.assign(file="a"), {}, "r.parquet")
     assert told.startswith("r.parquet: column time_s, row 100: found 0.0 after 0.495")
-    assert refusal(RESIDUALS.check, both.assign(model="best"), {}, "r.parquet") == (
-        "r.parquet: column model, row 0: found 'best', expected one of baseline, extended; mend the value"
+    assert (
+        refusal(RESIDUALS.check, both.assign(model="best"), {}, "r.parquet")
+        == "r.parquet: column model, row 0: found 'best', expected one of baseline, extended; mend"
+        " the value"
     )
 
 
@@ -364,12 +429,24 @@ def test_a_diverging_simulation_is_not_taken_for_a_wrong_unit(swinging_leg):
 
 def test_the_covariance_has_a_row_for_each_parameter():
     frame = pd.DataFrame(
-        {"name": ["X1"], "symbol": ["X1"], "joint": [None], "run": [None], "value": [1.0], "unit": ["kg·m²"],
-         "std_error": [None], "ci95_low": [None], "ci95_high": [None], "step": ["inertia"], "effect": ["rigid_body"]}
-    )  # fmt: skip
+        {
+            "name": ["X1"],
+            "symbol": ["X1"],
+            "joint": [None],
+            "run": [None],
+            "value": [1.0],
+            "unit": ["kg·m²"],
+            "std_error": [None],
+            "ci95_low": [None],
+            "ci95_high": [None],
+            "step": ["inertia"],
+            "effect": ["rigid_body"],
+        }
+    )
     PARAMETERS.check(frame, {"covariance": [[1.0]]})
-    assert refusal(PARAMETERS.check, frame, {"covariance": [[1.0, 0.0]]}, "p.parquet") == (
-        "p.parquet: metadata covariance: found 1 rows of [2] values, expected 1 x 1, "
+    assert (
+        refusal(PARAMETERS.check, frame, {"covariance": [[1.0, 0.0]]}, "p.parquet")
+        == "p.parquet: metadata covariance: found 1 rows of [2] values, expected 1 x 1, "
         "one for each parameter in row order; write the whole matrix"
     )
 
@@ -385,11 +462,15 @@ def test_nothing_but_an_older_version_of_itself_is_overwritten(
     notes.write_text("a month of work")
     left_over.write_bytes(path.read_bytes()[:-100])
     RECORDING.write(left_over, swinging_leg, run_metadata)
-    assert refusal(MOTION.refuse_place, path) == (
-        f"{path}: holds recording/1, not overwritten with motion/1; choose another name or remove it"
+    assert (
+        refusal(MOTION.refuse_place, path)
+        == f"{path}: holds recording/1, not overwritten with motion/1; choose another name or"
+        " remove it"
     )
-    assert refusal(RECORDING.write, notes, swinging_leg, run_metadata) == (
-        f"{notes}: holds something else, not overwritten with recording/1; choose another name or remove it"
+    assert (
+        refusal(RECORDING.write, notes, swinging_leg, run_metadata)
+        == f"{notes}: holds something else, not overwritten with recording/1; choose another name"
+        " or remove it"
     )
     assert notes.read_text() == "a month of work"
 
@@ -413,8 +494,10 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_a_motion_needs_what_a_recording_lacks(swinging_leg, run_metadata):
-    assert refusal(MOTION.check, swinging_leg, run_metadata, "a.parquet") == (
-        "a.parquet: column hip_angle_measured_rad is missing, expected measured joint angle (rad); "
+    assert (
+        refusal(MOTION.check, swinging_leg, run_metadata, "a.parquet")
+        == "a.parquet: column hip_angle_measured_rad is missing, expected measured joint angle"
+        " (rad); "
         "a motion/1 table must have it"
     )
 
@@ -438,8 +521,10 @@ def test_a_journal_is_recognised_and_its_whole_samples_are_counted(tmp_path):
         stream.write_batch(batch)
         stream.write_batch(batch)
     path.write_bytes(path.read_bytes()[:-40])
-    assert refusal(storage.load, path) == (
-        f"{path}: is the journal of a run that was killed or still goes on, with 3 whole samples; "
+    assert (
+        refusal(storage.load, path)
+        == f"{path}: is the journal of a run that was killed or still goes on, with 3 whole"
+        " samples; "
         f"`exoid recover {path}` makes a recording of it"
     )
 

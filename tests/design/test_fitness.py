@@ -28,9 +28,15 @@ OMEGA = 0.2 * np.pi
 
 def a_problem(harmonics=5, criterion="condition", theta0=None, samples=1000, rest=False):
     return problem(
-        omega=OMEGA, harmonics=harmonics, bounds=bounds_array(JointBounds()), geometry=Geometry(),
-        criterion=criterion, theta0=theta0, basis=basis_of(harmonics, rest), samples=samples,
-    )  # fmt: skip
+        omega=OMEGA,
+        harmonics=harmonics,
+        bounds=bounds_array(JointBounds()),
+        geometry=Geometry(),
+        criterion=criterion,
+        theta0=theta0,
+        basis=basis_of(harmonics, rest),
+        samples=samples,
+    )
 
 
 def random_candidate(of, seed, size=1.0):

@@ -36,9 +36,15 @@ def moved(reference, rate, kp, kd, acceleration, seconds):
 
     time = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     path = solve_ivp(
-        lambda t, s: [s[1], acceleration(s[0], s[1], force(t, *s))], (0, seconds),
-        [reference(0.0)[0], rate(0.0)[0]], t_eval=time, method="RK23", rtol=1e-5, atol=1e-7, max_step=0.01,
-    )  # fmt: skip
+        lambda t, s: [s[1], acceleration(s[0], s[1], force(t, *s))],
+        (0, seconds),
+        [reference(0.0)[0], rate(0.0)[0]],
+        t_eval=time,
+        method="RK23",
+        rtol=1e-5,
+        atol=1e-7,
+        max_step=0.01,
+    )
     return (
         time,
         path.y[0],
@@ -55,9 +61,14 @@ def table(time, position, torque, joint, purpose, **geometry):
         {"time_s": time, f"{joint['name']}_{angle}": position, f"{joint['name']}_{force}": torque}
     )
     metadata = {
-        "contract": "recording/1", "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ,
-        "period_s": PERIOD_S, "joints": [joint], "geometry": geometry,
-    }  # fmt: skip
+        "contract": "recording/1",
+        "run": "exo_alone",
+        "purpose": purpose,
+        "sample_rate_hz": RATE_HZ,
+        "period_s": PERIOD_S,
+        "joints": [joint],
+        "geometry": geometry,
+    }
     return Table(frame, metadata, None)
 
 

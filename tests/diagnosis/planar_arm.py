@@ -65,8 +65,12 @@ def planar_arm(purpose, seed, spring=0.0, seconds=25.0):
     noise = np.random.default_rng(seed).normal(0, 0.05, (len(frame), 2))
     frame[["shoulder_torque_nm", "elbow_torque_nm"]] += noise
     metadata = {
-        "contract": "recording/1", "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ,
-        "period_s": PERIOD_S, "joints": [{"name": name, "kind": "revolute"} for name in ("shoulder", "elbow")],
+        "contract": "recording/1",
+        "run": "exo_alone",
+        "purpose": purpose,
+        "sample_rate_hz": RATE_HZ,
+        "period_s": PERIOD_S,
+        "joints": [{"name": name, "kind": "revolute"} for name in ("shoulder", "elbow")],
         "geometry": {"thigh_length_m": LENGTH, "gravity_m_s2": 0.0},
-    }  # fmt: skip
+    }
     return Table(frame, metadata, None)

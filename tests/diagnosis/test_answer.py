@@ -49,8 +49,12 @@ def test_a_likely_cause_is_named_and_a_rival_that_is_not_far_behind_is_tied():
     (finding,) = findings(posterior, answer)
     assert finding.level == "cause"
     assert [level for level, _, _ in finding.path] == [
-        "missing", "repeats", "joint", "family", "cause",
-    ]  # fmt: skip
+        "missing",
+        "repeats",
+        "joint",
+        "family",
+        "cause",
+    ]
 
 
 def test_a_third_cause_beside_the_named_one_is_no_tie():
@@ -250,7 +254,7 @@ def test_a_tie_that_predicts_the_validation_runs_better_is_named_instead():
     assert judged.dropped == frozenset(), "the other does no harm"
 
 
-def test_what_is_named_beside_a_cause_that_harms_keeps_its_probability_and_all_above_it_is_at_least_as_probable():
+def test_a_cause_named_with_one_that_harms_keeps_its_probability_and_so_do_all_above_it():
     """Without the one that harms, sets without either explain the training runs better."""
     selected = after(weighed(_02=0.9, _0=1e-6, _4=0.1, _=1e-8), {"quadratic_drag@hip": -30.0})
     (named,) = selected.answer.named

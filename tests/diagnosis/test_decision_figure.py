@@ -59,8 +59,11 @@ def test_every_family_has_a_colour_of_its_own():
 
 def test_only_unlisted_laws_are_hatched(drawn):
     right = drawn.axes[2]
-    hatched = [label.get_text() for label, bar in zip(right.get_yticklabels(), right.patches, strict=True)
-               if bar.get_hatch() == UNLISTED]  # fmt: skip
+    hatched = [
+        label.get_text()
+        for label, bar in zip(right.get_yticklabels(), right.patches, strict=True)
+        if bar.get_hatch() == UNLISTED
+    ]
     assert len(hatched) == 3
     assert all("law" in words or "tone" in words for words in hatched)
 

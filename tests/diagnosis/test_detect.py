@@ -141,7 +141,7 @@ def test_structural_ties_are_never_apart(rich, one, other):
     assert one in rich[other].never_apart
 
 
-def test_one_kind_of_run_ties_a_mass_beside_the_axis_to_an_encoder_and_to_a_spring_and_two_part_them(
+def test_one_kind_of_run_ties_a_mass_off_the_axis_to_encoder_and_spring_and_two_part_them(
     rich,
 ):
     alone = looked_at(RICH, kinds=("exo_alone",))["mass_off_axis@knee"].tied_with

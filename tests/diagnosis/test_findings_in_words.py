@@ -89,8 +89,11 @@ def levels(finding):
 def test_a_tie_over_two_families_is_told_at_the_joint_and_of_no_family():
     (found,) = findings(diagnosed({(SPEED,): 0.55, (OFFSET,): 0.42, (): 0.03}))
     assert levels(found) == [
-        ("missing", True), ("repeats", True), ("joint", "hip"), ("cause", "coulomb_asymmetry@hip"),
-    ]  # fmt: skip
+        ("missing", True),
+        ("repeats", True),
+        ("joint", "hip"),
+        ("cause", "coulomb_asymmetry@hip"),
+    ]
     assert [one["family"] for one in found["causes"]] == ["speed", "sensor"]
     assert found["words"] == "Coulomb asymmetry at the hip"
 

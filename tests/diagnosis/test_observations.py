@@ -69,7 +69,7 @@ def test_a_validation_run_has_no_cuffs_where_training_had_none(motions):
     assert like_trained(validated, baseline_of([validated])) is validated
 
 
-def test_torque_that_obeys_the_model_obeys_it_behind_the_low_pass_and_not_along_a_motion_filtered_so_low(
+def test_torque_of_the_model_obeys_it_behind_the_low_pass_but_not_along_a_low_passed_motion(
     motions,
 ):
     """Friction turns round at once, centrifugal torque is a square: a filtered motion has them

@@ -161,9 +161,13 @@ def test_gaps_and_samples_that_cannot_be_used_are_left_out():
 
 def test_lines_that_a_leg_hides_behind_its_position_loops_become_one_candidate_of_both():
     hidden = {
-        "amplitude": 1.2, "cycles_per_turn": 88.3, "phase": 0.4,
-        "amplitude_2": 0.9, "cycles_per_turn_2": 199.0, "phase_2": -1.0,
-    }  # fmt: skip
+        "amplitude": 1.2,
+        "cycles_per_turn": 88.3,
+        "phase": 0.4,
+        "amplitude_2": 0.9,
+        "cycles_per_turn_2": 199.0,
+        "phase_2": -1.0,
+    }
     look = Screening.of(session("cogging", "knee", **hidden))
     (ripple,) = _ripples(look.prepared, look.alone, look.regression)
     assert ripple.candidate.label == "cogging@knee"

@@ -34,7 +34,10 @@ def imported(motion):
 def test_a_joint_that_never_moves_is_named(motions, work):
     with pytest.raises(
         InputError,
-        match=r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to train",
+        match=(
+            r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to"
+            r" train"
+        ),
     ):
         work([standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions])
 
@@ -54,9 +57,10 @@ def test_who_moved_a_joint_that_seems_to_stand_is_told_to_look_at_its_units(moti
 def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
     with pytest.raises(InputError) as refused:
         diagnose([imported(standing_knee(m, -0.5)) for m in motions])
-    assert str(refused.value) == (
-        "run_0.parquet: the angle of the knee is -0.5 rad in every row, expected a joint that moves; check its "
-        "encoder, and which channel the map reads"
+    assert (
+        str(refused.value)
+        == "run_0.parquet: the angle of the knee is -0.5 rad in every row, expected a joint that"
+        " moves; check its encoder, and which channel the map reads"
     )
 
 
@@ -81,9 +85,11 @@ def test_joints_that_hold_one_angle_between_them_are_refused(motions, times):
 
     with pytest.raises(InputError) as refused:
         diagnose([imported(copied(m)) for m in motions])
-    assert str(refused.value) == (
-        f"run_0.parquet: hip and knee hold the same angles (knee's are {times:g} times hip's throughout, but for their "
-        "zeros), expected a measurement of its own of each joint; correct their columns in the map"
+    assert (
+        str(refused.value)
+        == f"run_0.parquet: hip and knee hold the same angles (knee's are {times:g} times hip's"
+        " throughout, but for their zeros), expected a measurement of its own of each joint;"
+        " correct their columns in the map"
     )
 
 
@@ -131,7 +137,9 @@ def test_mechanisms_that_exoid_does_not_know_are_refused(motions):
     strange = [replace(m, metadata=m.metadata | telescope) for m in motions]
     with pytest.raises(
         InputError,
-        match=r"has joints hip \(revolute\), knee \(prismatic\) and gravity 9\.8 m/s², expected those",
+        match=(
+            r"has joints hip \(revolute\), knee \(prismatic\) and gravity 9\.8 m/s², expected those"
+        ),
     ):
         diagnose(strange)
 

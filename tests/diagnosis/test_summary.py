@@ -30,8 +30,11 @@ from tests.diagnosis.sessions import recordings
 
 LABEL = "parallel_spring@knee"
 SPRING = {
-    "effect": "parallel_spring", "joint": "knee", "probability": 0.97, "indistinguishable_from": [],
-}  # fmt: skip
+    "effect": "parallel_spring",
+    "joint": "knee",
+    "probability": 0.97,
+    "indistinguishable_from": [],
+}
 STRIBECK = SPRING | {"effect": "stribeck_friction", "joint": "hip"}
 
 
@@ -79,8 +82,8 @@ def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
     said = told["summary"]
     assert said.startswith("Missing from the simulation: parallel spring at the knee")
     assert (
-        "Faults of acquisition were found as well: run_1.parquet, hip_angle_rad: the hip's angle is stuck"
-        in said
+        "Faults of acquisition were found as well: run_1.parquet, hip_angle_rad: the hip's angle is"
+        " stuck" in said
     )
     assert said.startswith(told["finding"])
     assert "acquisition" not in told["finding"]
@@ -98,10 +101,11 @@ def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck)
     said = finding_in_words(
         with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.56, 0.305]), [SPRING], None
     )
-    assert said == (
-        "Missing from the simulation: parallel spring at the knee (probability 0.97). With it the knee's torque error "
-        "falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m, which is noise; "
-        "the hip's is then 0.56 N·m, 1.12 times its floor."
+    assert (
+        said
+        == "Missing from the simulation: parallel spring at the knee (probability 0.97). With it"
+        " the knee's torque error falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m,"
+        " which is noise; the hip's is then 0.56 N·m, 1.12 times its floor."
     )
 
 
@@ -110,8 +114,8 @@ def test_the_gain_is_told_where_it_is_made_and_not_where_the_error_is_largest(st
         with_errors(stuck, [0.3, 0.3], [0.9, 0.4], [0.9, 0.305]), [SPRING], None
     )
     assert (
-        "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m, which is noise; "
-        in said
+        "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m,"
+        " which is noise; " in said
     )
     assert said.endswith("the hip's is then 0.90 N·m, 3.00 times its floor.")
 
@@ -280,8 +284,10 @@ def test_of_tied_causes_the_first_is_what_was_fitted(stuck):
 
 def test_ties_are_one_answer_with_one_probability():
     tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
-    assert _in_words(tied) == (
-        "parallel spring at the knee or base tilt, which these data cannot tell apart (together 0.97)"
+    assert (
+        _in_words(tied)
+        == "parallel spring at the knee or base tilt, which these data cannot tell apart (together"
+        " 0.97)"
     )
 
 
@@ -330,7 +336,10 @@ def test_a_size_that_may_be_zero_is_said_not_to_be_determined(stuck, times, is_t
         for caveat in caveats(replace(stuck, uncertainty=wide))
         if "do not determine" in caveat
     ]
-    said = "the training runs do not determine the size of parallel spring at the knee: its 95 % interval includes zero"
+    said = (
+        "the training runs do not determine the size of parallel spring at the knee: its 95 %"
+        " interval includes zero"
+    )
     assert told == [said] * is_told
 
 

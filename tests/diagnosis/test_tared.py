@@ -38,7 +38,7 @@ def tared():
     return found(HIDDEN)
 
 
-def test_a_sensor_tared_anew_at_each_start_is_named_and_nothing_but_a_drift_that_hardly_grows_is_its_tie(
+def test_a_sensor_tared_at_each_start_is_named_and_only_a_drift_that_hardly_grows_ties(
     tared,
 ):
     assert tared["status"] == "explained"

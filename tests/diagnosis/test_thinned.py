@@ -31,10 +31,20 @@ def fast():
     forces = np.repeat(slow.forces, 5, axis=0)
     blocks = {**slow.metadata["regression_filter"], "decimation": 25}
     return replace(
-        slow, time=time, **at, torque=torque, forces=forces, segment=np.repeat(slow.segment, 5),
-        valid=np.repeat(slow.valid, 5), sample_rate_hz=RATE_HZ, sequence=None, reference=None, measured_angle=None,
-        temperature=None, metadata={**slow.metadata, "regression_filter": blocks},
-    )  # fmt: skip
+        slow,
+        time=time,
+        **at,
+        torque=torque,
+        forces=forces,
+        segment=np.repeat(slow.segment, 5),
+        valid=np.repeat(slow.valid, 5),
+        sample_rate_hz=RATE_HZ,
+        sequence=None,
+        reference=None,
+        measured_angle=None,
+        temperature=None,
+        metadata={**slow.metadata, "regression_filter": blocks},
+    )
 
 
 def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):

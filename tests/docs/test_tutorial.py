@@ -25,7 +25,9 @@ SHORT = {
         "duration_s = 40.0\n": "duration_s = 15.0\n",
         "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
         "figures = true": "figures = false",
-        "sweep_nm_s_rad = [50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": "sweep_nm_s_rad = []",
+        "sweep_nm_s_rad = [50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": (
+            "sweep_nm_s_rad = []"
+        ),
     },
     "rigs/plain.toml": {"ramp_s = 3.0": "ramp_s = 1.0"},
 }

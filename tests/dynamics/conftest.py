@@ -46,9 +46,17 @@ def record(model: Model, seconds: float = 12.0) -> Motion:
     # The start from rest is a kink that the filter rounds off.
     valid[:100] = valid[-40:] = False
     return Motion(
-        time, q, derivative(q, RATE_HZ, 1), derivative(q, RATE_HZ, 2), torque, np.zeros(len(time), dtype=np.int64),
-        valid, sample_rate_hz=RATE_HZ, cutoff_hz=CUTOFF_HZ, reference=reference,
-    )  # fmt: skip
+        time,
+        q,
+        derivative(q, RATE_HZ, 1),
+        derivative(q, RATE_HZ, 2),
+        torque,
+        np.zeros(len(time), dtype=np.int64),
+        valid,
+        sample_rate_hz=RATE_HZ,
+        cutoff_hz=CUTOFF_HZ,
+        reference=reference,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -36,8 +36,18 @@ def controller(**changes) -> RbfController:
 
 def wave(t):
     """Angle, velocity and acceleration, (3, 2) at one time."""
-    return np.array([f(2.5 * t + np.array([0.0, 1.0])) * 2.5**k for k, f in enumerate((
-        lambda x: 0.4 * np.sin(x) - 0.2, lambda x: 0.4 * np.cos(x), lambda x: -0.4 * np.sin(x)))])  # fmt: skip
+    return np.array(
+        [
+            f(2.5 * t + np.array([0.0, 1.0])) * 2.5**k
+            for k, f in enumerate(
+                (
+                    lambda x: 0.4 * np.sin(x) - 0.2,
+                    lambda x: 0.4 * np.cos(x),
+                    lambda x: -0.4 * np.sin(x),
+                )
+            )
+        ]
+    )
 
 
 def follow(model: Model, c: RbfController, seconds=2.0, encoder=IDEAL, substeps=1, push_nm=2.0):

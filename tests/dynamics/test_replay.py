@@ -74,6 +74,8 @@ def test_terms_of_another_kind_of_run_are_left_out(leg, recorded):
 def test_a_recording_shorter_than_a_window_is_told(leg, recorded):
     with pytest.raises(InputError) as caught:
         replay(leg, recorded, window_s=60.0)
-    assert str(caught.value) == (
-        "the motion: no stretch of valid samples lasts the 60 s of a window; replay a longer recording without gaps"
+    assert (
+        str(caught.value)
+        == "the motion: no stretch of valid samples lasts the 60 s of a window; replay a longer"
+        " recording without gaps"
     )

@@ -26,9 +26,16 @@ def with_human():
     everywhere = np.ones(len(time), dtype=bool)
     temperature = np.column_stack([26.0 + 0.5 * time, 28.0 + 0.8 * time])
     return Motion(
-        time, q, dq, ddq, torque, np.zeros(len(time), dtype=np.int64), everywhere, run="with_human",
+        time,
+        q,
+        dq,
+        ddq,
+        torque,
+        np.zeros(len(time), dtype=np.int64),
+        everywhere,
+        run="with_human",
         temperature=temperature,
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="session")

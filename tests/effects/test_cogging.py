@@ -19,9 +19,13 @@ from tests.effects.test_parameters_file import rows
 from tests.export.machines import LEG, machine
 
 TWO = {
-    "amplitude": 1.5, "cycles_per_turn": 88.3, "phase": 0.6,
-    "amplitude_2": 0.4, "cycles_per_turn_2": 201.7, "phase_2": -2.0,
-}  # fmt: skip
+    "amplitude": 1.5,
+    "cycles_per_turn": 88.3,
+    "phase": 0.6,
+    "amplitude_2": 0.4,
+    "cycles_per_turn_2": 201.7,
+    "phase_2": -2.0,
+}
 
 
 @pytest.fixture

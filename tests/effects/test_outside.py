@@ -50,13 +50,19 @@ def test_an_effect_of_another_package_is_one_of_exoids(python_with):
 @pytest.mark.parametrize(
     ("module", "message"),
     [
-        ("import no_such_module", "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; mend it"),
+        (
+            "import no_such_module",
+            "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; mend it",
+        ),
         ("TendonSlack = 3", "it is 3, expected a subclass of pipelines.effects.Effect; mend it"),
         (GOOD.replace("    equation =", "    unstated ="), "does not state equation"),
-        (GOOD.replace('"tendon_slack"', '"cogging"'), "its name cogging is already that of pipelines"),
+        (
+            GOOD.replace('"tendon_slack"', '"cogging"'),
+            "its name cogging is already that of pipelines",
+        ),
     ],
     ids=["does not load", "no effect", "incomplete", "name taken"],
-)  # fmt: skip
+)
 def test_a_broken_effect_is_one_line_that_names_its_package(python_with, module, message):
     done = python_with(module, "from exoid_cli.app import run; sys.exit(run(['effects']))")
     assert done.returncode == 2

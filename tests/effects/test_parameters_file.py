@@ -31,7 +31,7 @@ def table(*terms):
 
 @pytest.mark.parametrize(
     "term", [t for t in TERMS if t.effect.name != "rigid_body"], ids=lambda term: term.effect.label
-)  # fmt: skip
+)
 def test_a_model_survives_its_file(term, with_human):
     body = Term(RigidBody(run="with_human"), BODIES["with_human"])
     written = Model((body, term))
@@ -49,7 +49,10 @@ def test_a_parameter_too_few_is_refused_with_the_names_that_belong_there():
     frame = table(spring)
     with pytest.raises(
         InputError,
-        match="parallel_spring@knee has values stiffness, expected stiffness, rest_angle; correct them",
+        match=(
+            "parallel_spring@knee has values stiffness, expected stiffness, rest_angle; correct"
+            " them"
+        ),
     ):
         model_from_parameters(frame[frame["name"] != "rest_angle"], "with_human")
 

@@ -90,8 +90,16 @@ def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(
     # Gravity would pull the twisted link a little further, at any speed.
     m = replace(with_human, geometry=replace(with_human.geometry, gravity_m_s2=0.01))
     for slow in (2.0, 8.0):
-        motion = replace(m, time=slow * m.time, sample_rate_hz=m.sample_rate_hz / slow, cutoff_hz=12.0 / slow,
-                         dq=m.dq / slow, ddq=m.ddq / slow**2, body=X, limb_body=X)  # fmt: skip
+        motion = replace(
+            m,
+            time=slow * m.time,
+            sample_rate_hz=m.sample_rate_hz / slow,
+            cutoff_hz=12.0 / slow,
+            dq=m.dq / slow,
+            ddq=m.ddq / slow**2,
+            body=X,
+            limb_body=X,
+        )
         # A rotor that the body holds turns with the motor.
         rotor = rotor_among_links(motion, joint) if effect is JointElasticity else 0.0
         load = Model((Term(RigidBody(), X - [rotor, 0.0, 0.0, 0.0]),)).torque(motion)
@@ -126,9 +134,16 @@ def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(
     states, ddtheta = simulated(model, seconds=6.0)
     n = len(states)
     motion = Motion(
-        np.arange(n) * 0.005, states[:, THETA], states[:, DTHETA], ddtheta, np.zeros((n, 2)), np.zeros(n, np.int64),
-        np.ones(n, bool), cutoff_hz=60.0, body=X,
-    )  # fmt: skip
+        np.arange(n) * 0.005,
+        states[:, THETA],
+        states[:, DTHETA],
+        ddtheta,
+        np.zeros((n, 2)),
+        np.zeros(n, np.int64),
+        np.ones(n, bool),
+        cutoff_hz=60.0,
+        body=X,
+    )
     direction = np.zeros((n, 2))
     direction[:, bound.column(motion)] = 1.0
     link = behind_spring(motion, motion.link_swing, direction, bound, shape, ratio)
@@ -203,10 +218,19 @@ def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured
     )
     n = len(t)
     measured = Motion(
-        t, q, dq, ddq, np.sin(np.column_stack([t, t])), np.zeros(n, np.int64), np.ones(n, bool), body=X, limb_body=X,
-        forces=np.ones((n, 4, 3)), geometry=Geometry(thigh_cuff_distance_m=0.2, shank_cuff_distance_m=0.2),
+        t,
+        q,
+        dq,
+        ddq,
+        np.sin(np.column_stack([t, t])),
+        np.zeros(n, np.int64),
+        np.ones(n, bool),
+        body=X,
+        limb_body=X,
+        forces=np.ones((n, 4, 3)),
+        geometry=Geometry(thigh_cuff_distance_m=0.2, shank_cuff_distance_m=0.2),
         limb_load=np.cos(np.column_stack([t, t])) if with_load else None,
-    )  # fmt: skip
+    )
     if before:
         getattr(measured, before)
     moved, alone = measured.with_state(q + 0.2, dq, ddq), replace(measured, q=q + 0.2)
@@ -214,8 +238,9 @@ def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured
     for of in (
         lambda motion: motion.link_swing.on_coordinate(direction),
         lambda motion: motion.limb_swing.on_coordinate(direction),
-        lambda motion: motion.on_limb, lambda motion: motion.transmitted,
-    ):  # fmt: skip
+        lambda motion: motion.on_limb,
+        lambda motion: motion.transmitted,
+    ):
         assert all(
             (found == expected).all() for found, expected in zip(of(moved), of(alone), strict=True)
         )

@@ -105,9 +105,13 @@ def motion(disturbed, seed, seconds=20.0, purpose="train"):
         }
     }
     metadata = {
-        "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ, "controller": controller,
-        "joints": [{"name": "joint", "kind": "revolute"}], "geometry": {"gravity_m_s2": GRAVITY},
-    }  # fmt: skip
+        "run": "exo_alone",
+        "purpose": purpose,
+        "sample_rate_hz": RATE_HZ,
+        "controller": controller,
+        "joints": [{"name": "joint", "kind": "revolute"}],
+        "geometry": {"gravity_m_s2": GRAVITY},
+    }
     return motion_from_table(motion_table(Table(frame, metadata), FilterSettings(cutoff_hz=15.0)))
 
 

@@ -155,7 +155,8 @@ def test_good_angles_are_seldom_called_noisy():
 def test_good_angles_are_called_noisy_at_the_nominal_rate():
     p = false_alarms(600)
     print(
-        f"\nfalse alarms at 5 %: {100 * np.mean(p < 0.05):.1f} %, at 20 %: {100 * np.mean(p < 0.2):.1f} %"
+        f"\nfalse alarms at 5 %: {100 * np.mean(p < 0.05):.1f} %, at 20 %:"
+        f" {100 * np.mean(p < 0.2):.1f} %"
     )
     assert 0.025 < np.mean(p < 0.05) < 0.08
     assert 0.14 < np.mean(p < 0.2) < 0.27
@@ -199,9 +200,14 @@ def test_a_method_that_does_not_exist_is_told_with_the_nearest_that_does():
 
 @pytest.mark.parametrize(
     ("short", "method"),
-    [("iv", InstrumentalVariables), ("wls", WeightedLeastSquares), ("ols", OrdinaryLeastSquares),
-     ("irls", IterativelyReweighted), ("oe", OutputError)],
-)  # fmt: skip
+    [
+        ("iv", InstrumentalVariables),
+        ("wls", WeightedLeastSquares),
+        ("ols", OrdinaryLeastSquares),
+        ("irls", IterativelyReweighted),
+        ("oe", OutputError),
+    ],
+)
 def test_a_method_answers_to_what_papers_call_it_for_short(short, method):
     assert type(estimator_named(short)) is method
 

@@ -24,7 +24,10 @@ SEED = 480_000
 def show(methods: Sequence[Estimator], sessions: int) -> None:
     """Print bias, coverage, error on runs not fitted, and time."""
     made = [simulate(Case(SEED + number, "none", plain=True)) for number in range(sessions)]
-    title = f"**a leg simulated by MuJoCo**, {sessions} sessions of four runs of 60 to 80 s, nothing hidden"
+    title = (
+        f"**a leg simulated by MuJoCo**, {sessions} sessions of four runs of 60 to 80 s, nothing"
+        " hidden"
+    )
     headings = ("method", "worst bias of X", "of friction", "covered", "validation RMSE N·m", "s")
     table(title, headings, _rows(methods, made))
 

@@ -47,15 +47,21 @@ def frame_of(terms, run, joints=("hip", "knee")):
     called = dict(zip(("hip", "knee"), joints, strict=True))
     rows = [
         {
-            "name": p.name, "symbol": p.symbol, "value": float(value),
+            "name": p.name,
+            "symbol": p.symbol,
+            "value": float(value),
             "joint": called.get(term.effect.joint, term.effect.joint),
-            "run": run if term.effect.name == "rigid_body" else None, "unit": p.unit, "std_error": 0.1,
-            "ci95_low": float(value) - 0.2, "ci95_high": float(value) + 0.2, "step": "extension",
+            "run": run if term.effect.name == "rigid_body" else None,
+            "unit": p.unit,
+            "std_error": 0.1,
+            "ci95_low": float(value) - 0.2,
+            "ci95_high": float(value) + 0.2,
+            "step": "extension",
             "effect": term.effect.name,
         }
         for term in terms
         for p, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
-    ]  # fmt: skip
+    ]
     return pd.DataFrame(rows)
 
 
@@ -126,9 +132,16 @@ def at_joints(terms, states, names, *, sensors):
     give them."""
     n = len(states.t)
     motion = Motion(
-        states.t, states.q, states.dq, states.ddq, np.zeros_like(states.q), np.arange(n), np.ones(n, dtype=bool),
-        run="with_human", joints=tuple(names),
-    )  # fmt: skip
+        states.t,
+        states.q,
+        states.dq,
+        states.ddq,
+        np.zeros_like(states.q),
+        np.arange(n),
+        np.ones(n, dtype=bool),
+        run="with_human",
+        joints=tuple(names),
+    )
     for term in terms:
         if (term.effect.side is Side.SENSOR) == sensors:
             motion = term.effect.corrected(motion, term.shape)

@@ -189,7 +189,7 @@ def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format
         "friction@hip: viscous = -0.4 N·m·s/rad",
         "friction@knee: coulomb = -0.3 N·m",
         "friction@knee: viscous = -0.1 N·m·s/rad",
-    ]  # fmt: skip
+    ]
     text = "\n".join(format.write(made, "leg").values())
     assert ("WARNING: friction@hip: viscous = -0.4" in text) == (format is not JSON)
     degrees = {term.effect.label: holding.degree for term, holding in made.holdings(format)}

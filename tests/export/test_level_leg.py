@@ -33,9 +33,11 @@ CAUSES = (
 
 def made_of(*terms):
     metadata = {
-        "contract": "parameters/1", "mechanism": "leg", "geometry": LEVEL.metadata(),
+        "contract": "parameters/1",
+        "mechanism": "leg",
+        "geometry": LEVEL.metadata(),
         "joints": [{"name": name, "kind": "revolute"} for name in NAMES],
-    }  # fmt: skip
+    }
     return exported(Table(frame_of(terms, "exo_alone", NAMES), metadata))
 
 

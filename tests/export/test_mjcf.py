@@ -47,8 +47,10 @@ def test_the_bare_leg_accelerates_as_ours_does(leg, states, drive):
 
 
 @pytest.mark.parametrize(
-    "term", [t for t in RIGID if t.effect.torque_reading is None], ids=lambda term: term.effect.label
-)  # fmt: skip
+    "term",
+    [t for t in RIGID if t.effect.torque_reading is None],
+    ids=lambda term: term.effect.label,
+)
 def test_a_leg_with_a_cause_accelerates_as_ours_does(term, states, drive):
     made = machine(*LEG, term)
     agree(simulated(made, states, drive), acceleration(made, states, drive)[0])

@@ -40,11 +40,18 @@ def single(kind, *, causes=CAUSES, times=1.0):
     given = {"rigid_body": dict(zip([p.name for p in mechanism.parameters], body, strict=True))}
     given |= causes | (ONLY_OF.get(kind, {}) if causes is CAUSES else {})
     rows = [
-        {"name": name, "symbol": name, "joint": None if effect == "rigid_body" else NAME, "value": value, "unit": "1",
-         "run": "exo_alone" if effect == "rigid_body" else None, "effect": effect}
+        {
+            "name": name,
+            "symbol": name,
+            "joint": None if effect == "rigid_body" else NAME,
+            "value": value,
+            "unit": "1",
+            "run": "exo_alone" if effect == "rigid_body" else None,
+            "effect": effect,
+        }
         for effect, values in given.items()
         for name, value in values.items()
-    ]  # fmt: skip
+    ]
     metadata = {
         "joints": [{"name": NAME, "kind": mechanism.kinds[0]}],
         "geometry": {"gravity_m_s2": 9.81 if mechanism.has_gravity else 0.0},

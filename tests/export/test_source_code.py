@@ -86,9 +86,16 @@ def test_the_model_that_the_regression_fits_is_the_one_in_c(library, models, sta
 
     made, n = models["bare"], len(states.t)
     motion = Motion(
-        states.t, states.q, states.dq, states.ddq, np.zeros_like(states.q), np.arange(n), np.ones(n, dtype=bool),
-        run="with_human", geometry=made.geometry,
-    )  # fmt: skip
+        states.t,
+        states.q,
+        states.dq,
+        states.ddq,
+        np.zeros_like(states.q),
+        np.arange(n),
+        np.ones(n, dtype=bool),
+        run="with_human",
+        geometry=made.geometry,
+    )
     agree(in_c(library, "bare", states)[0], made.model.torque(motion))
 
 

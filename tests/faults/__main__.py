@@ -47,17 +47,26 @@ def rows() -> Iterator[str]:
                     if ended.code < 0
                     else "stops, then `exoid recover`"
                 )
-                yield f"| TCP | {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
+                yield (
+                    f"| TCP | {name} | {fate} | {missing} | {wrong} |"
+                    f" {_plain(ended.said) or made.account.abort} |\n"
+                )
             else:
                 kept = Path(folder) / "run.aborted.parquet"
-                yield f"| TCP | {name} | stops | 0 | {_wrong(kept, ended.latched)} | {_plain(ended.said)} |\n"
+                yield (
+                    f"| TCP | {name} | stops | 0 | {_wrong(kept, ended.latched)} |"
+                    f" {_plain(ended.said)} |\n"
+                )
 
 
 def _row(line: str, frames: type[Frame], case: Case, folder: Path) -> str:
     result = run_through(case.fault, folder, case.run, frames=frames)
     wrong = f"{result.wrong}, the last {result.wrong_s:g} s" if result.wrong else "0"
     fate = "goes on" if result.why is None else "stops"
-    return f"| {line} | {case.name} | {fate} | {result.missing} | {wrong} | {_plain(result.why or '')} |\n"
+    return (
+        f"| {line} | {case.name} | {fate} | {result.missing} | {wrong} |"
+        f" {_plain(result.why or '')} |\n"
+    )
 
 
 def _wrong(path: Path, latched: dict) -> int:

@@ -45,13 +45,23 @@ def strike(
         rig = rig_file(folder, proxy.port, watchdog_s=10.0, reply_s=1.0)
         config = folder / "exoid.toml"
         config.write_text(
-            f'[acquire]\nrig = "{rig.name}"\nsample_rate_hz = {RATE}\n[[run]]\nname = "run"\nrun = "exo_alone"\n'
-            f'purpose = "train"\nduration_s = 4000.0\nseed = {SEED}\n'
+            f'[acquire]\nrig = "{rig.name}"\nsample_rate_hz = {RATE}\n[[run]]\nname = "run"\nrun ='
+            f' "exo_alone"\npurpose = "train"\nduration_s = 4000.0\nseed = {SEED}\n'
         )
         command = [
-            sys.executable, "-m", "exoid_cli.app", "acquire", "--config", str(config), "--run", "run", "--trajectory",
-            str(folder / "excitation.toml"), "-o", str(output),
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "exoid_cli.app",
+            "acquire",
+            "--config",
+            str(config),
+            "--run",
+            "run",
+            "--trajectory",
+            str(folder / "excitation.toml"),
+            "-o",
+            str(output),
+        ]
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

@@ -104,26 +104,53 @@ def test_the_cutoff_and_why_stand_in_the_metadata():
 @pytest.mark.parametrize(
     ("time", "settings", "metadata", "message"),
     [
-        (grid(0.05), {}, {}, "the longest stretch without a gap has 10 samples, too few to choose a cut-off from"),
         (
-            grid(0.2), {"cutoff_hz": 5.0}, {},
-            "no stretch without a gap lasts the 0.60 s that a 5.0 Hz filter needs; the longest has 40 samples",
+            grid(0.05),
+            {},
+            {},
+            "the longest stretch without a gap has 10 samples, too few to choose a cut-off from",
         ),
         (
-            grid(20) * 1e4, {}, {"sample_rate_hz": 0.02, "imported": {"source": "log.csv"}},
+            grid(0.2),
+            {"cutoff_hz": 5.0},
+            {},
+            (
+                "no stretch without a gap lasts the 0.60 s that a 5.0 Hz filter needs; the longest"
+                " has 40 samples"
+            ),
+        ),
+        (
+            grid(20) * 1e4,
+            {},
+            {"sample_rate_hz": 0.02, "imported": {"source": "log.csv"}},
             r"is sampled at 0.02 Hz, expected 12 Hz to 1 MHz, .*; correct time.unit in the map",
         ),
         (
-            grid(20) * 1e-9, {}, {"sample_rate_hz": 2e11},
-            r"is sampled at 2e\+11 Hz, expected 12 Hz to 1 MHz, .*; correct sample_rate_hz in the rig file",
+            grid(20) * 1e-9,
+            {},
+            {"sample_rate_hz": 2e11},
+            (
+                r"is sampled at 2e\+11 Hz, expected 12 Hz to 1 MHz, .*; correct sample_rate_hz in"
+                r" the rig file"
+            ),
         ),
-        (grid(20), {"cutoff_hz": 120.0}, {}, "filter.cutoff_hz is 120, expected less than half the sample rate of 200"),
         (
-            grid(20), {}, {"sample_rate_hz": 1000.0},
-            r"metadata sample_rate_hz is 1000, but time_s advances by 0.005 s \(200 Hz\); correct the one",
+            grid(20),
+            {"cutoff_hz": 120.0},
+            {},
+            "filter.cutoff_hz is 120, expected less than half the sample rate of 200",
+        ),
+        (
+            grid(20),
+            {},
+            {"sample_rate_hz": 1000.0},
+            (
+                r"metadata sample_rate_hz is 1000, but time_s advances by 0.005 s \(200 Hz\);"
+                r" correct the one"
+            ),
         ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_filtered_is_refused_in_one_line(time, settings, metadata, message):
     with pytest.raises(InputError, match=message):
         filter_recording(recording(time, 1e-5, **metadata), FilterSettings(**settings))

@@ -51,14 +51,16 @@ class Outcome:
         """Fail where memory grew without bound."""
         if self.grown_mib > MEMORY_MIB:
             self.failures.append(
-                f"memory grew by {self.grown_mib:.0f} MiB, at most {MEMORY_MIB:.0f} MiB are expected"
+                f"memory grew by {self.grown_mib:.0f} MiB, at most {MEMORY_MIB:.0f} MiB are"
+                " expected"
             )
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {what}" for what, count in self.counts.most_common())
         lines = [
-            f"{self.target}: {self.inputs} inputs, seed {self.seed}: {counts}; worst {self.worst_s:.2f} s, memory "
-            f"grew by {self.grown_mib:.1f} MiB, {len(self.failures)} failures"
+            f"{self.target}: {self.inputs} inputs, seed {self.seed}: {counts}; worst"
+            f" {self.worst_s:.2f} s, memory grew by {self.grown_mib:.1f} MiB, {len(self.failures)}"
+            " failures"
         ]
         return "\n".join(lines + [f"  {failure}" for failure in self.failures[:20]])
 

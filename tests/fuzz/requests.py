@@ -200,8 +200,10 @@ def _sent(rig: Rig, frame: Frame, name: str, script: Script) -> tuple[str, str |
     found = parsed(reply)
     kind = "refused" if found.body[0] & 0x80 else "answered"
     right = (frame.transaction, frame.unit, frame.body[0]) == (
-        found.transaction, found.unit, found.body[0] & 0x7F if frame.body[0] < 0x80 else found.body[0],
-    )  # fmt: skip
+        found.transaction,
+        found.unit,
+        found.body[0] & 0x7F if frame.body[0] < 0x80 else found.body[0],
+    )
     return kind, None if right else f"{bytes(frame).hex()} was answered {reply.hex()}"
 
 

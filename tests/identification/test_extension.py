@@ -103,8 +103,13 @@ def test_the_truth_of_an_extension_lies_in_its_intervals_95_times_in_100(hidden,
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_every_method_finds_what_is_named(estimator):
     """A torque sensor that is not zeroed, on a joint without gravity's help: 0.4 N·m."""
-    runs = [replace(pendulum.motion(pendulum.Disturbed(torque_nm=0.05), seed, purpose=p), file=f"{p}.parquet")
-            for seed, p in enumerate(("train", "validate"))]  # fmt: skip
+    runs = [
+        replace(
+            pendulum.motion(pendulum.Disturbed(torque_nm=0.05), seed, purpose=p),
+            file=f"{p}.parquet",
+        )
+        for seed, p in enumerate(("train", "validate"))
+    ]
     runs = [replace(run, torque=run.torque + 0.4) for run in runs]
     found = identify(runs, estimator(), Extension(chosen(["torque_offset@joint"], runs[0].machine)))
     assert sizes(found)["torque_offset", "offset"] == pytest.approx(0.4, abs=0.03)
@@ -191,7 +196,8 @@ def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
     scatter = np.std(found, axis=0)[1]
     carried, certain = (np.mean(errors[key], axis=0)[1] / scatter for key in (False, True))
     print(
-        f"\ncovered {np.mean(inside):.3f}; error of the moment over its scatter {carried:.2f}, {certain:.2f} without"
+        f"\ncovered {np.mean(inside):.3f}; error of the moment over its scatter {carried:.2f},"
+        f" {certain:.2f} without"
     )
     assert 0.91 <= np.mean(inside) <= 0.99
     assert carried == pytest.approx(1.0, abs=0.2)
@@ -234,10 +240,12 @@ def tared(noiseless_motions, tmp_path_factory):
         frame = {"time_s": run.time, "segment": run.segment, "valid": run.valid}
         for j, joint in enumerate(run.joints):
             frame |= {
-                f"{joint}_angle_measured_rad": run.q[:, j], f"{joint}_angle_rad": run.q[:, j],
+                f"{joint}_angle_measured_rad": run.q[:, j],
+                f"{joint}_angle_rad": run.q[:, j],
                 f"{joint}_velocity_rad_s": run.dq[:, j],
-                f"{joint}_acceleration_rad_s2": run.ddq[:, j], f"{joint}_torque_nm": run.torque[:, j],
-            }  # fmt: skip
+                f"{joint}_acceleration_rad_s2": run.ddq[:, j],
+                f"{joint}_torque_nm": run.torque[:, j],
+            }
         MOTION.write(folder / motion.file, pd.DataFrame(frame), dict(motion.metadata))
         runs.append(run)
         files.append(folder / motion.file)
@@ -248,11 +256,22 @@ def told_of(files, told, folder):
     """Write the ``parameters/1`` of a diagnosis that found the sensor out."""
     plain = pd.DataFrame(
         [
-            {"name": "offset", "symbol": "o", "joint": "hip", "run": None, "value": 1.5, "unit": "N·m",
-             "std_error": 0.1, "ci95_low": 1.3, "ci95_high": 1.7, "step": "extension", "effect": "torque_offset",
-             "each_run": True}
+            {
+                "name": "offset",
+                "symbol": "o",
+                "joint": "hip",
+                "run": None,
+                "value": 1.5,
+                "unit": "N·m",
+                "std_error": 0.1,
+                "ci95_low": 1.3,
+                "ci95_high": 1.7,
+                "step": "extension",
+                "effect": "torque_offset",
+                "each_run": True,
+            }
         ]
-    )  # fmt: skip
+    )
     of_runs = [
         {"name": f.name, "sha256": recording_behind(f), "values": {"offset": ZEROS[f.stem]}}
         for f in files
@@ -298,7 +317,8 @@ def test_intervals_hold_where_a_sensor_is_tared_anew_in_each_run(tared, truth, t
         ).parameters
         inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
     print(
-        f"\ncovered {np.mean(inside):.3f}; the moments {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}"
+        f"\ncovered {np.mean(inside):.3f}; the moments"
+        f" {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}"
     )
     assert 0.91 <= np.mean(inside) <= 0.99
     assert np.mean(inside, axis=0)[[3, 11, 15]].min() > 0.8

@@ -46,7 +46,8 @@ def test_foretold_standard_errors_are_the_scatter_of_identifications():
     scatter = np.std([table["value"] for table in tables], axis=0)
     said = np.mean([table["std_error"] for table in tables], axis=0)
     print(
-        f"\nover the scatter {np.round(foretold / scatter, 2)}, over the fit's own {np.round(foretold / said, 2)}"
+        f"\nover the scatter {np.round(foretold / scatter, 2)}, over the fit's own"
+        f" {np.round(foretold / said, 2)}"
     )
     np.testing.assert_allclose(foretold, scatter, rtol=0.2)
     np.testing.assert_allclose(foretold, said, rtol=0.2)

@@ -68,7 +68,8 @@ def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_its
     both_alike = left(smooth(regressor), torque, rest, valid)
     masked = left(smooth(regressor), torque, rest, moving)
     print(
-        f"\n{method.__name__}: torque alone {torque_alone}, both alike {both_alike}, and masked {masked}"
+        f"\n{method.__name__}: torque alone {torque_alone}, both alike {both_alike}, and masked"
+        f" {masked}"
     )
     assert np.all(torque_alone > both_alike)
     assert np.all(both_alike > 1.08)

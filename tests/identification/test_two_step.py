@@ -237,6 +237,9 @@ def test_a_regression_filter_of_another_kind_is_refused_and_never_replaced(noise
         first,
         metadata={**first.metadata, "regression_filter": {"kind": "low_pass", "cutoff_hz": 5.0}},
     )
-    told = r'exo_alone_train.parquet: metadata regression_filter.kind: found "low_pass", expected "block_average"; '
+    told = (
+        r'exo_alone_train.parquet: metadata regression_filter.kind: found "low_pass", expected'
+        r' "block_average"; '
+    )
     with pytest.raises(InputError, match=told):
         identify([foreign, *noiseless_motions[1:]])

@@ -228,8 +228,10 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(
     monkeypatch.setitem(sys.modules, "h5py", None)
     outcome = imported(path)
     assert outcome.code == 2
-    assert outcome.err == (
-        f"exoid: {path}: to read it exoid needs h5py, which is not installed; pip install 'exoid[import]'\n"
+    assert (
+        outcome.err
+        == f"exoid: {path}: to read it exoid needs h5py, which is not installed; pip install"
+        " 'exoid[import]'\n"
     )
 
 

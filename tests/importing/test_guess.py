@@ -247,10 +247,11 @@ def test_what_changes_with_the_kind_of_a_joint_is_told_where_nothing_says_that_i
     path = tmp_path / "slide.mat"
     savemat(path, {"t": time, "qm": place, "qg": place + 1e-3, "vir": 2.0 * np.cos(2.0 * time)})
     _, doubts = guessed(path)
-    assert doubts["joint[0].kind"] == (
-        'no unit of length; where it slides and the log is in metres: kind = "prismatic", angle.unit = "m", '
-        'reference.unit = "m", gain_n_v in place of gain_nm_v, '
-        "gravity_m_s2 = 0 if it lies level"
+    assert (
+        doubts["joint[0].kind"]
+        == 'no unit of length; where it slides and the log is in metres: kind = "prismatic",'
+        ' angle.unit = "m", reference.unit = "m", gain_n_v in place of gain_nm_v, gravity_m_s2 ='
+        " 0 if it lies level"
     )
 
 
@@ -327,8 +328,10 @@ def test_several_files_train_and_validate_as_a_whole(guessed, pendulum, write_cs
     files = [write_csv(swinging(pendulum), name=f"run{k}.csv") for k in range(3)]
     recordings = tomllib.loads(guessed(*files)[0])["recording"]
     assert [(one["files"], one["purpose"]) for one in recordings] == [
-        ("run0.csv", "train"), ("run1.csv", "train"), ("run2.csv", "validate")
-    ]  # fmt: skip
+        ("run0.csv", "train"),
+        ("run1.csv", "train"),
+        ("run2.csv", "validate"),
+    ]
 
 
 def test_a_guess_never_overwrites_a_map(pendulum, write_csv, tmp_path, capsys):
@@ -415,9 +418,16 @@ def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
 
 @pytest.mark.parametrize(
     ("name", "joint"),
-    [("x_counts", "x"), ("motor_counts", "joint"), ("ticks", "joint"), ("Ist Inkremente", "joint"),
-     ("impulsions moteur", "joint"), ("knee_ticks", "knee"), ("points", "joint")],
-)  # fmt: skip
+    [
+        ("x_counts", "x"),
+        ("motor_counts", "joint"),
+        ("ticks", "joint"),
+        ("Ist Inkremente", "joint"),
+        ("impulsions moteur", "joint"),
+        ("knee_ticks", "knee"),
+        ("points", "joint"),
+    ],
+)
 def test_counts_are_an_angle_where_nothing_else_is(guessed, pendulum, write_csv, name, joint):
     counts = np.round(1000.0 * pendulum.angle).astype(int) + 2000
     columns = {
@@ -574,9 +584,10 @@ def test_a_unit_in_a_header_is_believed_and_imports_the_truth(
     text, doubts = guessed(path)
     assert doubts.keys() == {"geometry.gravity_m_s2"}
     (torque,) = (
-        values for name, values in imported(path, map_text=text).recording("log_train").frame.items()
+        values
+        for name, values in imported(path, map_text=text).recording("log_train").frame.items()
         if name.endswith("_torque_nm")
-    )  # fmt: skip
+    )
     assert_allclose(torque, swinging(pendulum)["torque"][: len(torque)], rtol=1e-9, atol=1e-9)
 
 
@@ -617,11 +628,21 @@ def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(
 
 
 COUNTED = {
-    "revolute": ({"counts_per_turn": "counts_per_turn = 4096", "torque_constant_nm_a": "torque_constant_nm_a = 0.1"},
-                 ("joint_reference_rad", "joint_angle_rad", 2.0 * np.pi / 4096)),
-    "prismatic": ({"counts_per_turn": "counts_per_m = 50000", "torque_constant_nm_a": "force_constant_n_a = 2.0"},
-                  ("joint_reference_m", "joint_position_m", 1.0 / 50000)),
-}  # fmt: skip
+    "revolute": (
+        {
+            "counts_per_turn": "counts_per_turn = 4096",
+            "torque_constant_nm_a": "torque_constant_nm_a = 0.1",
+        },
+        ("joint_reference_rad", "joint_angle_rad", 2.0 * np.pi / 4096),
+    ),
+    "prismatic": (
+        {
+            "counts_per_turn": "counts_per_m = 50000",
+            "torque_constant_nm_a": "force_constant_n_a = 2.0",
+        },
+        ("joint_reference_m", "joint_position_m", 1.0 / 50000),
+    ),
+}
 """What is filled in of a joint of each kind, its columns and what a count is in them."""
 
 
@@ -824,8 +845,8 @@ def test_a_torque_that_no_joints_drive_delivers_is_doubted_by_the_guess_and_told
     )
     told = imported(path, map_text=text).told
     assert (
-        "N·m, and drives of legs, arms and robots at most some 1000; kept; check its unit (is it mN·m?)"
-        in told
+        "N·m, and drives of legs, arms and robots at most some 1000; kept; check its unit (is it"
+        " mN·m?)" in told
     )
     right = imported(path, map_text=text.replace('unit = "N·m"', 'unit = "mN·m"'))
     assert "drives of legs" not in right.told

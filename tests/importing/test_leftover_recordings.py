@@ -38,7 +38,8 @@ def test_files_of_one_name_are_told_apart_by_their_folders_as_the_refusal_says(
         in refused.err
     )
     named = BOTH + "".join(
-        f'[[recording]]\nname = "{{folder}}_{{file}}_{{purpose}}"\npurpose = "{purpose}"\nspan = {span}\n'
+        f'[[recording]]\nname = "{{folder}}_{{file}}_{{purpose}}"\npurpose = "{purpose}"\nspan ='
+        f" {span}\n"
         for purpose, span in (("train", [0.0, 0.7]), ("validate", [0.7, 1.0]))
     )
     assert imported(*two_folders, map_text=named).code == 0
@@ -136,15 +137,22 @@ def test_a_file_that_grows_too_large_is_named_with_what_to_do(pendulum, write_cs
     resource = pytest.importorskip("resource", reason="Windows knows no such limit")
     path = write_csv(pendulum.columns())
     (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
-    code = f"import sys; from exoid_cli.app import run; sys.exit(run(['import', {str(path)!r}, '--map', 'map.toml']))"
+    code = (
+        f"import sys; from exoid_cli.app import run; sys.exit(run(['import', {str(path)!r},"
+        " '--map', 'map.toml']))"
+    )
     stopped = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-    )  # fmt: skip
+    )
     assert stopped.returncode == 2
     assert stopped.stderr.endswith(
-        f"{tmp_path / 'recordings' / 'whole.parquet'}: File too large; files may not be so large there; raise the "
-        "limit (ulimit -f), or choose another place\n"
+        f"{tmp_path / 'recordings' / 'whole.parquet'}: File too large; files may not be so large"
+        " there; raise the limit (ulimit -f), or choose another place\n"
     )
     assert stopped.stderr.count("\n") == 1
     assert not (tmp_path / "recordings").exists()

@@ -132,9 +132,13 @@ def test_expressions_are_arithmetic_with_columns(imported, pendulum, tmp_path):
 
     path = tmp_path / "log.mat"
     content = {
-        "time": pendulum.time, "q1": np.cos(pendulum.time), "q2": pendulum.angle + np.cos(pendulum.time),
-        "velocity": pendulum.velocity, "vir": pendulum.torque / 35.15, "gtau": 35.15,
-    }  # fmt: skip
+        "time": pendulum.time,
+        "q1": np.cos(pendulum.time),
+        "q2": pendulum.angle + np.cos(pendulum.time),
+        "velocity": pendulum.velocity,
+        "vir": pendulum.torque / 35.15,
+        "gtau": 35.15,
+    }
     scipy.io.savemat(path, content)
     text = MAP.replace('column = "angle"', 'expression = "q2 - q1"')
     text = text.replace('column = "torque"', 'expression = "gtau * vir"')
@@ -152,8 +156,10 @@ def test_names_with_blanks_stand_in_backquotes(imported, pendulum, write_csv):
 
 
 def test_spans_of_one_file_become_recordings_that_do_not_overlap(imported, pendulum, write_csv):
-    text = MAP.partition("[[recording]]")[0] + (
-        '[[recording]]\npurpose = "train"\nspan = [0.0, 0.7]\n[[recording]]\npurpose = "validate"\nspan = [0.7, 1.0]\n'
+    text = (
+        MAP.partition("[[recording]]")[0]
+        + '[[recording]]\npurpose = "train"\nspan = [0.0, 0.7]\n[[recording]]\npurpose ='
+        ' "validate"\nspan = [0.7, 1.0]\n'
     )
     outcome = imported(write_csv(pendulum.columns()), map_text=text)
     train, validate = outcome.recording("log_train"), outcome.recording("log_validate")
@@ -200,8 +206,10 @@ def test_a_span_has_the_rate_and_the_gaps_of_its_own_part(imported, pendulum, wr
     """The first half at 200 Hz, the second at 100 Hz, as where a logger was set anew."""
     rows = np.r_[0:1000, 1000:2000:2]
     columns = {name: values[rows] for name, values in pendulum.columns().items()}
-    text = MAP.partition("[[recording]]")[0] + (
-        '[[recording]]\npurpose = "train"\nspan_s = [0, 4.99]\n[[recording]]\npurpose = "validate"\nspan_s = [5, 99]\n'
+    text = (
+        MAP.partition("[[recording]]")[0]
+        + '[[recording]]\npurpose = "train"\nspan_s = [0, 4.99]\n[[recording]]\npurpose ='
+        ' "validate"\nspan_s = [5, 99]\n'
     )
     outcome = imported(write_csv(columns), map_text=text)
     rates = [
@@ -412,12 +420,12 @@ def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(
     assert "exoid identify and exoid diagnose do not" in " ".join(outcome.told.split())
     told = " ".join(outcome.told.split())
     assert (
-        "elbow (revolute), wrist (revolute), and of the mechanisms that exoid knows none has these: two rev"
-        in told
+        "elbow (revolute), wrist (revolute), and of the mechanisms that exoid knows none has these:"
+        " two rev" in told
     )
     assert (
-        "`exoid run` ends at the motions of these: pivot (revolute), elbow (revolute), wrist (revolute) make"
-        in told
+        "`exoid run` ends at the motions of these: pivot (revolute), elbow (revolute), wrist"
+        " (revolute) make" in told
     )
     assert "does the rest" not in outcome.told
 

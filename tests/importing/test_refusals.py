@@ -17,33 +17,123 @@ from pipelines.settings.transmission import gain
 from tests.importing.conftest import MAP
 
 BAD_MAPS = [
-    ('column = "angle"', 'column = "angel"', "has no column 'angel', which joint[0].angle in", "did you mean angle?"),
-    ('unit = "rad"', 'unit = "rpm"', "angle.unit: found 'rpm', a unit of angular velocity, expected one of angle: rad"),
-    ('unit = "N·m"', 'unit = "mA"', "torque.unit: needs torque_constant_nm_a; add it from the data sheet"),
-    ('name = "pivot"', 'name = "pivot"\nkind = "prismatic"', 'angle.unit: needs lead_m; add it from the data sheet, or '
-     'unit = "m", where the log is in metres'),
+    (
+        'column = "angle"',
+        'column = "angel"',
+        "has no column 'angel', which joint[0].angle in",
+        "did you mean angle?",
+    ),
+    (
+        'unit = "rad"',
+        'unit = "rpm"',
+        "angle.unit: found 'rpm', a unit of angular velocity, expected one of angle: rad",
+    ),
+    (
+        'unit = "N·m"',
+        'unit = "mA"',
+        "torque.unit: needs torque_constant_nm_a; add it from the data sheet",
+    ),
+    (
+        'name = "pivot"',
+        'name = "pivot"\nkind = "prismatic"',
+        (
+            "angle.unit: needs lead_m; add it from the data sheet, or "
+            'unit = "m", where the log is in metres'
+        ),
+    ),
     ('unit = "rad"', 'unit = "counts"', "angle.unit: needs counts_per_turn"),
-    ('unit = "N·m"', 'unit = "N·m", gain_nm_v = 2.0', "torque.unit: has no use for gain_nm_v; remove it"),
-    ('unit = "N·m"', 'unit = "N·n"', "torque.unit: found 'N·n', expected one of torque: N·m", "did you mean N·m?"),
-    ('unit = "rad/s"', 'unit = "rads"', "velocity.unit: found 'rads', expected one of", "did you mean rad/s?"),
+    (
+        'unit = "N·m"',
+        'unit = "N·m", gain_nm_v = 2.0',
+        "torque.unit: has no use for gain_nm_v; remove it",
+    ),
+    (
+        'unit = "N·m"',
+        'unit = "N·n"',
+        "torque.unit: found 'N·n', expected one of torque: N·m",
+        "did you mean N·m?",
+    ),
+    (
+        'unit = "rad/s"',
+        'unit = "rads"',
+        "velocity.unit: found 'rads', expected one of",
+        "did you mean rad/s?",
+    ),
     ('column = "torque"', 'column = "angle"', "found 'angle', which is joint[0].angle already"),
-    ('column = "torque"', 'column = "torque", expression = "2 * torque"', "expected either column or expression"),
-    ('column = "torque"', 'expression = "__import__(1)"', "expected numbers and columns with + - * / ( )"),
-    ('column = "torque"', 'expression = "torque ** 2"', "expected numbers and columns with + - * / ( )"),
-    ('column = "torque"', 'expression = "2 * torq"', "has no column 'torq'", "did you mean torque?"),
-    ('unit = "rad"', 'unit = "rad", zero = 1e6', "would be -1e+06 to -1e+06 rad", "correct its unit, zero"),
-    ('unit = "rad"', 'unit = "rad", zero = 1e300', "zero: found 1e+300, expected less than or equal to"),
-    ('unit = "rad"', 'unit = "rad", sing = -1', "joint[0].angle.sing: unknown key; did you mean sign?"),
-    ('purpose = "train"', 'purpose = "train"\nspan = [0.7, 0.2]', "span: found [0.7, 0.2], expected its begin before"),
-    ('purpose = "train"', 'purpose = "train"\nspan_s = [50, 60]', " from 50 to 60 s has 0 rows of a run of 9.995 s"),
-    ('purpose = "train"', 'purpose = "train"\nfiles = "x*"', "no [[recording]] is of log.csv, only of x*; add one"),
+    (
+        'column = "torque"',
+        'column = "torque", expression = "2 * torque"',
+        "expected either column or expression",
+    ),
+    (
+        'column = "torque"',
+        'expression = "__import__(1)"',
+        "expected numbers and columns with + - * / ( )",
+    ),
+    (
+        'column = "torque"',
+        'expression = "torque ** 2"',
+        "expected numbers and columns with + - * / ( )",
+    ),
+    (
+        'column = "torque"',
+        'expression = "2 * torq"',
+        "has no column 'torq'",
+        "did you mean torque?",
+    ),
+    (
+        'unit = "rad"',
+        'unit = "rad", zero = 1e6',
+        "would be -1e+06 to -1e+06 rad",
+        "correct its unit, zero",
+    ),
+    (
+        'unit = "rad"',
+        'unit = "rad", zero = 1e300',
+        "zero: found 1e+300, expected less than or equal to",
+    ),
+    (
+        'unit = "rad"',
+        'unit = "rad", sing = -1',
+        "joint[0].angle.sing: unknown key; did you mean sign?",
+    ),
+    (
+        'purpose = "train"',
+        'purpose = "train"\nspan = [0.7, 0.2]',
+        "span: found [0.7, 0.2], expected its begin before",
+    ),
+    (
+        'purpose = "train"',
+        'purpose = "train"\nspan_s = [50, 60]',
+        " from 50 to 60 s has 0 rows of a run of 9.995 s",
+    ),
+    (
+        'purpose = "train"',
+        'purpose = "train"\nfiles = "x*"',
+        "no [[recording]] is of log.csv, only of x*; add one",
+    ),
     ('unit = "s"', 'unit = "s"\nrate_hz = 5.0', "expected either column or rate_hz"),
     ('unit = "N·m"', 'unit = "N·m", range = [90, 100]', "pivot_torque_nm has no value in any row"),
-    *(('name = "whole"', f'name = "{name}"', "recording[0].name: found", "expected a file's name without its folder")
-      for name in ("", "../../evil", "/tmp/evil", "a\\u0000b", "c:evil")),
-    ('name = "whole"', 'name = "{nosuch}"', "recording[0].name: found {nosuch} in '{nosuch}', expected {file}, "),
-    ('name = "pivot"', 'name = "Pivot 1"', "joint[0].name: found 'Pivot 1', expected text matching"),
-]  # fmt: skip
+    *(
+        (
+            'name = "whole"',
+            f'name = "{name}"',
+            "recording[0].name: found",
+            "expected a file's name without its folder",
+        )
+        for name in ("", "../../evil", "/tmp/evil", "a\\u0000b", "c:evil")
+    ),
+    (
+        'name = "whole"',
+        'name = "{nosuch}"',
+        "recording[0].name: found {nosuch} in '{nosuch}', expected {file}, ",
+    ),
+    (
+        'name = "pivot"',
+        'name = "Pivot 1"',
+        "joint[0].name: found 'Pivot 1', expected text matching",
+    ),
+]
 
 
 @pytest.mark.parametrize(
@@ -143,23 +233,58 @@ def test_a_folder_that_is_called_as_a_recordings_file_is_refused_with_what_is_me
     assert run(["import", str(write_csv(pendulum.columns())), *where]) == 2
     err = capsys.readouterr().err
     assert (
-        "x.parquet: ends as a recording's file does, expected the folder for all of them, such as -o"
-        in err
+        "x.parquet: ends as a recording's file does, expected the folder for all of them, such"
+        " as -o" in err
     )
     assert 'name = "x" at [[recording]] in the map' in err and len(err.splitlines()) == 1
     assert not (tmp_path / "made").exists()
 
 
 SLIPS = [
-    *(("[time]", f"[source]\ndelimiter = {d}\n[time]", "source.delimiter: found", "expected one character, such as")
-      for d in ('"::"', '", "', '"tab"', "'\\s+'", '""')),
-    ('column = "torque"', 'expression = "5.0"', "torque.expression: found '5.0', expected", "one column at least"),
-    ('column = "torque"', f'expression = "torque * {"9" * 500}"', "torque.expression: found 'torque * 999", "expected"),
-    ('column = "torque"', 'expression = "1e999 * torque"', "torque.expression: found '1e999 * torque', expected"),
-    ('column = "torque"', f'expression = "torque{" + torque" * 5000}"', "expression: found 'torque + ", "expected"),
-    ('column = "torque"', f'expression = "{"-" * 300}torque"', "at most 100 of them; write what they make"),
-    ('column = "torque"', f'expression = "{"(" * 500}torque{")" * 500}"', "torque.expression: found '((((", "expected"),
-]  # fmt: skip
+    *(
+        (
+            "[time]",
+            f"[source]\ndelimiter = {d}\n[time]",
+            "source.delimiter: found",
+            "expected one character, such as",
+        )
+        for d in ('"::"', '", "', '"tab"', "'\\s+'", '""')
+    ),
+    (
+        'column = "torque"',
+        'expression = "5.0"',
+        "torque.expression: found '5.0', expected",
+        "one column at least",
+    ),
+    (
+        'column = "torque"',
+        f'expression = "torque * {"9" * 500}"',
+        "torque.expression: found 'torque * 999",
+        "expected",
+    ),
+    (
+        'column = "torque"',
+        'expression = "1e999 * torque"',
+        "torque.expression: found '1e999 * torque', expected",
+    ),
+    (
+        'column = "torque"',
+        f'expression = "torque{" + torque" * 5000}"',
+        "expression: found 'torque + ",
+        "expected",
+    ),
+    (
+        'column = "torque"',
+        f'expression = "{"-" * 300}torque"',
+        "at most 100 of them; write what they make",
+    ),
+    (
+        'column = "torque"',
+        f'expression = "{"(" * 500}torque{")" * 500}"',
+        "torque.expression: found '((((",
+        "expected",
+    ),
+]
 
 
 ABSURD = [
@@ -206,7 +331,7 @@ def test_a_period_of_all_the_run_is_none_too_long(imported, pendulum, write_csv)
     assert imported(write_csv(pendulum.columns()), map_text=MAP + "period_s = 10.0").code == 0
 
 
-def test_a_single_torque_that_no_drive_delivers_is_refused_with_its_instant_until_a_range_leaves_it_out(
+def test_a_torque_that_no_drive_delivers_is_refused_with_its_instant_until_it_is_left_out(
     imported, pendulum, write_csv
 ):
     torque = pendulum.torque.copy()
@@ -248,9 +373,10 @@ def test_a_parquet_file_with_a_column_twice_or_damaged_pages_is_named(imported, 
     twice = pa.Table.from_arrays([*columns.values(), columns["angle"]], [*columns, "angle"])
     pq.write_table(twice, tmp_path / "twice.parquet")
     outcome = imported(tmp_path / "twice.parquet")
-    assert (outcome.code, "twice.parquet: has two columns 'angle'" in outcome.err) == (2, True), (
-        outcome.err
-    )
+    assert (outcome.code, "twice.parquet: has two columns 'angle'" in outcome.err) == (
+        2,
+        True,
+    ), outcome.err
     path = tmp_path / "damaged.parquet"
     pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=False)
     damaged = bytearray(path.read_bytes())
@@ -412,12 +538,11 @@ def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
     path = write_csv(pendulum.columns())
     (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
     code = (
-        "import os, signal; from pipelines.importing import recordings as r; from exoid_cli.app import run; "
-        "real = r.Imported.pieces\n"
-        "def pieces(self):\n  yield next(real(self)); os.kill(os.getpid(), signal.SIGINT); yield None\n"
-        "r.Imported.pieces = pieces\n"
-        f"folder = {str(tmp_path)!r}\n"
-        f"raise SystemExit(run(['import', {str(path)!r}, '--map', folder + '/map.toml', '-o', folder + '/out']))"
+        "import os, signal; from pipelines.importing import recordings as r; from exoid_cli.app"
+        " import run; real = r.Imported.pieces\ndef pieces(self):\n  yield next(real(self));"
+        " os.kill(os.getpid(), signal.SIGINT); yield None\nr.Imported.pieces = pieces\nfolder ="
+        f" {str(tmp_path)!r}\nraise SystemExit(run(['import', {str(path)!r}, '--map', folder +"
+        " '/map.toml', '-o', folder + '/out']))"
     )
     stopped = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120
@@ -433,8 +558,9 @@ def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(
     path = write_csv(columns)
     outcome = imported(path)
     assert (outcome.code, outcome.err) == (
-        2, f"exoid: {path}: found 5 rows, a recording needs at least 10; log for longer\n",
-    )  # fmt: skip
+        2,
+        f"exoid: {path}: found 5 rows, a recording needs at least 10; log for longer\n",
+    )
 
 
 def test_a_clock_of_which_no_run_is_long_enough_is_told_with_how_long_they_are(
@@ -472,8 +598,8 @@ def test_one_wild_angle_is_refused_with_its_instant_and_what_leaves_it_out(
     outcome = imported(write_csv(columns))
     assert outcome.code == 2 and len(outcome.err.splitlines()) == 1
     assert (
-        f"beyond it in 1 row of {len(columns['angle'])}, the first 99 at {columns['time'][100]:.6g} s"
-        in outcome.err
+        f"beyond it in 1 row of {len(columns['angle'])}, the first 99 at"
+        f" {columns['time'][100]:.6g} s" in outcome.err
     )
     assert "leave slips out with range" in outcome.err
 

@@ -79,10 +79,16 @@ class Leg(DataHandler):
             j = DRIVES.index(unit)
             angle, control = self.angle[j], self.words[unit][WRITE + 2]
             values = (
-                self.sample, self.clock_us, angle, (angle - self.last_angle[j]) * 20, int(angle / 50) + 1000, angle,
+                self.sample,
+                self.clock_us,
+                angle,
+                (angle - self.last_angle[j]) * 20,
+                int(angle / 50) + 1000,
+                angle,
                 # Halted, a drive is enabled still.
-                250 + self.sample % 10, control & ENABLE == ENABLE,
-            )  # fmt: skip
+                250 + self.sample % 10,
+                control & ENABLE == ENABLE,
+            )
             raw = struct.pack(">IIiiiihH", *values)
         else:
             raw = struct.pack(">Ifff", self.sample, unit, self.angle[0] * 1e-5, self.sample % 100)

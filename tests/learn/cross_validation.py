@@ -18,13 +18,13 @@ from tests.learn.vector import from_vector, to_vector
 
 TITLE = "Worlds and forms left out"
 COLUMNS = ("left out", "learned from", "judged on", "learned without it", "as shipped")
-ABOUT = """\
-Measured by `python -m tests.learn cross-validate --most {most}`. Each world is left out in turn, and so is each third
-of the forms that effects have in the worlds. The criteria are learned anew from the other sessions and judged on those
-left out. Each learned number starts at twice its shipped value, the prior's learned odds at zero. Numbers that are not
-learned, and the choice of the sets that are compared, come from the shipped criteria, which were learned from all
-sessions. So these losses are lower bounds. The last two columns are the mean log probability of the truth. The
-evidence was stored by revision {revisions}."""
+ABOUT = """\ Measured by `python -m tests.learn cross-validate --most {most}`. Each world is left
+out in turn, and so is each third of the forms that effects have in the worlds. The criteria are
+learned anew from the other sessions and judged on those left out. Each learned number starts at
+twice its shipped value, the prior's learned odds at zero. Numbers that are not learned, and the
+choice of the sets that are compared, come from the shipped criteria, which were learned from all
+sessions. So these losses are lower bounds. The last two columns are the mean log probability of the
+truth. The evidence was stored by revision {revisions}."""
 AWAY = 2.0
 """Factor by which each criterion is off where learning starts: none may be right because it was
 right before."""
@@ -47,8 +47,12 @@ class Part:
     def as_row(self) -> list[str]:
         """Return it as ``COLUMNS`` has it."""
         return [
-            self.name, str(self.learned_from), str(self.judged_on), f"{self.learned:.2f}", f"{self.shipped:.2f}",
-        ]  # fmt: skip
+            self.name,
+            str(self.learned_from),
+            str(self.judged_on),
+            f"{self.learned:.2f}",
+            f"{self.shipped:.2f}",
+        ]
 
 
 def cross_validated(root: Path, most: int, workers: int, shipped: Criteria) -> Iterator[Part]:

@@ -18,9 +18,11 @@ from tests.blind.cases import Case
 from tests.blind.examine import Folders, neutral_name, prepare
 
 SOURCES = (
-    "pipelines", "tests/blind",
-    ":!pipelines/diagnosis/criteria.py", ":!pipelines/diagnosis/criteria_measured.json",
-)  # fmt: skip
+    "pipelines",
+    "tests/blind",
+    ":!pipelines/diagnosis/criteria.py",
+    ":!pipelines/diagnosis/criteria_measured.json",
+)
 """What evidence depends on, as git names it; of the criteria it depends on those of
 ``BEFORE_EVIDENCE`` alone."""
 CHANGED = ", changed"
@@ -81,8 +83,12 @@ def _one(case: Case, root: Path, revision: str, keep: bool) -> str:
     truth = json.loads(folders.truth(name).read_text())
     row = evidence_row(folders.recordings(name))
     row |= {
-        "name": name, "world": case.world, "seed": case.seed, "revision": revision, "truth": json.dumps(truth),
-    }  # fmt: skip
+        "name": name,
+        "world": case.world,
+        "seed": case.seed,
+        "revision": revision,
+        "truth": json.dumps(truth),
+    }
     place = _place(root, case)
     place.parent.mkdir(parents=True, exist_ok=True)
     part = place.with_suffix(".part")

@@ -25,9 +25,13 @@ ROUNDS = 2
 
 
 def learn(
-    root: Path, worlds: Sequence[str], left_out: set[int], most: int, workers: int,
+    root: Path,
+    worlds: Sequence[str],
+    left_out: set[int],
+    most: int,
+    workers: int,
     start: Criteria,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Return the learned criteria, the scores before and after, and what they were learned from."""
     # The sessions have a base rate of their own.
     criteria, history = replace(start, base_rate=0.0), []
@@ -48,15 +52,22 @@ def learn(
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
     seeds = [session.truth["case"]["seed"] for session in sessions]
     return {
-        "criteria": asdict(replace(criteria, base_rate=start.base_rate)), "history": history,
-        "seeds": [min(seeds), max(seeds)], "worlds": list(worlds), "left_out": sorted(left_out),
-    }  # fmt: skip
+        "criteria": asdict(replace(criteria, base_rate=start.base_rate)),
+        "history": history,
+        "seeds": [min(seeds), max(seeds)],
+        "worlds": list(worlds),
+        "left_out": sorted(left_out),
+    }
 
 
 def sessions_of(
-    root: Path, worlds: Sequence[str], left_out: set[int], most: int, pool: Executor,
+    root: Path,
+    worlds: Sequence[str],
+    left_out: set[int],
+    most: int,
+    pool: Executor,
     criteria: Criteria,
-) -> Iterator[Session]:  # fmt: skip
+) -> Iterator[Session]:
     """Yield sessions, none that hides a form which is left out or held back."""
     count: dict[str, int] = {}
     jobs = []

@@ -100,13 +100,16 @@ def _compact(
     own = tuple(
         replace(e, columns=moved(e.columns), derivative=moved(e.derivative))
         for e in (evidence.elements[i] for i in elements)
-    )  # fmt: skip
+    )
     square, known = np.ix_(kept, kept), evidence.nonnegative
     small = replace(
-        evidence, gram=evidence.gram[:, *square].astype(np.float32), right=evidence.right[:, kept],
-        elements=own, background=tuple((new[p], v, n) for p, v, n in evidence.background),
+        evidence,
+        gram=evidence.gram[:, *square].astype(np.float32),
+        right=evidence.right[:, kept],
+        elements=own,
+        background=tuple((new[p], v, n) for p, v, n in evidence.background),
         nonnegative=known and replace(known, imitation=known.imitation[:, kept]),
-    )  # fmt: skip
+    )
     number = {i: n for n, i in enumerate(elements)}
     chosen = tuple(tuple(number[i] for i in s) for s in sets)
     true = np.array([right(frozenset(own[i].label for i in s)) for s in chosen])

@@ -21,16 +21,22 @@ TITLE = "How much each matters"
 CHANGE = 1.3
 """Factor by which a number is changed, up and down."""
 COLUMNS = (
-    "changed", "ln p, larger", "ln p, smaller", "ln p, neutral",
-    "right first, larger", "right first, smaller", "right first, neutral",
-)  # fmt: skip
-ABOUT = """\
-Measured by `make sensitivity` on {sessions} simulated sessions of seeds for tuning, whose evidence was stored by
-revision {revisions}. As they stand the criteria give the truth a mean log probability of {score:.3f}, and the most
-probable set is the truth in {share:.1%}. The table has the changes of both where one number is multiplied by 1.3
-(larger), divided by 1.3 (smaller), or set to its neutral value, all else as it stands. Neutral is one for weights and
-lines, which then count in full; one of several values is then not there; all else is zero. Eight numbers have no row:
-three act before evidence is stored, the base rate is the sessions' own, and four change no probability."""
+    "changed",
+    "ln p, larger",
+    "ln p, smaller",
+    "ln p, neutral",
+    "right first, larger",
+    "right first, smaller",
+    "right first, neutral",
+)
+ABOUT = """\ Measured by `make sensitivity` on {sessions} simulated sessions of seeds for tuning,
+whose evidence was stored by revision {revisions}. As they stand the criteria give the truth a mean
+log probability of {score:.3f}, and the most probable set is the truth in {share:.1%}. The table has
+the changes of both where one number is multiplied by 1.3 (larger), divided by 1.3 (smaller), or set
+to its neutral value, all else as it stands. Neutral is one for weights and lines, which then count
+in full; one of several values is then not there; all else is zero. Eight numbers have no row: three
+act before evidence is stored, the base rate is the sessions' own, and four change no
+probability."""
 NOT_MEASURED = (*BEFORE_EVIDENCE, "base_rate", "likely", "tied", "at_floor", "left_of_explained")
 """Criteria of which the probability of the truth, given stored evidence, tells nothing."""
 NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "lines": 1.0, "shape_sd": 1e-6}

@@ -81,9 +81,13 @@ def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
     for j, name in enumerate("xy"):
         columns |= {f"{name}_position_m": path[:, j], f"{name}_force_n": force[:, j]}
     metadata = {
-        "contract": "recording/1", "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ,
-        "period_s": PERIOD_S, "joints": [{"name": name, "kind": "prismatic"} for name in "xy"],
-    }  # fmt: skip
+        "contract": "recording/1",
+        "run": "exo_alone",
+        "purpose": purpose,
+        "sample_rate_hz": RATE_HZ,
+        "period_s": PERIOD_S,
+        "joints": [{"name": name, "kind": "prismatic"} for name in "xy"],
+    }
     return pd.DataFrame(columns), metadata
 
 
@@ -109,9 +113,13 @@ def exoid_with_it(tmp_path_factory):
             (folder / f"{name}.py").write_text(text, encoding="utf-8")
         command = [sys.executable, "-c", WITH_FOLDER, folder, *arguments]
         return subprocess.run(
-            [str(word) for word in command], capture_output=True, text=True, check=False,
-            cwd=tmp_path_factory.mktemp("elsewhere"), env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
-        )  # fmt: skip
+            [str(word) for word in command],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path_factory.mktemp("elsewhere"),
+            env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
+        )
 
     known = tmp_path_factory.mktemp("mechanisms")
     return run
@@ -185,8 +193,8 @@ def test_without_its_file_it_is_refused_with_what_there_is(
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert (
-        "train.parquet has joints x (prismatic), y (prismatic) and gravity 0 m/s², expected those of"
-        in outcome.err
+        "train.parquet has joints x (prismatic), y (prismatic) and gravity 0 m/s², expected"
+        " those of" in outcome.err
     )
     assert (
         "two revolute joints in series, whose axes are parallel, under gravity; two revolute joints"
@@ -197,8 +205,8 @@ def test_without_its_file_it_is_refused_with_what_there_is(
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert (
-        "exoid.toml: mechanism.name: found 'stage', expected a mechanism's name, or a file for a new"
-        in outcome.err
+        "exoid.toml: mechanism.name: found 'stage', expected a mechanism's name, or a file for"
+        " a new" in outcome.err
     )
 
 

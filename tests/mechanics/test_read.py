@@ -25,28 +25,38 @@ def experiment(folder, text):
     [
         (
             joints("prismatic"),
-            "mechanism.joints: found q0 (prismatic), expected revolute, revolute for leg; "
-            "correct the joints, or set name to single",
+            (
+                "mechanism.joints: found q0 (prismatic), expected revolute, revolute for leg; "
+                "correct the joints, or set name to single"
+            ),
         ),
         (
             '[mechanism]\nname = "single"\n' + joints("revolute", "revolute"),
-            "mechanism.joints: found q0 (revolute), q1 (revolute), expected revolute or prismatic for single; "
-            "correct the joints, or set name to leg",
+            (
+                "mechanism.joints: found q0 (revolute), q1 (revolute), expected revolute or"
+                " prismatic for single; correct the joints, or set name to leg"
+            ),
         ),
         (
             '[mechanism]\nname = "single"\n' + joints("prismatic", "revolute"),
-            "mechanism.joints: found q0 (prismatic), q1 (revolute), expected revolute or prismatic for single; "
-            "correct the joints",
+            (
+                "mechanism.joints: found q0 (prismatic), q1 (revolute), expected revolute or"
+                " prismatic for single; correct the joints"
+            ),
         ),
         (
             '[mechanism]\nname = "sinlge"\n' + joints("prismatic"),
-            "mechanism.name: found 'sinlge', expected a mechanism's name, or a file for a new one (docs/mechanisms.md)"
-            "; did you mean single?",
+            (
+                "mechanism.name: found 'sinlge', expected a mechanism's name, or a file for a new"
+                " one (docs/mechanisms.md); did you mean single?"
+            ),
         ),
         (
             '[mechanism]\nname = "arm"\n' + joints("prismatic"),
-            "mechanism.name: found 'arm', expected a mechanism's name, or a file for a new one (docs/mechanisms.md)"
-            "; known are leg, single",
+            (
+                "mechanism.name: found 'arm', expected a mechanism's name, or a file for a new one"
+                " (docs/mechanisms.md); known are leg, single"
+            ),
         ),
     ],
 )

@@ -106,8 +106,12 @@ def test_joints_and_gravity_decide_the_mechanism(kinds, geometry, expected):
 def test_a_mechanism_that_is_not_known_is_refused_with_what_there_is():
     with pytest.raises(
         InputError,
-        match=r"a\.parquet has joints x \(prismatic\), y \(revolute\) and gravity 9\.81 m/s², expected those of a mech"
-        r"anism that exoid knows: two revolute joints in series, .*; one level prismatic joint; ",
+        match=(
+            r"a\.parquet has joints x \(prismatic\), y \(revolute\) and gravity 9\.81 m/s²,"
+            r" expected those of a mech"
+            r"anism that exoid knows: two revolute joints in series, .*; one level prismatic"
+            r" joint; "
+        ),
     ):
         machine_of([Joint("x", "prismatic"), Joint("y")], EARTH, "a.parquet")
 

@@ -38,9 +38,11 @@ def as_table(trajectory, rate_hz=100.0):
 
 def coefficients(trajectory):
     return {
-        "a": trajectory.a.tolist(), "b": trajectory.b.tolist(),
-        "theta0_rad": trajectory.theta0.tolist(), "omega_rad_s": trajectory.omega,
-    }  # fmt: skip
+        "a": trajectory.a.tolist(),
+        "b": trajectory.b.tolist(),
+        "theta0_rad": trajectory.theta0.tolist(),
+        "omega_rad_s": trajectory.omega,
+    }
 
 
 def test_velocity_and_acceleration_are_the_derivatives_of_the_angle(random_trajectory):
@@ -125,9 +127,10 @@ def test_a_table_whose_samples_and_coefficients_differ_is_refused(tmp_path, rand
     expected = trajectory.at(0.07)[0][0, 1]
     with pytest.raises(ContractError) as error:
         read_trajectory(path)
-    assert str(error.value) == (
-        f"{path}: column knee_angle_rad, row 7: found -0.5, but the metadata's coefficients give {expected:.6g}; "
-        "drop a and b, or compute the rows from them"
+    assert (
+        str(error.value)
+        == f"{path}: column knee_angle_rad, row 7: found -0.5, but the metadata's coefficients give"
+        f" {expected:.6g}; drop a and b, or compute the rows from them"
     )
 
 
@@ -150,8 +153,10 @@ GOOD = {
         ({"c": "1"}, "c: unknown key; known are unit, omega_rad_s, theta0_rad, a, b"),
         (
             {"a": "[[1, 2], [2]]"},
-            "found rows of different length or empty (a[0] 2, a[1] 1, b[0] 1, b[1] 1), "
-            "expected as many harmonics in each",
+            (
+                "found rows of different length or empty (a[0] 2, a[1] 1, b[0] 1, b[1] 1), "
+                "expected as many harmonics in each"
+            ),
         ),
         (
             {"unit": '"rad"', "b": "[[1], [-24.0]]"},

@@ -138,9 +138,11 @@ def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset
 def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
     wide = {"type": "int32", "unit": "N"}
     told = {
-        "sequence": {"address": 100, "type": "uint16"}, "force_x": {"address": first, **wide},
-        "force_y": {"address": second, **wide}, "force_z": {"address": 50, **wide},
-    }  # fmt: skip
+        "sequence": {"address": 100, "type": "uint16"},
+        "force_x": {"address": first, **wide},
+        "force_y": {"address": second, **wide},
+        "force_z": {"address": 50, **wide},
+    }
     if abs(first - second) >= 2:
         assert SensorMap.model_validate({"read": told}).read.force_y.address == second
     else:

@@ -24,8 +24,9 @@ from tests.peers.answer import Answer, Log
 CUTOFF_HZ = 10.0
 LINK = """<link name="{name}"><inertial><origin xyz="0 0 {along}"/><mass value="{mass}"/>
 <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
-<joint name="{joint}" type="revolute"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 {at}"/>
-<axis xyz="0 -1 0"/><limit lower="-3" upper="3" velocity="10" effort="300"/></joint>"""
+<joint name="{joint}" type="revolute"><parent link="{parent}"/><child link="{name}"/>
+<origin xyz="0 0 {at}"/><axis xyz="0 -1 0"/>
+<limit lower="-3" upper="3" velocity="10" effort="300"/></joint>"""
 
 
 def identify(log: Log, held_out: Log, masses: NDArray) -> Answer:
@@ -42,8 +43,15 @@ def identify(log: Log, held_out: Log, masses: NDArray) -> Answer:
     words = [f"{verdict.status} (scope {verdict.scope})", *verdict.insights]
     values = np.linalg.solve(to_own, own)[:8]
     return Answer(
-        "FIGAROH", values, names, own, 1.96 * error, lambda truth: to_own[:, :8] @ truth, seconds, words
-    )  # fmt: skip
+        "FIGAROH",
+        values,
+        names,
+        own,
+        1.96 * error,
+        lambda truth: to_own[:, :8] @ truth,
+        seconds,
+        words,
+    )
 
 
 def _fit(log: Log, held_out: Log, masses: NDArray, folder: Path) -> BaseIdentification:
@@ -67,9 +75,12 @@ def _fit(log: Log, held_out: Log, masses: NDArray, folder: Path) -> BaseIdentifi
         def load_trajectory_data(self, data_source=None):
             run = held_out if data_source else log
             return {
-                "timestamps": run.time[:, np.newaxis], "positions": run.angle, "velocities": None,
-                "accelerations": None, "torques": run.torque,
-            }  # fmt: skip
+                "timestamps": run.time[:, np.newaxis],
+                "positions": run.angle,
+                "velocities": None,
+                "accelerations": None,
+                "torques": run.torque,
+            }
 
     fit = Leg(load_robot(str(urdf), package_dirs=str(folder)), str(config))
     fit.initialize()
@@ -86,7 +97,9 @@ def _configuration(rate_hz: float) -> dict:
                 "joints": {"active_joints": ["hip", "knee"]},
                 "mechanics": {
                     "friction_coefficients": {"viscous": [0, 0], "static": [0, 0]},
-                    "actuator_inertias": [0, 0], "joint_offsets": [0, 0], "reduction_ratios": [1.0, 1.0],
+                    "actuator_inertias": [0, 0],
+                    "joint_offsets": [0, 0],
+                    "reduction_ratios": [1.0, 1.0],
                 },
                 "coupling": {"has_coupled_wrist": False},
             },
@@ -95,18 +108,26 @@ def _configuration(rate_hz: float) -> dict:
             "identification": {
                 "enabled": True,
                 "problem": {
-                    "include_external_forces": False, "use_joint_torques": True,
-                    "qr_relative_tolerance": 1.0e-4, "wls": True,
-                    "model_components": {"friction": True, "actuator_inertia": False, "joint_offset": False},
+                    "include_external_forces": False,
+                    "use_joint_torques": True,
+                    "qr_relative_tolerance": 1.0e-4,
+                    "wls": True,
+                    "model_components": {
+                        "friction": True,
+                        "actuator_inertia": False,
+                        "joint_offset": False,
+                    },
                 },
                 "signal_processing": {
-                    "sampling_frequency": float(rate_hz), "cutoff_frequency": CUTOFF_HZ,
-                    "filter_type": "butterworth", "filter_order": 4,
+                    "sampling_frequency": float(rate_hz),
+                    "cutoff_frequency": CUTOFF_HZ,
+                    "filter_type": "butterworth",
+                    "filter_order": 4,
                 },
                 "data": {"validation_data_file": "held out"},
             }
         },
-    }  # fmt: skip
+    }
 
 
 def _base_parameters(fit: BaseIdentification, log: Log) -> NDArray:

@@ -88,11 +88,15 @@ def identify(log: Log, given: Given) -> Answer:
     spec = mujoco.MjSpec.from_string(_mjcf(log, given))
     model = spec.compile()
     sequences = sysid.ModelSequences(
-        "leg", spec, "train",
+        "leg",
+        spec,
+        "train",
         sysid.create_initial_state(model, log.angle[0], log.velocity[0]),
         sysid.TimeSeries.from_control_names(log.time, _set_points(log), model),
-        sysid.TimeSeries.from_names(log.time, np.hstack([log.angle, log.velocity, log.torque]), model),
-    )  # fmt: skip
+        sysid.TimeSeries.from_names(
+            log.time, np.hstack([log.angle, log.velocity, log.torque]), model
+        ),
+    )
     residual = sysid.build_residual_fn(models_sequences=[sequences])
     with contextlib.redirect_stdout(io.StringIO()):
         found, result = sysid.optimize(
@@ -103,10 +107,15 @@ def identify(log: Log, given: Given) -> Answer:
     insights = AutomatedInsights("Automated Insights", found).get_context()["insights"]
     own = found.as_vector()
     return Answer(
-        "MuJoCo sysid", given.to_leg(own, log.length), list(PARAMETERS), own, half_width,
-        lambda truth: given.from_leg(truth, log.length), time.process_time() - begun,
+        "MuJoCo sysid",
+        given.to_leg(own, log.length),
+        list(PARAMETERS),
+        own,
+        half_width,
+        lambda truth: given.from_leg(truth, log.length),
+        time.process_time() - begun,
         [re.sub("</?b>", "", f"{i['title']}: {i['message']}") for i in insights],  # it writes HTML
-    )  # fmt: skip
+    )
 
 
 def _set_points(log: Log) -> NDArray:
@@ -132,8 +141,10 @@ def _mjcf(log: Log, given: Given) -> str:
         for joint in JOINTS
     )
     inertial = '<inertial pos="0 0 -0.2" mass="{}" diaginertia="{i} {i} {i}"/>'
-    return f'''<mujoco><compiler angle="radian"/>
+    return f"""<mujoco><compiler angle="radian"/>
 <option timestep="{TIMESTEP_S}" integrator="implicitfast" gravity="0 0 -{log.gravity}"/><worldbody>
-<body name="thigh"><joint name="hip" axis="0 -1 0"/>{inertial.format(given.masses[0], i=given.thigh_inertia)}
-<body name="shank" pos="0 0 -{log.length}"><joint name="knee" axis="0 -1 0"/>{inertial.format(given.masses[1], i=0.05)}
-</body></body></worldbody><actuator>{actuators}</actuator><sensor>{sensors}</sensor></mujoco>'''
+<body name="thigh"><joint name="hip" axis="0 -1 0"/>
+{inertial.format(given.masses[0], i=given.thigh_inertia)}
+<body name="shank" pos="0 0 -{log.length}"><joint name="knee" axis="0 -1 0"/>
+{inertial.format(given.masses[1], i=0.05)}
+</body></body></worldbody><actuator>{actuators}</actuator><sensor>{sensors}</sensor></mujoco>"""

@@ -61,9 +61,9 @@ def _without(legs: Sequence[dict[str, Any]]) -> str:
 
 {chr(10).join(rows)}
 
-Held-out torque: RMS error at hip / knee, N·m, of {_pooled([leg["torque_rms"] for leg in legs])} N·m rms.
-`exoid diagnose`, {seconds:.0f} s a leg, says {told}{"; it names " + "; ".join(named) if named else ""}.
-"""
+Held-out torque: RMS error at hip / knee, N·m, of {_pooled([leg["torque_rms"] for leg in legs])} N·m
+rms. `exoid diagnose`, {seconds:.0f} s a leg, says
+{told}{"; it names " + "; ".join(named) if named else ""}. """
 
 
 def _with(legs: Sequence[dict[str, Any]]) -> str:
@@ -107,17 +107,16 @@ def _real(real: dict[str, Any]) -> str:
     rms = _pooled([real["torque_rms"]])
     return f"""## A real double pendulum
 
-`A0_fourier_75s.csv` through `exoid import` with `datasets/maps/double_pendulum_fourier.toml`: the first 70 % to train,
-the rest to validate, {rms} N·m rms at shoulder / elbow. Its controller was not logged: MuJoCo's rollouts would have to
-run on the torque alone, in short windows, which was not tried. IDIM-LS and FIGAROH get the irregular log on a uniform
-grid. The truth is not known.
+`A0_fourier_75s.csv` through `exoid import` with `datasets/maps/double_pendulum_fourier.toml`: the
+first 70 % to train, the rest to validate, {rms} N·m rms at shoulder / elbow. Its controller was not
+logged: MuJoCo's rollouts would have to run on the torque alone, in short windows, which was not
+tried. IDIM-LS and FIGAROH get the irregular log on a uniform grid. The truth is not known.
 
 {chr(10).join(rows)}
 
-Above 5 Hz these angles hold noise, which every model turns into torque: so the error is told below 5 Hz too, reversals
-included, as in [real-data.md](real-data.md). `exoid diagnose` looked there alone, and gains there alone; IDIM-LS and
-FIGAROH filter at 10 Hz.
-"""
+Above 5 Hz these angles hold noise, which every model turns into torque: so the error is told below
+5 Hz too, reversals included, as in [real-data.md](real-data.md). `exoid diagnose` looked there
+alone, and gains there alone; IDIM-LS and FIGAROH filter at 10 Hz. """
 
 
 def _pooled(errors: Sequence[Sequence[float]]) -> str:

@@ -101,7 +101,13 @@ def _log(table: Table) -> Log:
         )
 
     return Log(
-        time=time, angle=pair("angle_rad"), torque=pair("torque_nm"), length=geometry["thigh_length_m"],
-        gravity=geometry["gravity_m_s2"], reference=pair("reference_rad"), velocity=pair("velocity_rad_s"),
-        kp=gains("kp_nm_rad"), kd=gains("kd_nm_s_rad"),
-    )  # fmt: skip
+        time=time,
+        angle=pair("angle_rad"),
+        torque=pair("torque_nm"),
+        length=geometry["thigh_length_m"],
+        gravity=geometry["gravity_m_s2"],
+        reference=pair("reference_rad"),
+        velocity=pair("velocity_rad_s"),
+        kp=gains("kp_nm_rad"),
+        kd=gains("kd_nm_s_rad"),
+    )

@@ -41,8 +41,9 @@ class Logs:
     def commands(self) -> str:
         """What a user types to get from these logs to a verdict."""
         return (
-            f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o recordings/\n"
-            f"exoid diagnose recordings/*.parquet{' '.join(('', *self.told))} --out diagnosed/"
+            f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o"
+            f" recordings/\nexoid diagnose recordings/*.parquet{' '.join(('', *self.told))} --out"
+            " diagnosed/"
         )
 
     @property

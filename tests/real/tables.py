@@ -210,14 +210,18 @@ def of_each_run(d: Diagnosed) -> str:
     own = [cause for cause in d.verdict["causes"] if cause["each_run"]]
     headings = [
         f"{name} of {cause_label(cause)}, {unit}"
-        for cause in own for name in cause["each_run"][0]["values"]
+        for cause in own
+        for name in cause["each_run"][0]["values"]
         for unit in [p["unit"] for p in cause["parameters"] if p["name"] == name]
-    ]  # fmt: skip
+    ]
     rows = [
-        (one["file"].removesuffix(".parquet"), one["purpose"],
-         *(f"{v:+.3f}" for cause in own for v in cause["each_run"][k]["values"].values()))
+        (
+            one["file"].removesuffix(".parquet"),
+            one["purpose"],
+            *(f"{v:+.3f}" for cause in own for v in cause["each_run"][k]["values"].values()),
+        )
         for k, one in enumerate(own[0]["each_run"])
-    ]  # fmt: skip
+    ]
     return table(("run", "for", *headings), rows)
 
 

@@ -33,7 +33,10 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
         assert (by_identify < published.rms).all(), motion.file
 
 
-WEIGHED = "with load friction at both joints the two weigh samples near reversals otherwise: 3 % on the training run"
+WEIGHED = (
+    "with load friction at both joints the two weigh samples near reversals otherwise: 3 % on the"
+    " training run"
+)
 
 
 @pytest.mark.xfail(strict=True, reason=WEIGHED)
@@ -57,7 +60,7 @@ def test_friction_that_goes_with_the_load_is_named_at_both_joints(fourier):
     )
 
 
-def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foretells_what_no_fit_has_seen(
+def test_load_friction_of_a_planetary_gear_is_named_and_predicts_what_no_fit_has_seen(
     fourier,
 ):
     assert fourier.causes[0] == ("load_dependent_friction", "shoulder")
@@ -107,7 +110,7 @@ def assert_noise_of_the_angles_passes_for_nothing(found):
 
 @pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason="the shoulder's zeros are not named")
-def test_free_swings_show_rotor_and_zeros_set_anew_and_every_run_is_foretold_better_than_by_its_makers(
+def test_free_swings_show_rotor_and_zeros_and_every_run_is_predicted_better_than_published(
     real_data, theirs, tmp_path_factory
 ):
     swings = diagnosed(LOGS["A0-swings"], real_data, tmp_path_factory.mktemp("A0-swings"))

@@ -92,9 +92,14 @@ def write_residuals(folder, joints=LEG, seconds=20.0, inputs=()):
     rng, parts = np.random.default_rng(0), []
     for model, left in (("baseline", 1.0), ("extended", 0.3)):
         columns = {
-            "file": RUN, "run": "with_human", "purpose": "validate", "segment": 0, "time_s": time, "model": model,
+            "file": RUN,
+            "run": "with_human",
+            "purpose": "validate",
+            "segment": 0,
+            "time_s": time,
+            "model": model,
             "scored": np.sin(2 * time) ** 2 < 0.95,
-        }  # fmt: skip
+        }
         for joint in joints:
             angle, speed, acceleration, torque = motion_of(joints, time)[joint.name]
             residual = left * np.sin(20 * angle) + 0.2 * rng.standard_normal(len(time))
@@ -105,9 +110,10 @@ def write_residuals(folder, joints=LEG, seconds=20.0, inputs=()):
             }
         parts.append(pd.DataFrame(columns))
     RESIDUALS.write(
-        folder / "diagnosed" / "residuals.parquet", pd.concat(parts, ignore_index=True),
+        folder / "diagnosed" / "residuals.parquet",
+        pd.concat(parts, ignore_index=True),
         {"joints": named(joints)} | describe(inputs),
-    )  # fmt: skip
+    )
 
 
 def write_candidates(folder, joints=LEG, reason="nothing smaller explains as much"):
@@ -136,43 +142,86 @@ def verdict_of(joints=LEG, **changes):
     of_joints = {joint.name: 0.7182818 + 0.1 * j for j, joint in enumerate(joints)}
     reduced = {name: 0.3141593 for name in of_joints}
     told = {
-        "contract": "verdict/1", "status": "explained",
-        "summary": f"Missing from the simulation: cogging at the {last} (probability 0.90).", "caveats": [],
+        "contract": "verdict/1",
+        "status": "explained",
+        "summary": f"Missing from the simulation: cogging at the {last} (probability 0.90).",
+        "caveats": [],
         "scoring": {"bandwidth_hz": 17.7, "mask": "|v| < 0.04 rad/s", "samples": 800},
         "noise_floor_nm": {name: 0.2718282 for name in of_joints},
-        "baseline_rmse_nm": of_joints, "extended_rmse_nm": reduced,
-        "baseline_rmse_unmasked_nm": of_joints, "extended_rmse_unmasked_nm": reduced,
+        "baseline_rmse_nm": of_joints,
+        "extended_rmse_nm": reduced,
+        "baseline_rmse_unmasked_nm": of_joints,
+        "extended_rmse_unmasked_nm": reduced,
         "baseline_simulation_rmse_rad": {name: 0.0223607 for name in of_joints},
         "extended_simulation_rmse_rad": {name: 0.0141421 for name in of_joints},
         "unexplained": {name: 0.05 for name in of_joints},
         "control": {
-            "run": "with_human", "controller": {}, "reason": None,
-            "without": {"tracking_rmse_rad": {name: 0.0015 for name in of_joints},
-                        "peak_torque_nm": {name: 33.3 for name in of_joints}},
-            "with": {"tracking_rmse_rad": {name: 0.0017 for name in of_joints},
-                     "peak_torque_nm": {name: 35.5 for name in of_joints}},
+            "run": "with_human",
+            "controller": {},
+            "reason": None,
+            "without": {
+                "tracking_rmse_rad": {name: 0.0015 for name in of_joints},
+                "peak_torque_nm": {name: 33.3 for name in of_joints},
+            },
+            "with": {
+                "tracking_rmse_rad": {name: 0.0017 for name in of_joints},
+                "peak_torque_nm": {name: 35.5 for name in of_joints},
+            },
         },
         "error_budget": {
-            name: {"noise_floor": 0.07, f"cogging@{last}": 0.4, "repeatable_unexplained": 0.04, "not_repeatable": 0.006}
+            name: {
+                "noise_floor": 0.07,
+                f"cogging@{last}": 0.4,
+                "repeatable_unexplained": 0.04,
+                "not_repeatable": 0.006,
+            }
             for name in of_joints
         },
         "depends_on": {
-            name: [{"variable": "angle", "share_before": 0.8, "share_after": 0.1},
-                   {"variable": "phase", "share_before": 0.8, "share_after": 0.1},
-                   {"variable": "speed", "share_before": 0.2, "share_after": 0.1}]
+            name: [
+                {"variable": "angle", "share_before": 0.8, "share_after": 0.1},
+                {"variable": "phase", "share_before": 0.8, "share_after": 0.1},
+                {"variable": "speed", "share_before": 0.2, "share_after": 0.1},
+            ]
             for name in of_joints
         },
-        "units": {joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")} for joint in joints},
-        "causes": [{
-            "effect": "cogging", "joint": last, "side": "drive", "probability": 0.9,
-            "parameters": [{"name": "amplitude", "value": 1.5, "unit": "N·m", "ci95": [1.4, 1.6]}],
-            "gain": {"rmse_reduction_nm": 0.504, "ci95": [0.45, 0.55], "systematic_error_removed": 0.95, "joint": last},
-            "indistinguishable_from": [{"effect": "parallel_spring", "joint": last, "why": "both follow the angle",
-                                        "how_to_separate": "turn it slowly", "probability": 0.1}],
-            "evidence": ["it takes 0.50 of 0.82"], "fitted_on_validate": [],
-        }],
-        "data_faults": [], "residual": None, "runs": ["with_human"], "noise_floor_from": "periods",
-    }  # fmt: skip
+        "units": {
+            joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
+            for joint in joints
+        },
+        "causes": [
+            {
+                "effect": "cogging",
+                "joint": last,
+                "side": "drive",
+                "probability": 0.9,
+                "parameters": [
+                    {"name": "amplitude", "value": 1.5, "unit": "N·m", "ci95": [1.4, 1.6]}
+                ],
+                "gain": {
+                    "rmse_reduction_nm": 0.504,
+                    "ci95": [0.45, 0.55],
+                    "systematic_error_removed": 0.95,
+                    "joint": last,
+                },
+                "indistinguishable_from": [
+                    {
+                        "effect": "parallel_spring",
+                        "joint": last,
+                        "why": "both follow the angle",
+                        "how_to_separate": "turn it slowly",
+                        "probability": 0.1,
+                    }
+                ],
+                "evidence": ["it takes 0.50 of 0.82"],
+                "fitted_on_validate": [],
+            }
+        ],
+        "data_faults": [],
+        "residual": None,
+        "runs": ["with_human"],
+        "noise_floor_from": "periods",
+    }
     return told | changes
 
 
@@ -194,27 +243,55 @@ def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
         ("cause", f"cogging@{last}", probability, words["cogging"]),
     ]
     finding = {
-        "level": "cause", "repeats": True, "joint": last, "family": "angle", "probability": probability,
+        "level": "cause",
+        "repeats": True,
+        "joint": last,
+        "family": "angle",
+        "probability": probability,
         "words": words["cogging"],
-        "causes": [{"effect": effect, "joint": last, "family": "angle", "probability": p, "words": words[effect],
-                    "dropped": False}
-                   for effect, p in zip(effects, each, strict=True)],
-        "laws": [{"law": "angle", "joint": last, "probability": law, "words": f"a law of the {last}'s angle"}],
-        "path": [dict(zip(("level", "value", "probability", "words"), node, strict=True)) for node in path],
-    }  # fmt: skip
+        "causes": [
+            {
+                "effect": effect,
+                "joint": last,
+                "family": "angle",
+                "probability": p,
+                "words": words[effect],
+                "dropped": False,
+            }
+            for effect, p in zip(effects, each, strict=True)
+        ],
+        "laws": [
+            {
+                "law": "angle",
+                "joint": last,
+                "probability": law,
+                "words": f"a law of the {last}'s angle",
+            }
+        ],
+        "path": [
+            dict(zip(("level", "value", "probability", "words"), node, strict=True))
+            for node in path
+        ],
+    }
     shares = {
-        "rms_nm": 0.7, "noise": 0.2, "repeats": 0.7, "wanders": 0.08, "between_runs": 0.02, "unsplit": 0.0,
+        "rms_nm": 0.7,
+        "noise": 0.2,
+        "repeats": 0.7,
+        "wanders": 0.08,
+        "between_runs": 0.02,
+        "unsplit": 0.0,
         "with_person_only": 0.1,
-    }  # fmt: skip
+    }
     return {
         "findings": [finding],
         "router": {joint.name: dict(shares) for joint in joints},
         "posterior": {
-            "nothing_missing": nothing, "unlisted": law,
+            "nothing_missing": nothing,
+            "unlisted": law,
             "causes": {f"{effect}@{last}": p for effect, p in zip(effects, each, strict=True)},
             "laws": {f"law:angle@{last}": law},
         },
-    }  # fmt: skip
+    }
 
 
 def write_verdict(folder, joints=LEG, inputs=(), **changes):
@@ -284,12 +361,30 @@ def write_trajectory(folder, joints=LEG):
     columns = {"time_s": time}
     for joint in joints:
         angle, speed, acceleration, _ = motion_of(joints, time)[joint.name]
-        columns |= {joint.column("angle"): angle, joint.column("velocity"): speed,
-                    joint.column("acceleration"): acceleration}  # fmt: skip
-    margins = [{"joint": joints[0].name, "quantity": "angle", "unit": "rad", "low": -1.0, "high": 1.0, "lowest": -0.4,
-                "highest": 0.4, "margin": 0.6}]  # fmt: skip
-    about = {"joints": named(joints), "condition": 29.8, "log_det": 10.7, "margins": margins,
-             "standard_errors": {"X1": 0.007}}  # fmt: skip
+        columns |= {
+            joint.column("angle"): angle,
+            joint.column("velocity"): speed,
+            joint.column("acceleration"): acceleration,
+        }
+    margins = [
+        {
+            "joint": joints[0].name,
+            "quantity": "angle",
+            "unit": "rad",
+            "low": -1.0,
+            "high": 1.0,
+            "lowest": -0.4,
+            "highest": 0.4,
+            "margin": 0.6,
+        }
+    ]
+    about = {
+        "joints": named(joints),
+        "condition": 29.8,
+        "log_det": 10.7,
+        "margins": margins,
+        "standard_errors": {"X1": 0.007},
+    }
     TRAJECTORY.write(folder / "trajectory.parquet", pd.DataFrame(columns), about | describe())
 
 

@@ -39,8 +39,10 @@ def pair(folder, shift):
 @pytest.mark.parametrize("widths", [(1.0, 1.0), (0.2, 3.0)])
 def test_of_parameters_that_did_not_change_one_in_twenty_is_marked(widths):
     rng = np.random.default_rng(7)
-    first, second = ([estimate(w * z, 1.96 * w, str(k)) for k, z in enumerate(rng.standard_normal(4000))]
-                     for w in widths)  # fmt: skip
+    first, second = (
+        [estimate(w * z, 1.96 * w, str(k)) for k, z in enumerate(rng.standard_normal(4000))]
+        for w in widths
+    )
     marked = np.mean([change.is_beyond for change in changes(first, second)])
     assert marked == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / 4000))
 
@@ -106,7 +108,8 @@ def test_a_verdict_that_changed_is_told_before_parameters_that_did_not(tmp_path)
     page = told_apart(tmp_path, **NOTHING)
     assert (
         page.headline
-        == "The verdict went from explained to cause unknown; no parameter changed beyond its interval"
+        == "The verdict went from explained to cause unknown; no parameter changed beyond its"
+        " interval"
     )
     assert f"<h1>{page.headline}</h1>" in page.text
 
@@ -118,8 +121,9 @@ def test_other_causes_under_the_same_status_are_a_change_too(tmp_path):
 
 def test_each_error_stands_beside_the_floor_of_its_own_session(tmp_path):
     page = told_apart(tmp_path, **NOTHING, noise_floor_nm={"hip": 0.6, "knee": 0.5})
-    assert page.errors[2] == (
-        "knee, rigid body and friction: 0.818 N·m, 3.01 times the floor of 0.272 N·m → "
+    assert (
+        page.errors[2]
+        == "knee, rigid body and friction: 0.818 N·m, 3.01 times the floor of 0.272 N·m → "
         "0.818 N·m, 1.64 times the floor of 0.500 N·m"
     )
     assert len(page.errors) == 4
@@ -127,8 +131,10 @@ def test_each_error_stands_beside_the_floor_of_its_own_session(tmp_path):
 
 
 def test_settings_that_differ_are_listed_and_those_that_do_not_or_only_draw_are_not(tmp_path):
-    config = [{"filter": {"cutoff_hz": cutoff, "order": 4}, "identify": {"figures": draws}}
-              for cutoff, draws in (("auto", True), (20.0, False))]  # fmt: skip
+    config = [
+        {"filter": {"cutoff_hz": cutoff, "order": 4}, "identify": {"figures": draws}}
+        for cutoff, draws in (("auto", True), (20.0, False))
+    ]
     sessions = []
     for name, one in zip(("monday", "tuesday"), config, strict=True):
         write_parameters(tmp_path / name)
@@ -174,7 +180,10 @@ def test_sessions_of_different_machines_are_refused_by_what_differs(tmp_path):
         find([write_session(tmp_path / name, joints)])
         for name, joints in (("leg", LEG), ("axis", AXIS))
     )
-    says = r"leg is of another machine than axis \(hip \(revolute\), knee \(revolute\), and axis \(prismatic\)\)"
+    says = (
+        r"leg is of another machine than axis \(hip \(revolute\), knee \(revolute\), and axis"
+        r" \(prismatic\)\)"
+    )
     with pytest.raises(InputError, match=says):
         compare(leg, axis, ("leg", "axis"))
 

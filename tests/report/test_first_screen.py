@@ -90,8 +90,8 @@ def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_
     )
     assert '<p class="lead">Found.</p>' in top(folder)
     assert (
-        "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s angle"
-        in top(folder)
+        "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s"
+        " angle" in top(folder)
     )
     assert 'href="#faults"' in top(folder)
     write_verdict(folder, finding="Found.", data_faults=[FAULT])
@@ -114,8 +114,9 @@ def gains(folder, *causes):
 def test_each_gain_says_what_it_is_of(tmp_path):
     folder = write_session(tmp_path / "leg")
     assert [tile.title for tile in gains(folder, cause(), cause("backlash"))] == [
-        "gain of cogging at the knee", "gain of backlash at the knee",
-    ]  # fmt: skip
+        "gain of cogging at the knee",
+        "gain of backlash at the knee",
+    ]
 
 
 def test_a_gain_is_of_the_error_that_the_other_causes_leave(tmp_path):
@@ -140,11 +141,13 @@ def test_the_path_and_the_three_cases_stand_on_the_first_screen(tmp_path):
     assert "listed causes only 0.95" in shown
     assert "something unlisted 0.02" in shown
     path = [
-        "something that repeats with the motion 0.97", "something at the knee 0.97",
+        "something that repeats with the motion 0.97",
+        "something at the knee 0.97",
         "a law of the knee&#39;s angle 0.97",
-        "one of these, which these data cannot tell apart 0.95", "cogging at the knee 0.63",
+        "one of these, which these data cannot tell apart 0.95",
+        "cogging at the knee 0.63",
         "parallel spring at the knee 0.32",
-    ]  # fmt: skip
+    ]
     at = [shown.index(words) for words in path]
     assert at == sorted(at)
 
@@ -201,8 +204,14 @@ RIGHT_EDGES = """() => {
 @pytest.mark.parametrize("causes", [1, 2])
 def test_no_row_of_tiles_is_left_half_empty(opened, tmp_path, causes, width):
     folder = write_session(tmp_path / "axis", AXIS)
-    write_verdict(folder, AXIS, causes=[cause(name, "axis") | {"gain": cause()["gain"] | {"joint": "axis"}}
-                                        for name in ("cogging", "backlash")[:causes]])  # fmt: skip
+    write_verdict(
+        folder,
+        AXIS,
+        causes=[
+            cause(name, "axis") | {"gain": cause()["gain"] | {"joint": "axis"}}
+            for name in ("cogging", "backlash")[:causes]
+        ],
+    )
     page_file = tmp_path / "report.html"
     page_file.write_text(report(find([folder])), encoding="utf-8")
     with opened(page_file, width=width) as page:

@@ -130,7 +130,8 @@ def test_the_leg_moves(opened, page_file):
 
 ROOM = """() => {
     const c = document.querySelector('[data-stage] canvas');
-    const copy = Object.assign(document.createElement('canvas'), { width: c.width, height: c.height });
+    const copy = document.createElement('canvas');
+    Object.assign(copy, { width: c.width, height: c.height });
     copy.getContext('2d', { willReadFrequently: true }).drawImage(c, 0, 0);
     const all = copy.getContext('2d').getImageData(0, 0, c.width, c.height).data;
     let [left, right, top, bottom] = [c.width, 0, c.height, 0];
@@ -169,12 +170,10 @@ def test_an_exaggerated_difference_is_said_on_the_picture(opened, page_file):
         stage = page.locator("[data-stage]").first
         stage.scroll_into_view_if_needed()
         assert stage.locator("select").input_value() == "1"
-        page.evaluate(
-            """() => {
+        page.evaluate("""() => {
                 const stage = document.querySelector('[data-stage] canvas').getContext('2d');
                 stage.fillText = text => { window.said = text; };
-            }"""
-        )
+            }""")
         stage.locator("select").select_option("5")
         assert page.evaluate("window.said") == "difference from measured drawn × 5"
 
@@ -227,8 +226,11 @@ def test_a_million_samples_stay_fluid_and_a_spike_among_them_is_seen(opened, tmp
         draw_all(page)
         key = "angle-with_human_validate-axis"
         assert "1,000,000 rows" in page.locator(f'[data-chart="{key}"] figcaption').inner_text()
-        at = page.evaluate("k => { const u = exoid.plots.get(k)[1], y = u.data[1];"
-                           "return u.data[0][y.indexOf(Math.max(...y.filter(v => v !== null)))]; }", key)  # fmt: skip
+        at = page.evaluate(
+            "k => { const u = exoid.plots.get(k)[1], y = u.data[1];"
+            "return u.data[0][y.indexOf(Math.max(...y.filter(v => v !== null)))]; }",
+            key,
+        )
         assert at == pytest.approx(654.321)
         # Median of zooms to ever other places, all charts of the run together, drawing included.
         took = page.evaluate(
@@ -255,7 +257,10 @@ def test_charts_of_a_run_keep_one_time_axis_where_one_of_them_has_nothing_to_sho
     RESIDUALS.write(path, table.frame, table.metadata)
     page_file = tmp_path / "report.html"
     page_file.write_text(report(find([folder])), encoding="utf-8")
-    shape = "k => exoid.plots.get(k).map(u => [u.bbox.left, u.bbox.width, u.scales.y.min, u.scales.y.max])"
+    shape = (
+        "k => exoid.plots.get(k).map(u => [u.bbox.left, u.bbox.width, u.scales.y.min,"
+        " u.scales.y.max])"
+    )
     with opened(page_file) as page:
         draw_all(page)
         key = "torque-with_human_validate-hip"
@@ -269,7 +274,8 @@ def test_charts_of_a_run_keep_one_time_axis_where_one_of_them_has_nothing_to_sho
 
 PRINTED = """async () => {
     dispatchEvent(new Event('beforeprint'));
-    for (let k = 0; k < 5; k++) await Promise.resolve();  // plots take their size then, and no observer is asked yet
+    // Plots take their size then, and no observer is asked yet.
+    for (let k = 0; k < 5; k++) await Promise.resolve();
     const ctx = document.createElement('canvas').getContext('2d');
     ctx.font = '12px system-ui, sans-serif';
     const told = { wide: document.documentElement.scrollWidth, texts: [], gaps: [] };
@@ -306,8 +312,10 @@ def test_on_paper_nothing_sticks_out_and_no_axis_outgrows_the_text_or_has_labels
         page.emulate_media(media="print")
         page.set_viewport_size({"width": paper, "height": 900})
         printed = page.evaluate(PRINTED)
-        body, cell = (page.evaluate(f"parseFloat(getComputedStyle({of}).fontSize)")
-                      for of in ("document.body", "document.querySelector('table.scores td')"))  # fmt: skip
+        body, cell = (
+            page.evaluate(f"parseFloat(getComputedStyle({of}).fontSize)")
+            for of in ("document.body", "document.querySelector('table.scores td')")
+        )
         assert printed["wide"] <= paper
         assert max(printed["texts"]) <= body
         assert min(from_screen + printed["gaps"]) > 4

@@ -162,8 +162,8 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
     lines = [command.line for command in provenance.commands(find([folder]))]
     assert (
-        lines[0]
-        == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o {folder / 'recordings'}/"
+        lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o"
+        f" {folder / 'recordings'}/"
     )
     (log,) = provenance.outside(find([folder]))
     assert (log.name, log.role, log.made_of_it) == (
@@ -258,10 +258,12 @@ def worsened(folder, joint="knee", effect="stribeck_friction"):
     said = verdict_of()
     cause = said["causes"][0] | {"effect": effect, "joint": joint}
     write_verdict(
-        folder, causes=[cause],
-        baseline_rmse_unmasked_nm={"hip": 0.8, "knee": 2.95}, extended_rmse_unmasked_nm={"hip": 0.4, "knee": 3.38},
+        folder,
+        causes=[cause],
+        baseline_rmse_unmasked_nm={"hip": 0.8, "knee": 2.95},
+        extended_rmse_unmasked_nm={"hip": 0.4, "knee": 3.38},
         extended_simulation_rmse_rad={"hip": 0.02, "knee": 0.0367},
-    )  # fmt: skip
+    )
 
 
 def verdict_part(page):
@@ -340,10 +342,10 @@ def test_a_verdict_without_causes_shows_the_model_without_them_alone(tmp_path, s
 def test_a_budget_below_the_floor_says_so_and_gives_no_second_floor(tmp_path):
     shares = {joint: {"noise_floor": 0.07, "unexplained": 0.0} for joint in ("hip", "knee")}
     floor = {joint: 0.3 for joint in shares}
-    (below, _) = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    below, _ = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
     assert below.segments[0].label == "noise, all of it below the floor"
     floor = {joint: 0.07**0.5 for joint in shares}
-    (at, _) = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    at, _ = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
     assert at.segments[0].label == "noise floor"
 
 
@@ -389,14 +391,32 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     folder = write_session(tmp_path / "leg")
     sure = [0.0512, 0.0712]
     each_run = [
-        {"file": "first.parquet", "purpose": "train", "values": {"offset": 0.0612}, "ci95": {"offset": sure}},
-        {"file": "judged.parquet", "purpose": "validate", "values": {"offset": -0.0503}, "ci95": {"offset": None}},
-        {"file": "absent.parquet", "purpose": "validate", "values": {"offset": None}, "ci95": {"offset": None}},
-    ]  # fmt: skip
+        {
+            "file": "first.parquet",
+            "purpose": "train",
+            "values": {"offset": 0.0612},
+            "ci95": {"offset": sure},
+        },
+        {
+            "file": "judged.parquet",
+            "purpose": "validate",
+            "values": {"offset": -0.0503},
+            "ci95": {"offset": None},
+        },
+        {
+            "file": "absent.parquet",
+            "purpose": "validate",
+            "values": {"offset": None},
+            "ci95": {"offset": None},
+        },
+    ]
     cause = verdict_of()["causes"][0] | {
-        "effect": "encoder_offset", "side": "sensor", "indistinguishable_from": [], "each_run": each_run,
+        "effect": "encoder_offset",
+        "side": "sensor",
+        "indistinguishable_from": [],
+        "each_run": each_run,
         "parameters": [{"name": "offset", "value": 0.0612, "unit": "rad", "ci95": sure}],
-    }  # fmt: skip
+    }
     shares = {joint: {"noise_floor": 0.07, "encoder_offset@knee": 0.4} for joint in ("hip", "knee")}
     write_verdict(folder, causes=[cause], error_budget=shares)
     tried = CANDIDATES.read(folder / "diagnosed" / "candidates.parquet")
@@ -413,7 +433,8 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     assert "Why per-run encoder offset at the knee" in page
     assert '<li class="key cause1">per-run encoder offset at the knee: ' in page
     assert re.search(
-        '<td>per-run encoder offset at the knee</td><td class="n">0.90</td><td><span class="pill [^"]*">named',
+        '<td>per-run encoder offset at the knee</td><td class="n">0.90</td><td><span class="pill'
+        ' [^"]*">named',
         page,
     )
     shown = told(page)

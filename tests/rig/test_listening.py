@@ -27,9 +27,11 @@ def test_a_link_whose_port_is_somebody_elses_by_now_is_said_to_be_a_leftover_per
     link.symlink_to("/dev/null")
     with pytest.raises(DeviceError) as refused, _linked(str(link), "/dev/zero"):
         raise AssertionError("the link is taken")
-    assert str(refused.value) == (
-        f"{link}: is a link to /dev/null already, as a virtual rig makes one; end the rig that is served there or, if "
-        "none is and a killed one left it, delete the link, or name another path in serial_port"
+    assert (
+        str(refused.value)
+        == f"{link}: is a link to /dev/null already, as a virtual rig makes one; end the rig that"
+        " is served there or, if none is and a killed one left it, delete the link, or name"
+        " another path in serial_port"
     )
     assert os.readlink(link) == "/dev/null"
 

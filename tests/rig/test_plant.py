@@ -118,9 +118,10 @@ def test_motors_warm_with_the_square_of_their_torque(silent, excitation):
 def test_a_leg_that_cannot_exist_is_refused():
     with pytest.raises(SettingsError) as caught:
         Plant(PlantSettings(human_inertial=(1.6, -0.41, 1.23, 3.4)), "with_human")
-    assert str(caught.value) == (
-        "plant.exo_inertial + human_inertial: no real leg has these: X2 = -0.19 kg·m² is not positive: "
-        "the shank would have no inertia; correct them"
+    assert (
+        str(caught.value)
+        == "plant.exo_inertial + human_inertial: no real leg has these: X2 = -0.19 kg·m² is not"
+        " positive: the shank would have no inertia; correct them"
     )
 
 

@@ -30,8 +30,11 @@ def test_one_seed_hides_one_thing(with_seed):
 def test_seeds_reach_every_possibility_and_keep_its_ranges(with_seed):
     drawn = [hidden_effects(with_seed(seed))[0] for seed in range(40)]
     assert {term.effect.name for term in drawn} == {
-        "stribeck_friction", "presliding_hysteresis", "joint_elasticity", "encoder_offset",
-    }  # fmt: skip
+        "stribeck_friction",
+        "presliding_hysteresis",
+        "joint_elasticity",
+        "encoder_offset",
+    }
     assert {term.effect.joint for term in drawn} == {"hip", "knee"}
     offsets = [abs(term.values[0]) for term in drawn if term.effect.name == "encoder_offset"]
     assert all(0.04 <= offset <= 0.1 for offset in offsets)

@@ -25,18 +25,30 @@ def loaded(tmp_path, key, value, text=LAB):
     ("key", "value", "message"),
     [
         ("watchdog_s", 3600.0, "safety.watchdog_s: found 3600, expected at most 1"),
-        ("following_error_rad", 1e9, "safety.following_error_rad: found 1e+09, expected at most 0.5"),
+        (
+            "following_error_rad",
+            1e9,
+            "safety.following_error_rad: found 1e+09, expected at most 0.5",
+        ),
         ("cuff_force_n", 1e9, "safety.cuff_force_n: found 1e+09, expected at most 2000"),
         ("control_s", 1e9, "safety.control_s: found 1e+09, expected at most 30"),
         ("connect_s", 1e9, "safety.connect_s: found 1e+09, expected at most 60"),
         ("speed_rad_s", 1e6, "drive[0].speed_rad_s: found 1e+06, expected at most 20"),
         ("torque_nm", 1e9, "torque_nm: found 1e+09 "),
-        ("angle_rad", "[-1000.0, 1.0]", "drive[0].angle_rad: found -1000, expected radians, at most one turn"),
-        ("deceleration_rad_s2", 1e-6, "safety.deceleration_rad_s2: found 1e-06, with which the hip takes 1e+06 s and "
-         "5e+05 rad to stop from its 1 rad/s (exo_alone), expected at least 1"),
+        (
+            "angle_rad",
+            "[-1000.0, 1.0]",
+            "drive[0].angle_rad: found -1000, expected radians, at most one turn",
+        ),
+        (
+            "deceleration_rad_s2",
+            1e-6,
+            "safety.deceleration_rad_s2: found 1e-06, with which the hip takes 1e+06 s and "
+            "5e+05 rad to stop from its 1 rad/s (exo_alone), expected at least 1",
+        ),
         ("deceleration_rad_s2", 0.9, "safety.deceleration_rad_s2: found 0.9"),
     ],
-)  # fmt: skip
+)
 def test_a_limit_that_would_keep_nobody_from_harm_is_refused(tmp_path, key, value, message):
     with pytest.raises(SettingsError) as caught:
         loaded(tmp_path, key, value)

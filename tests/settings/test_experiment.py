@@ -91,7 +91,10 @@ def test_the_settings_page_is_current():
         ),
         (
             "[design.bounds.hip]\nangle_rad = [1.0, 0.5]\n",
-            "design.bounds.hip: angle_rad: found [1.0, 0.5], expected the lowest angle first; swap them",
+            (
+                "design.bounds.hip: angle_rad: found [1.0, 0.5], expected the lowest angle first;"
+                " swap them"
+            ),
         ),
         (
             "[design.bounds.hip]\nangle_deg = [5, 70]\n",
@@ -108,8 +111,10 @@ def test_the_settings_page_is_current():
         ),
         (
             '[mechanism]\nname = "sinlge"\n',
-            "mechanism: name: found 'sinlge' without joints, which only leg and single may leave out; "
-            "add [[mechanism.joints]], or correct the name: did you mean single?",
+            (
+                "mechanism: name: found 'sinlge' without joints, which only leg and single may"
+                " leave out; add [[mechanism.joints]], or correct the name: did you mean single?"
+            ),
         ),
         (
             '[mechanism]\nname = "Stage"\n',
@@ -163,8 +168,10 @@ def test_bounds_in_degrees_are_refused_with_their_radians():
     [
         ('[acquire]\nrig = "no.toml"', "acquire.rig: .*no.toml: no such file"),
         (
-            '[acquire]\nrig = "exoid.toml"\n[[run]]\nname = "a"\nrun = "exo_alone"\npurpose = "train"\n'
-            'trajectory = "b.toml"',
+            (
+                '[acquire]\nrig = "exoid.toml"\n[[run]]\nname = "a"\nrun = "exo_alone"\npurpose ='
+                ' "train"\ntrajectory = "b.toml"'
+            ),
             "run a.trajectory: .*b.toml: no such file",
         ),
         (

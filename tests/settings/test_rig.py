@@ -23,104 +23,322 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
     rig = load_rig(RIGS / "default.toml")
     assert rig.known_geometry()["shank_cuff_distance_m"] == 0.22
     assert rig.known_controllers()["hip"] == {
-        "type": "pd", "kp_nm_rad": 1500.0, "kd_nm_s_rad": 120.0, "rate_hz": 1000.0, "limit_nm": 200.0,
-    }  # fmt: skip
+        "type": "pd",
+        "kp_nm_rad": 1500.0,
+        "kd_nm_s_rad": 120.0,
+        "rate_hz": 1000.0,
+        "limit_nm": 200.0,
+    }
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("gear_ratio = 100.0", "gear_rato = 100.0", "drive[0].gear_rato: unknown key; did you mean gear_ratio? "
-         "(and 1 more)"),
+        (
+            "gear_ratio = 100.0",
+            "gear_rato = 100.0",
+            "drive[0].gear_rato: unknown key; did you mean gear_ratio? (and 1 more)",
+        ),
         ("unit = 2", "unit = 400", "drive[1].unit: found 400, expected less than or equal to 247"),
         ("unit = 2", "unit = 1", "unit: 127.0.0.1:502 unit 1 stands for two devices; correct one"),
-        ('map = "servo"', 'map = "servos"', "drive[0].map: found 'servos', expected a table below [map.drive]: servo"),
-        ('cuff = "thigh_back"', 'cuff = "thigh_front"', "sensor: found two sensors at thigh_front, expected one; "
-         "correct their cuffs"),
-        ('scale = 1e-6, unit = "rad" }\nvelocity', 'scale = 1e-6, unit = "A" }\nvelocity',
-         "map.drive.servo: read.angle.unit: found 'A', expected rad or mrad or deg; correct the unit"),
-        ("address = 106", "address = 105", "map.drive.servo: read.velocity: register 105 is part of angle too; correct "
-         "one address"),
-        ("address = 113", "address = 400", "map.drive.servo: read: spans 301 registers (100 to 400), expected at most "
-         "125, which is what one Modbus exchange carries"),
-        ("control = { address = 202", "control = { address = 204", "map.drive.servo: write: names nothing at register "
-         "202 between 200 and 204, expected a block without gaps, which is written as a whole; map the drive's "
-         "registers side by side"),
-        ("scale = 0.1, unit = \"mA\"", "scale = 0.0, unit = \"mA\"", "map.drive.servo.read.current: scale: found 0, "
-         "expected units per count; every value would be the offset"),
-        ("angle_rad = [-0.35, 1.75]", "angle_rad = [1.75, -0.35]", "drive[0]: angle_rad: found [1.75, -0.35], expected "
-         "the lowest angle first; swap them"),
-        ('map = "servo"', 'map = "servo"\nline = "leg"', "line: found 'leg' at unit 1, expected a table below [line]: "
-         "there is none"),
-        ("enable = 0x000F", "enable = 0x1000F", "map.drive.servo: enable: found 0x1000F, but write.control is a "
-         "uint16; correct one of them"),
-        ("fault_mask = 0x0008", "fault_mask = 0x10000", "map.drive.servo: fault_mask: found 0x10000, but read.status "
-         "is a uint16; correct one of them"),
-        ('control = { address = 202, type = "uint16"', 'control = { address = 202, type = "int16"', "map.drive.servo: "
-         "write.control: found int16 with scale 1 and offset 0, expected uint16, uint32 or uint64 as it is: its bits "
-         "have meanings of their own; correct it"),
-        ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 1e-10, unit = "rad" }\ncontrol',
-         "map.drive.servo.write.reference: cannot hold -0.35 to 1.75 rad, the hip's limits; correct its type or scale"),
-        ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 5.0, unit = "deg" }\ncontrol',
-         "map.drive.servo.write.reference: one count is 0.0873 rad, expected at most 0.025 rad, a quarter of "
-         "safety.following_error_rad or of the hip's range; correct its scale"),
-        ("ramp_s = 3.0", "ramp_s = 1e9", "safety.ramp_s: found 1000000000.0, expected less than or equal to 60"),
-        ('sequence = { address = 100, type = "uint32"', 'sequence = { address = 100, type = "float32"',
-         "map.drive.servo: read.sequence: found float32 with scale 1 and offset 0, expected uint16, uint32 or uint64 "
-         "as it is: it is a count; correct it"),
-        ('sequence = { address = 100, type = "uint32"', 'sequence = { address = 100, type = "uint32", scale = 0.5',
-         "map.drive.servo: read.sequence: found uint32 with scale 0.5 and offset 0, expected uint16, uint32 or uint64 "
-         "as it is: it is a count; correct it"),
-        ('control = { address = 202, type = "uint16" }', 'control = { address = 202, type = "uint16" }\n'
-         'heartbeat = { address = 203, type = "uint16", scale = 1e-6 }', "map.drive.servo: write.heartbeat: found "
-         "uint16 with scale 1e-06 and offset 0, expected uint16, uint32 or uint64 as it is: it is a count; correct it"),
-        ('unit = "us"', 'scale = -1.0, unit = "us"', "map.drive.servo: read.time.scale: found -1, expected a clock "
-         "that goes forward; turn its sign"),
-        ('scale = 0.1, unit = "mA"', 'scale = 0.1, offset = 1e308, unit = "mA"', "map.drive.servo.read.current."
-         "offset: found 1e+308, expected less than or equal to 1000000000000"),
-        ("[plant]\n", "[controller.knee]\nlimit_nm = 110.0\n[plant]\n", "torque_nm: found 110 of the knee, expected "
-         "less than its controller.limit_nm (110), which the drive never goes beyond; lower it"),
-        ("following_error_rad = 0.1\n", "following_error_rad = 0.2\n", "safety: with_human.following_error_rad: found "
-         "0.2, expected at most following_error_rad (0.15); with somebody in the machine a limit may only be tighter"),
-        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'tcp'\n[map.drive.servo]\n", "line.leg: no device is on it; "
-         'remove it, or give one line = "leg"'),
-        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'rs485'\n[map.drive.servo]\n", "line.leg.transport: found "
-         "'rs485', expected one of 'tcp', 'rtu', 'rtu_over_tcp', 'tls'"),
-        ("[map.drive.servo]\n", "[line.leg]\nhost = 'leg'\n[map.drive.servo]\n", "line.leg.transport: missing; add it"),
-        ("unit = 2\n", "unit = 2\nline = 'leg'\nport = 502\n", "drive[1]: port: found beside line = 'leg', which says "
-         "where the device is; remove one"),
-        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'tls'\nkey = 'a.key'\n[map.drive.servo]\n", "line.leg: "
-         "certificate and key belong together; give both or neither"),
-        ("[map.drive.servo]\n", "[map.drive.servo]\nfaults = { 5 = 'hot' }\n", "map.drive.servo: faults: bit 5 is not "
-         "one of fault_mask 0x0008; add 0x0020 to the mask, or leave the name out"),
-        ("speed_rad_s = 2.2", "speed_rad_s = 3.2", "drive[0]: with_human.speed_rad_s: found 3.2, expected at most "
-         "speed_rad_s (3); with somebody in the machine a limit may only be tighter"),
-        ("[drive.with_human]", "[drive.with_human]\nangle_rad = [-0.4, 1.0]", "drive[0]: with_human.angle_rad: found "
-         "[-0.4, 1], expected within angle_rad [-0.35, 1.75]; with somebody in the machine a limit may only be "
-         "tighter"),
-        ("cuff_force_n = 250.0", "cuff_force_n = 500.0", "safety: with_human.cuff_force_n: found 500, expected at most "
-         "cuff_force_n (400); with somebody in the machine a limit may only be tighter"),
-        ("enabled_value = 0x0001", "enabled_value = 0x0003", "map.drive.servo: enabled_value: found 0x0003, expected "
-         "bits of enabled_mask 0x0001 only; correct one of them"),
-        ("halt = 0x010F", "halt = 0x000F", "map.drive.servo: enable and halt: both are 0x000F, expected different "
-         "control words; correct one"),
-        ('joint = "knee"', 'joint = "hip"', "drive: found hip, hip, expected one for the hip, then one for the knee"),
-        ("enabled_value = 0x0001", "#", "map.drive.servo: enabled_value: missing beside enabled_mask 0x0001, expected "
-         "what these bits are while the drive is enabled, see its manual; give it"),
-        ("fault_mask = 0x0008", "fault_mask = 0x0009", "map.drive.servo: fault_mask: found 0x0009, of which 0x0001 is "
-         "in enabled_value 0x0001 too, expected other bits: an enabled drive has no fault; correct one of them"),
-        ("enabled_mask = 0x0001                  # bits that tell whether the drive is enabled ...\nenabled_value = "
-         "0x0001", "enabled_mask = 0x0008\nenabled_value = 0x0000", "map.drive.servo: enabled_mask: found 0x0008, all "
-         "of it in fault_mask 0x0008, expected a bit that tells an enabled drive from a disabled one; correct one of "
-         "them"),
-        ("angle_margin_rad = 0.02", "angle_margin_rad = 1.05", "safety.angle_margin_rad: found 1.05, expected less "
-         "than 1.05, half of the hip's angle_rad, or no set-point keeps it; lower it"),
-        ("thigh_length_m = 0.38952", "thigh_length_m = 38952", "plant.thigh_length_m: found 38952, expected less than "
-         "or equal to 5"),
-        ("[plant]\n", "[geometry]\nthigh_length_m = 389.52\n[plant]\n", "geometry.thigh_length_m: found 389.52, "
-         "expected less than or equal to 5"),
+        (
+            'map = "servo"',
+            'map = "servos"',
+            "drive[0].map: found 'servos', expected a table below [map.drive]: servo",
+        ),
+        (
+            'cuff = "thigh_back"',
+            'cuff = "thigh_front"',
+            "sensor: found two sensors at thigh_front, expected one; correct their cuffs",
+        ),
+        (
+            'scale = 1e-6, unit = "rad" }\nvelocity',
+            'scale = 1e-6, unit = "A" }\nvelocity',
+            (
+                "map.drive.servo: read.angle.unit: found 'A', expected rad or mrad or deg; correct"
+                " the unit"
+            ),
+        ),
+        (
+            "address = 106",
+            "address = 105",
+            (
+                "map.drive.servo: read.velocity: register 105 is part of angle too; correct "
+                "one address"
+            ),
+        ),
+        (
+            "address = 113",
+            "address = 400",
+            (
+                "map.drive.servo: read: spans 301 registers (100 to 400), expected at most "
+                "125, which is what one Modbus exchange carries"
+            ),
+        ),
+        (
+            "control = { address = 202",
+            "control = { address = 204",
+            (
+                "map.drive.servo: write: names nothing at register 202 between 200 and 204,"
+                " expected a block without gaps, which is written as a whole; map the drive's"
+                " registers side by side"
+            ),
+        ),
+        (
+            'scale = 0.1, unit = "mA"',
+            'scale = 0.0, unit = "mA"',
+            (
+                "map.drive.servo.read.current: scale: found 0, "
+                "expected units per count; every value would be the offset"
+            ),
+        ),
+        (
+            "angle_rad = [-0.35, 1.75]",
+            "angle_rad = [1.75, -0.35]",
+            "drive[0]: angle_rad: found [1.75, -0.35], expected the lowest angle first; swap them",
+        ),
+        (
+            'map = "servo"',
+            'map = "servo"\nline = "leg"',
+            "line: found 'leg' at unit 1, expected a table below [line]: there is none",
+        ),
+        (
+            "enable = 0x000F",
+            "enable = 0x1000F",
+            (
+                "map.drive.servo: enable: found 0x1000F, but write.control is a "
+                "uint16; correct one of them"
+            ),
+        ),
+        (
+            "fault_mask = 0x0008",
+            "fault_mask = 0x10000",
+            (
+                "map.drive.servo: fault_mask: found 0x10000, but read.status "
+                "is a uint16; correct one of them"
+            ),
+        ),
+        (
+            'control = { address = 202, type = "uint16"',
+            'control = { address = 202, type = "int16"',
+            (
+                "map.drive.servo: write.control: found int16 with scale 1 and offset 0, expected"
+                " uint16, uint32 or uint64 as it is: its bits have meanings of their own;"
+                " correct it"
+            ),
+        ),
+        (
+            'scale = 1e-6, unit = "rad" }\ncontrol',
+            'scale = 1e-10, unit = "rad" }\ncontrol',
+            (
+                "map.drive.servo.write.reference: cannot hold -0.35 to 1.75 rad, the hip's limits;"
+                " correct its type or scale"
+            ),
+        ),
+        (
+            'scale = 1e-6, unit = "rad" }\ncontrol',
+            'scale = 5.0, unit = "deg" }\ncontrol',
+            (
+                "map.drive.servo.write.reference: one count is 0.0873 rad, expected at most 0.025"
+                " rad, a quarter of safety.following_error_rad or of the hip's range; correct its"
+                " scale"
+            ),
+        ),
+        (
+            "ramp_s = 3.0",
+            "ramp_s = 1e9",
+            "safety.ramp_s: found 1000000000.0, expected less than or equal to 60",
+        ),
+        (
+            'sequence = { address = 100, type = "uint32"',
+            'sequence = { address = 100, type = "float32"',
+            (
+                "map.drive.servo: read.sequence: found float32 with scale 1 and offset 0, expected"
+                " uint16, uint32 or uint64 as it is: it is a count; correct it"
+            ),
+        ),
+        (
+            'sequence = { address = 100, type = "uint32"',
+            'sequence = { address = 100, type = "uint32", scale = 0.5',
+            (
+                "map.drive.servo: read.sequence: found uint32 with scale 0.5 and offset 0, expected"
+                " uint16, uint32 or uint64 as it is: it is a count; correct it"
+            ),
+        ),
+        (
+            'control = { address = 202, type = "uint16" }',
+            (
+                'control = { address = 202, type = "uint16" }\n'
+                'heartbeat = { address = 203, type = "uint16", scale = 1e-6 }'
+            ),
+            (
+                "map.drive.servo: write.heartbeat: found uint16 with scale 1e-06 and offset 0,"
+                " expected uint16, uint32 or uint64 as it is: it is a count; correct it"
+            ),
+        ),
+        (
+            'unit = "us"',
+            'scale = -1.0, unit = "us"',
+            (
+                "map.drive.servo: read.time.scale: found -1, expected a clock "
+                "that goes forward; turn its sign"
+            ),
+        ),
+        (
+            'scale = 0.1, unit = "mA"',
+            'scale = 0.1, offset = 1e308, unit = "mA"',
+            (
+                "map.drive.servo.read.current."
+                "offset: found 1e+308, expected less than or equal to 1000000000000"
+            ),
+        ),
+        (
+            "[plant]\n",
+            "[controller.knee]\nlimit_nm = 110.0\n[plant]\n",
+            (
+                "torque_nm: found 110 of the knee, expected less than its controller.limit_nm"
+                " (110), which the drive never goes beyond; lower it"
+            ),
+        ),
+        (
+            "following_error_rad = 0.1\n",
+            "following_error_rad = 0.2\n",
+            (
+                "safety: with_human.following_error_rad: found 0.2, expected at most"
+                " following_error_rad (0.15); with somebody in the machine a limit may only be"
+                " tighter"
+            ),
+        ),
+        (
+            "[map.drive.servo]\n",
+            "[line.leg]\ntransport = 'tcp'\n[map.drive.servo]\n",
+            'line.leg: no device is on it; remove it, or give one line = "leg"',
+        ),
+        (
+            "[map.drive.servo]\n",
+            "[line.leg]\ntransport = 'rs485'\n[map.drive.servo]\n",
+            (
+                "line.leg.transport: found "
+                "'rs485', expected one of 'tcp', 'rtu', 'rtu_over_tcp', 'tls'"
+            ),
+        ),
+        (
+            "[map.drive.servo]\n",
+            "[line.leg]\nhost = 'leg'\n[map.drive.servo]\n",
+            "line.leg.transport: missing; add it",
+        ),
+        (
+            "unit = 2\n",
+            "unit = 2\nline = 'leg'\nport = 502\n",
+            "drive[1]: port: found beside line = 'leg', which says where the device is; remove one",
+        ),
+        (
+            "[map.drive.servo]\n",
+            "[line.leg]\ntransport = 'tls'\nkey = 'a.key'\n[map.drive.servo]\n",
+            "line.leg: certificate and key belong together; give both or neither",
+        ),
+        (
+            "[map.drive.servo]\n",
+            "[map.drive.servo]\nfaults = { 5 = 'hot' }\n",
+            (
+                "map.drive.servo: faults: bit 5 is not "
+                "one of fault_mask 0x0008; add 0x0020 to the mask, or leave the name out"
+            ),
+        ),
+        (
+            "speed_rad_s = 2.2",
+            "speed_rad_s = 3.2",
+            (
+                "drive[0]: with_human.speed_rad_s: found 3.2, expected at most "
+                "speed_rad_s (3); with somebody in the machine a limit may only be tighter"
+            ),
+        ),
+        (
+            "[drive.with_human]",
+            "[drive.with_human]\nangle_rad = [-0.4, 1.0]",
+            (
+                "drive[0]: with_human.angle_rad: found [-0.4, 1], expected within angle_rad [-0.35,"
+                " 1.75]; with somebody in the machine a limit may only be tighter"
+            ),
+        ),
+        (
+            "cuff_force_n = 250.0",
+            "cuff_force_n = 500.0",
+            (
+                "safety: with_human.cuff_force_n: found 500, expected at most "
+                "cuff_force_n (400); with somebody in the machine a limit may only be tighter"
+            ),
+        ),
+        (
+            "enabled_value = 0x0001",
+            "enabled_value = 0x0003",
+            (
+                "map.drive.servo: enabled_value: found 0x0003, expected "
+                "bits of enabled_mask 0x0001 only; correct one of them"
+            ),
+        ),
+        (
+            "halt = 0x010F",
+            "halt = 0x000F",
+            (
+                "map.drive.servo: enable and halt: both are 0x000F, expected different "
+                "control words; correct one"
+            ),
+        ),
+        (
+            'joint = "knee"',
+            'joint = "hip"',
+            "drive: found hip, hip, expected one for the hip, then one for the knee",
+        ),
+        (
+            "enabled_value = 0x0001",
+            "#",
+            (
+                "map.drive.servo: enabled_value: missing beside enabled_mask 0x0001, expected "
+                "what these bits are while the drive is enabled, see its manual; give it"
+            ),
+        ),
+        (
+            "fault_mask = 0x0008",
+            "fault_mask = 0x0009",
+            (
+                "map.drive.servo: fault_mask: found 0x0009, of which 0x0001 is in enabled_value"
+                " 0x0001 too, expected other bits: an enabled drive has no fault; correct one of"
+                " them"
+            ),
+        ),
+        (
+            (
+                "enabled_mask = 0x0001                  # bits that tell whether the drive is"
+                " enabled ...\nenabled_value = 0x0001"
+            ),
+            "enabled_mask = 0x0008\nenabled_value = 0x0000",
+            (
+                "map.drive.servo: enabled_mask: found 0x0008, all of it in fault_mask 0x0008,"
+                " expected a bit that tells an enabled drive from a disabled one; correct one of"
+                " them"
+            ),
+        ),
+        (
+            "angle_margin_rad = 0.02",
+            "angle_margin_rad = 1.05",
+            (
+                "safety.angle_margin_rad: found 1.05, expected less "
+                "than 1.05, half of the hip's angle_rad, or no set-point keeps it; lower it"
+            ),
+        ),
+        (
+            "thigh_length_m = 0.38952",
+            "thigh_length_m = 38952",
+            "plant.thigh_length_m: found 38952, expected less than or equal to 5",
+        ),
+        (
+            "[plant]\n",
+            "[geometry]\nthigh_length_m = 389.52\n[plant]\n",
+            "geometry.thigh_length_m: found 389.52, expected less than or equal to 5",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_bad_rig_file_is_refused_in_one_line_with_the_keys_path(tmp_path, old, new, message):
     text = (RIGS / "plain.toml").read_text()
     assert old in text

@@ -103,8 +103,14 @@ def driven() -> dict[str, np.ndarray]:
     )
     loop = loop_at_rest(plant.assembly, reference[0])
     angle, velocity, torque, truth = follow(plant.assembly, drives, loop, reference, 0.0)
-    return {"time": time, "reference": reference, "angle": angle, "velocity": velocity, "torque": torque,
-            "truth": truth}  # fmt: skip
+    return {
+        "time": time,
+        "reference": reference,
+        "angle": angle,
+        "velocity": velocity,
+        "torque": torque,
+        "truth": truth,
+    }
 
 
 def controller() -> dict[str, Any]:

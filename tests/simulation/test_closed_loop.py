@@ -106,9 +106,10 @@ def test_a_reference_that_ends_too_early_is_told(table3):
     short = SampledTrajectory(time, *gait().at(time))
     with pytest.raises(InputError) as caught:
         track(table3, SETTINGS, short)
-    assert str(caught.value) == (
-        "the reference lasts 4 s, but simulate.duration_s asks for 10 s; shorten that, or give a reference that "
-        "repeats (omega_rad_s)"
+    assert (
+        str(caught.value)
+        == "the reference lasts 4 s, but simulate.duration_s asks for 10 s; shorten that, or give a"
+        " reference that repeats (omega_rad_s)"
     )
 
 

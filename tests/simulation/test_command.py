@@ -56,8 +56,12 @@ def test_tracking_writes_the_loop_the_sweep_and_every_figure(exoid, parameters_f
     )
     about = table.metadata
     assert about["plant"]["effects"][0] == {
-        "effect": "rigid_body", "X1": 10.3016, "X2": 3.0157, "X3": 2.2664, "X4": 5.5354
-    }  # fmt: skip
+        "effect": "rigid_body",
+        "X1": 10.3016,
+        "X2": 3.0157,
+        "X3": 2.2664,
+        "X4": 5.5354,
+    }
     assert about["controller"] == {"type": "rbf", "reference": "gait"}
     assert about["config"]["simulate"]["feedback_gain_nm_s_rad"] == 300.0 and about["seed"] == 0
     assert [made["name"] for made in about["inputs"]] == ["parameters.parquet"]
@@ -82,7 +86,8 @@ def test_tracking_can_be_read_by_a_program(exoid, parameters_file, quick, tmp_pa
 
 def test_a_reference_file_is_followed_instead_of_the_gait(exoid, parameters_file, quick, tmp_path):
     (tmp_path / "wave.toml").write_text(
-        'unit = "rad"\nomega_rad_s = 3.0\ntheta0_rad = [0.2, -0.5]\na = [[0.2], [0.1]]\nb = [[0.0], [0.1]]\n'
+        'unit = "rad"\nomega_rad_s = 3.0\ntheta0_rad = [0.2, -0.5]\na = [[0.2], [0.1]]\nb = [[0.0],'
+        " [0.1]]\n"
     )
     reference = tmp_path / "wave.toml"
     assert (
@@ -240,10 +245,11 @@ def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_value
         exoid, parameters, quick(), recording, tmp_path / "replay.parquet"
     )
     assert effects["encoder_offset@knee"] == {"offset": 0.1} and strayed > 1e-3
-    assert err == (
-        f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none of {recording}; "
-        "taken is that of recording.parquet, the first run it tells of, and as much as they differ the errors "
-        "are not the model's"
+    assert (
+        err
+        == f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none"
+        f" of {recording}; taken is that of recording.parquet, the first run it tells of, and as"
+        " much as they differ the errors are not the model's"
     )
 
 
@@ -272,8 +278,8 @@ def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_t
     )
     _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
     assert err.startswith(
-        f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of {recording}; "
-        "taken is that of its rows, "
+        f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of"
+        f" {recording}; taken is that of its rows, "
     )
 
 
@@ -284,8 +290,12 @@ def test_parameters_without_the_run_are_told_with_those_there_are(
     given = ("simulate", parameters, "--config", quick(), "-o", tmp_path / "out")
     code, _, err = exoid(*given, "--run", "with_human")
     assert (code, err) == (
-        2, f"exoid: {parameters}: holds no model of the run with_human, only of: exo_alone; choose one with --run"
-    )  # fmt: skip
+        2,
+        (
+            f"exoid: {parameters}: holds no model of the run with_human, only of: exo_alone; choose"
+            " one with --run"
+        ),
+    )
     assert not (tmp_path / "out").exists()
     assert exoid(*given)[0] == 0  # of the only one there is
     assert SIMULATION.read(tmp_path / "out" / "rbf.parquet").metadata["plant"]["run"] == "exo_alone"
@@ -299,9 +309,12 @@ def test_parameters_of_no_real_leg_are_refused_with_the_reason(
     )
     assert (code, err) == (
         2,
-        "exoid: the with_human parameters are no real leg: X2 (X1 - X2) = 1.241 is not above (L1 X3)² = 2.428 "
-        "kg²·m⁴: the mass matrix is not positive definite. A simulation of it would run away; identify again from "
-        "motions that separate X1, X2 and X3 better, or choose another --run",
+        (
+            "exoid: the with_human parameters are no real leg: X2 (X1 - X2) = 1.241 is not above"
+            " (L1 X3)² = 2.428 kg²·m⁴: the mass matrix is not positive definite. A simulation of it"
+            " would run away; identify again from motions that separate X1, X2 and X3 better, or"
+            " choose another --run"
+        ),
     )
     assert not (tmp_path / "out").exists()
 
@@ -314,8 +327,8 @@ def test_a_loop_that_runs_away_is_told_with_its_time_and_writes_nothing(
     assert code == 2
     assert err.startswith("exoid: the simulated knee ran past one full turn at t = ")
     assert err.endswith(
-        "s: the loop is unstable, or the disturbance stronger than the drives; lower simulate.adaptation_gain "
-        "or simulate.disturbance_nm, or shorten simulate.step_s"
+        "s: the loop is unstable, or the disturbance stronger than the drives; lower"
+        " simulate.adaptation_gain or simulate.disturbance_nm, or shorten simulate.step_s"
     )
     assert not (tmp_path / "out").exists()
 
@@ -325,7 +338,10 @@ def test_a_recording_in_place_of_parameters_is_told(exoid, recording_file, tmp_p
     code, _, err = exoid("simulate", recording, "-o", tmp_path / "out")
     assert (code, err) == (
         2,
-        f"exoid: {recording}: holds recording/1, expected parameters/1; `exoid identify` makes a parameters file",
+        (
+            f"exoid: {recording}: holds recording/1, expected parameters/1; `exoid identify` makes"
+            " a parameters file"
+        ),
     )
 
 
@@ -351,8 +367,12 @@ def test_reference_and_replay_exclude_each_other(exoid, parameters_file, recordi
         tmp_path / "r.parquet",
     )
     assert (code, err) == (
-        2, "exoid: --reference and --replay exclude each other: a replay follows its recording; drop one"
-    )  # fmt: skip
+        2,
+        (
+            "exoid: --reference and --replay exclude each other: a replay follows its recording;"
+            " drop one"
+        ),
+    )
 
 
 def test_settling_after_the_end_is_told(exoid, parameters_file, quick, tmp_path):
@@ -360,6 +380,8 @@ def test_settling_after_the_end_is_told(exoid, parameters_file, quick, tmp_path)
     code, _, err = exoid("simulate", parameters_file(), "--config", config, "-o", tmp_path / "out")
     assert (code, err) == (
         2,
-        f"exoid: {config}: simulate: settled_after_s: found 5, expected less than duration_s = 3; "
-        "lengthen the simulation",
+        (
+            f"exoid: {config}: simulate: settled_after_s: found 5, expected less than duration_s ="
+            " 3; lengthen the simulation"
+        ),
     )

@@ -89,8 +89,9 @@ def test_another_set_of_inputs_is_told(chain):
     step = chain.steps[1]
     step.target.write_text(json.dumps({"provenance": describe([chain.source])}))
     assert chain.states()["two"] == (
-        "stale", ("first.json was not among its inputs", "source.json is no input any more"),
-    )  # fmt: skip
+        "stale",
+        ("first.json was not among its inputs", "source.json is no input any more"),
+    )
 
 
 def test_what_may_be_impossible_and_is_not_there_is_done_without(chain):

@@ -28,7 +28,8 @@ esac
 for last in "$@"; do :; done
 case "$last" in
   identified/|diagnosed/|./identified/|./diagnosed/) mkdir -p "$last"
-    for name in parameters.parquet residuals.parquet candidates.parquet detectability.json verdict.json; do
+    for name in parameters.parquet residuals.parquet candidates.parquet detectability.json \\
+        verdict.json; do
       touch "$last/$name"
     done ;;
   */) mkdir -p "$last"; touch "$last/rbf.parquet"; [ -e nosweep ] || touch "$last/kv-sweep.csv" ;;
@@ -220,6 +221,8 @@ def test_clean_keeps_the_recordings(make):
 def test_init_overwrites_nothing(make):
     with pytest.raises(SettingsError) as caught:
         create(make.folder, exoid="exoid")
-    assert str(caught.value) == (
-        f"{make.folder / 'exoid.toml'}: exists already, not overwritten; choose a new folder or move it away"
+    assert (
+        str(caught.value)
+        == f"{make.folder / 'exoid.toml'}: exists already, not overwritten; choose a new folder or"
+        " move it away"
     )

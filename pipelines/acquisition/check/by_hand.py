@@ -33,7 +33,10 @@ CLEAR = 3.0
 HARDLY_RAD = 1e-4
 MOTIONS = {
     "hip": (
-        "keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it come back",
+        (
+            "keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it"
+            " come back"
+        ),
         1.0,
     ),
     "knee": (
@@ -82,7 +85,8 @@ async def by_hand(
         front = probe.place.endswith("front")
         inside = "forward" if front else "backward"
         await operator.ready(
-            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg would, and let go."
+            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg would, and"
+            " let go."
         )
         least = PUSH_SHARE * rig.safety.cuff_force_n
         pressed = await _watch(
@@ -138,26 +142,27 @@ def _judge_motion(
     if abs(peaks[found]) < HARDLY_RAD:
         yield Finding(
             asked.name,
-            f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is frozen: compare "
-            f"{where}.angle with the device's manual",
+            f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is"
+            f" frozen: compare {where}.angle with the device's manual",
             "angle",
         )
         return
     if found is not asked and abs(peaks[found]) > CLEAR * abs(peak):
         yield Finding(
             asked.name,
-            f"the {asked.place} was moved, but the angle of {found.name} changed, by {peaks[found]:+.3g} rad, and not "
-            f"this one ({peak:+.3g}): the two are swapped; exchange host, port and unit of the two in the rig file",
+            f"the {asked.place} was moved, but the angle of {found.name} changed, by"
+            f" {peaks[found]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
+            " exchange host, port and unit of the two in the rig file",
             "angle",
         )
         return
     if peak * sign < 0:
         yield Finding(
             asked.name,
-            f"its angle went {'down' if peak < 0 else 'up'} ({peak:+.3g} rad) when the {asked.place} went "
-            f"{'forward' if asked.place == 'hip' else 'into flexion'}; expected {'up' if sign > 0 else 'down'}: turn "
-            f"the sign of {where}.angle.scale, and of velocity, current and write.reference with it"
-            f"{_shared(asked, moved)}",
+            f"its angle went {'down' if peak < 0 else 'up'} ({peak:+.3g} rad) when the"
+            f" {asked.place} went {'forward' if asked.place == 'hip' else 'into flexion'}; expected"
+            f" {'up' if sign > 0 else 'down'}: turn the sign of {where}.angle.scale, and of"
+            f" velocity, current and write.reference with it{_shared(asked, moved)}",
             "angle",
         )
     if not SWING_RAD[0] / 2 <= abs(peak) <= 1.5 * SWING_RAD[1]:
@@ -173,8 +178,9 @@ def _judge_motion(
         )
         yield Finding(
             asked.name,
-            f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected {SWING_RAD[0]:g} to "
-            f"{SWING_RAD[1]:g} rad of 10 to 40 degrees; {mended} {where}.angle",
+            f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected"
+            f" {SWING_RAD[0]:g} to {SWING_RAD[1]:g} rad of 10 to 40 degrees; {mended}"
+            f" {where}.angle",
             "angle",
         )
     velocity = asked.block.registers.get("velocity")
@@ -211,26 +217,28 @@ def _judge_push(
     if abs(peak) < least:
         yield Finding(
             asked.name,
-            f"no force of any cuff changed by more than {abs(peak):.3g} N when {asked.place} was to be pressed, "
-            f"expected {least:g} N and more; was it? Else compare scale and unit in {where} with the manual",
+            f"no force of any cuff changed by more than {abs(peak):.3g} N when {asked.place} was to"
+            f" be pressed, expected {least:g} N and more; was it? Else compare scale and unit in"
+            f" {where} with the manual",
         )
     elif found is not asked:
         yield Finding(
             asked.name,
-            f"{asked.place} was pressed, but {found.name} felt it ({axis} {peak:+.3g} N): the two are swapped; "
-            "exchange host, port and unit of the two in the rig file",
+            f"{asked.place} was pressed, but {found.name} felt it ({axis} {peak:+.3g} N): the two"
+            " are swapped; exchange host, port and unit of the two in the rig file",
         )
     elif axis != "force_y":
         yield Finding(
             asked.name,
-            f"the push was felt in {axis} ({peak:+.3g} N), expected force_y, the segment's forward axis: exchange the "
-            f"addresses in {where}",
+            f"the push was felt in {axis} ({peak:+.3g} N), expected force_y, the segment's forward"
+            f" axis: exchange the addresses in {where}",
             axis,
         )
     elif peak * sign < 0:
         yield Finding(
             asked.name,
-            f"force_y went {'up' if peak > 0 else 'down'} ({peak:+.3g} N), expected {'up' if sign > 0 else 'down'}: it "
-            f"is the force of the exoskeleton on the leg, forward positive; turn the sign of {where}.force_y.scale",
+            f"force_y went {'up' if peak > 0 else 'down'} ({peak:+.3g} N), expected"
+            f" {'up' if sign > 0 else 'down'}: it is the force of the exoskeleton on the leg,"
+            f" forward positive; turn the sign of {where}.force_y.scale",
             axis,
         )

@@ -61,7 +61,8 @@ def check_rig(
         rate_hz = rig.plant.sample_rate_hz
     if move and rate_hz is None and rig.sampling == "recorder":
         raise SettingsError(
-            "--rate-hz: missing; of a rig that records by itself it is not known how often it is told"
+            "--rate-hz: missing; of a rig that records by itself it is not known how often it is"
+            " told"
         )
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")
@@ -88,7 +89,8 @@ def refuse_to_move_somebody(*, by_hand: bool, move: bool) -> None:
     for option, given in (("--by-hand", by_hand), ("--move", move)):
         if given:
             raise InputError(
-                f"{option} wants nobody in the machine, but --run with_human says that somebody is; drop one"
+                f"{option} wants nobody in the machine, but --run with_human says that somebody is;"
+                " drop one"
             )
 
 
@@ -126,8 +128,8 @@ async def _check(
                 report.findings += await by_hand(probes_of(machine), rig, rate_hz, operator)
             except DeviceError as error:
                 report.findings.append(Finding("rig", str(error)))
-        return report, [] if report.findings else [
-            (await drive.look()).angle for drive in machine.drives
-        ]
+        return report, (
+            [] if report.findings else [(await drive.look()).angle for drive in machine.drives]
+        )
     finally:
         machine.close()

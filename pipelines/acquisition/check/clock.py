@@ -79,8 +79,8 @@ def _counter(
         if clock.step > 1 and not probe.in_lockstep and len(steps) > OFTEN * changes:
             yield Finding(
                 probe.name,
-                f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample; correct "
-                f"{where}.scale, or let the device count samples",
+                f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample;"
+                f" correct {where}.scale, or let the device count samples",
             )
         return
     mended = remedy(
@@ -99,14 +99,14 @@ def _counter(
         )
         yield Finding(
             probe.name,
-            f"its counter stands still at {counter[-1]:g} for {seconds:.2g} s, {alive}; is it sampling? "
-            f"Else correct {where}",
+            f"its counter stands still at {counter[-1]:g} for {seconds:.2g} s, {alive}; is it"
+            f" sampling? Else correct {where}",
         )
     elif (steps < 0).any():
         yield Finding(
             probe.name,
-            f"its counter goes back, from {counter[:-1][steps < 0][0]:g} to {counter[1:][steps < 0][0]:g}; "
-            f"compare {where} with the device's manual",
+            f"its counter goes back, from {counter[:-1][steps < 0][0]:g} to"
+            f" {counter[1:][steps < 0][0]:g}; compare {where} with the device's manual",
         )
     else:
         found, expected = (
@@ -115,8 +115,8 @@ def _counter(
         )
         yield Finding(
             probe.name,
-            f"its counter goes up by {found:.4g} a second, expected {expected}; set the device's rate or "
-            f"acquire.sample_rate_hz, or correct {where}",
+            f"its counter goes up by {found:.4g} a second, expected {expected}; set the device's"
+            f" rate or acquire.sample_rate_hz, or correct {where}",
         )
 
 
@@ -147,7 +147,8 @@ def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterato
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
     yield Finding(
         probe.name,
-        f"{found}; {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
+        f"{found};"
+        f" {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
     )
 
 
@@ -181,8 +182,8 @@ def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
     if torn:
         yield Finding(
             probe.name,
-            f"{', '.join(torn)} changed while the sample counter did not: a block is not latched at one "
-            "instant; read the registers that the device latches, see its manual",
+            f"{', '.join(torn)} changed while the sample counter did not: a block is not latched at"
+            " one instant; read the registers that the device latches, see its manual",
         )
 
 

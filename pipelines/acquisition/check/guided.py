@@ -60,8 +60,9 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
     for joint, angle in zip(JOINTS, angles, strict=True):
         if abs(angle) > NEAR_ZERO_RAD:
             raise SettingsError(
-                f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g} rad of zero, since "
-                "a drive of wrong sign leaps by twice its angle; let the leg hang straight, or add --by-hand"
+                f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g}"
+                " rad of zero, since a drive of wrong sign leaps by twice its angle; let the leg"
+                " hang straight, or add --by-hand"
             )
 
 
@@ -209,8 +210,8 @@ def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator
     if abs(gain) < GAIN and abs(across) > 1.0 - GAIN:
         yield Finding(
             name,
-            f"its angle follows the set-point of drive {other.joint}: the angles are swapped; exchange host, port and "
-            "unit of the two in the rig file",
+            f"its angle follows the set-point of drive {other.joint}: the angles are swapped;"
+            " exchange host, port and unit of the two in the rig file",
             "angle",
         )
     elif abs(gain) < GAIN:
@@ -221,22 +222,23 @@ def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator
     elif gain < 0:
         yield Finding(
             name,
-            f"its angle goes against its set-point ({gain:.2f} as far): the sign of {where}.read.angle.scale or of "
-            f"{where}.write.reference.scale is wrong; --by-hand tells which",
+            f"its angle goes against its set-point ({gain:.2f} as far): the sign of"
+            f" {where}.read.angle.scale or of {where}.write.reference.scale is wrong; --by-hand"
+            " tells which",
             "angle",
         )
     elif abs(gain - 1.0) > GAIN:
         yield Finding(
             name,
-            f"its angle goes {gain:.3g} times as far as its set-point: unit or scale of {where}.read.angle and "
-            f"{where}.write.reference differ; correct the wrong one",
+            f"its angle goes {gain:.3g} times as far as its set-point: unit or scale of"
+            f" {where}.read.angle and {where}.write.reference differ; correct the wrong one",
             "angle",
         )
     if abs(gain) >= GAIN and torque < -ALIKE:
         yield Finding(
             name,
-            f"its torque goes against its speed (correlation {torque:.2f}), as if friction drove it: turn the sign of "
-            f"{where}.read.current.scale",
+            f"its torque goes against its speed (correlation {torque:.2f}), as if friction drove"
+            f" it: turn the sign of {where}.read.current.scale",
             "current",
         )
 

@@ -78,13 +78,15 @@ class RigReport:
             "moved": [asdict(answer) for answer in self.answers],
             "devices": [device.as_json() for device in self.devices],
             **{
-                name: {
-                    "cycles_hz": rate.cycles_hz,
-                    "late": rate.late,
-                    "cycle": rate.cycle.as_json(),
-                }
-                if rate
-                else None
+                name: (
+                    {
+                        "cycles_hz": rate.cycles_hz,
+                        "late": rate.late,
+                        "cycle": rate.cycle.as_json(),
+                    }
+                    if rate
+                    else None
+                )
                 for name, rate in rates.items()
             },
             "findings": [asdict(finding) for finding in self.findings],
@@ -220,9 +222,9 @@ def _judged(
         findings.append(
             Finding(
                 probe.name,
-                f"takes {report.latency.median * 1e3:.3g} ms to answer, too long for a sample of "
-                f"{rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its own, raise its baud "
-                "rate, or ask less often",
+                f"takes {report.latency.median * 1e3:.3g} ms to answer, too long for a sample of"
+                f" {rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its"
+                " own, raise its baud rate, or ask less often",
             )
         )
     if series is together:
@@ -265,6 +267,6 @@ def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
         if first and found and abs(found / first - 1.0) > RATE_TOLERANCE:
             yield Finding(
                 name,
-                f"samples {found:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives sample at one "
-                "rate, on one synchronising signal if they have it",
+                f"samples {found:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives"
+                " sample at one rate, on one synchronising signal if they have it",
             )

@@ -105,8 +105,10 @@ def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]
         "current": Expectation(
             -current,
             current,
-            f"expected less than {current:.2g} A of a drive that is disabled ({TORQUE_AT_REST:.0%} of its torque_nm)",
-            "does another master drive it? Disable it there, or compare {where} with the device's manual",
+            f"expected less than {current:.2g} A of a drive that is disabled ({TORQUE_AT_REST:.0%}"
+            " of its torque_nm)",
+            "does another master drive it? Disable it there, or compare {where} with the device's"
+            " manual",
         ),
         "temperature": Expectation(
             *TEMPERATURE_C,
@@ -155,7 +157,7 @@ def _faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
     if bits := drive.map.told_faults(status):
         yield Finding(
             probe.name,
-            f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual and "
-            f"clear it, or correct {probe.map_path}.fault_mask",
+            f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual"
+            f" and clear it, or correct {probe.map_path}.fault_mask",
             "status",
         )

@@ -63,7 +63,10 @@ async def _judged(
         try:
             found = await drive.drain(reading.sequence)
         except DeviceError as error:
-            return f"its record cannot be drained ({error}); compare {_where(drive)} with the device's manual"
+            return (
+                f"its record cannot be drained ({error}); compare {_where(drive)} with the device's"
+                " manual"
+            )
         for record in found:
             told.tell(record.sequence, record.reference)  # nobody sends any
             agreement.judge(record)
@@ -72,7 +75,10 @@ async def _judged(
     for probe in drives:
         probe.taken()
     if not begun:
-        return f"its record brought no sample in {DRAINS} cycles; compare {_where(drive)} with the device's manual"
+        return (
+            f"its record brought no sample in {DRAINS} cycles; compare {_where(drive)} with the"
+            " device's manual"
+        )
     return None
 
 

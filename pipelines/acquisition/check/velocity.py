@@ -38,8 +38,9 @@ def check_velocity(
         if np.ptp(travel) > STANDING_RAD + np.ptp(q):
             yield Finding(
                 device,
-                f"velocity says that the joint went {np.ptp(travel):.3g} rad in {t[-1] - t[0]:.2g} s, but its "
-                f"angle changed by {np.ptp(q):.2g} rad; compare {where}.velocity with the device's manual",
+                f"velocity says that the joint went {np.ptp(travel):.3g} rad in {t[-1] - t[0]:.2g}"
+                f" s, but its angle changed by {np.ptp(q):.2g} rad; compare {where}.velocity with"
+                " the device's manual",
             )
         return
     ratio = float(told @ angle / (angle @ angle))
@@ -49,14 +50,14 @@ def check_velocity(
     if abs(correlation) < CORRELATED:
         yield Finding(
             device,
-            f"velocity does not follow the angle (correlation {correlation:.2f}); compare {where}.velocity "
-            "with the device's manual",
+            f"velocity does not follow the angle (correlation {correlation:.2f}); compare"
+            f" {where}.velocity with the device's manual",
         )
     elif ratio < 0:
         yield Finding(
             device,
-            f"velocity is negative where the angle grows ({ratio:.3g} of its rate of change, expected 1); turn "
-            f"the sign of {where}.velocity.scale",
+            f"velocity is negative where the angle grows ({ratio:.3g} of its rate of change,"
+            f" expected 1); turn the sign of {where}.velocity.scale",
         )
     elif abs(ratio - 1.0) > TOLERANCE:
         yield Finding(
@@ -69,5 +70,8 @@ def check_velocity(
 def _unit(register: Register, ratio: float, where: str) -> str:
     for unit in DIMENSION["velocity"]:
         if abs(ratio * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
-            return f'with unit = "{unit}" the two agree: correct {where}.velocity, or the angle\'s unit'
+            return (
+                f'with unit = "{unit}" the two agree: correct {where}.velocity, or the angle\'s'
+                " unit"
+            )
     return f"correct {where}.velocity.scale (or the gear ratio in it), or the angle's unit"

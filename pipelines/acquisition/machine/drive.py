@@ -169,15 +169,15 @@ class Drive:
         most = longest * rate_hz * (1.0 + RATE_TOLERANCE) + 1.0
         if not fewest <= samples <= most:
             raise DeviceError(
-                f"{self.device.label}: its sample counter goes up by {samples / (0.5 * (shortest + longest)):.4g} a "
-                f"second, expected {rate_hz:g}; correct {setting}, or the rate that is set in the drive; nothing was "
-                "moved"
+                f"{self.device.label}: its sample counter goes up by"
+                f" {samples / (0.5 * (shortest + longest)):.4g} a second, expected {rate_hz:g};"
+                f" correct {setting}, or the rate that is set in the drive; nothing was moved"
             )
         if not keeps_time(samples, seconds, rate_hz):
             raise DeviceError(
-                f"{self.device.label}: its clock went on by {seconds:.6f} s while its counter went on by {samples} "
-                f"samples of {1.0 / rate_hz:.6f} s; correct the unit of time in the rig file, or {setting}; nothing "
-                "was moved"
+                f"{self.device.label}: its clock went on by {seconds:.6f} s while its counter went"
+                f" on by {samples} samples of {1.0 / rate_hz:.6f} s; correct the unit of time in"
+                f" the rig file, or {setting}; nothing was moved"
             )
 
     async def empty_record(self) -> None:
@@ -192,9 +192,10 @@ class Drive:
         while not await self.forget_records():
             if time.monotonic() > until:
                 raise DeviceError(
-                    f"{self.device.label}: its queue is not empty after {EMPTYING_S:g} s in which it was read without "
-                    "a pause, so it fills faster; raise the speed of its line, give each drive a line of its own, or "
-                    "let it record less often (record_rate_hz)"
+                    f"{self.device.label}: its queue is not empty after {EMPTYING_S:g} s in which"
+                    " it was read without a pause, so it fills faster; raise the speed of its"
+                    " line, give each drive a line of its own, or let it record less often"
+                    " (record_rate_hz)"
                 )
 
     def _newest(self, sequence: float, sent: float | None) -> int:
@@ -284,8 +285,9 @@ class Drive:
             return
         if self.map.fault_reset is None:
             raise SettingsError(
-                f"map.drive.{self.settings.map}.fault_reset: missing, but {self.device.label} reports a fault that is "
-                "to be reset; give its control word, see the drive's manual"
+                f"map.drive.{self.settings.map}.fault_reset: missing, but {self.device.label}"
+                " reports a fault that is to be reset; give its control word, see the drive's"
+                " manual"
             )
         try:
             await self._tell_idle(self.map.fault_reset, told["angle"])
@@ -311,8 +313,8 @@ class Drive:
         low, high = self.settings.angle_rad
         if not low <= reference <= high:
             raise DeviceError(
-                f"{self.device.label}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to "
-                f"{high:g} rad; it was not sent"
+                f"{self.device.label}: a set-point of {reference:.3f} rad was due, outside its"
+                f" limits {low:g} to {high:g} rad; it was not sent"
             )
         # Within the limits once rounded, too: what is half a count from a limit may be rounded
         # beyond it.
@@ -356,8 +358,8 @@ class Drive:
                 return
             if time.monotonic() > until:
                 raise DeviceError(
-                    f"{self.device.label}: was told {what}, but its status word is still 0x{status:04X} after "
-                    f"{self._control_s:g} s (safety.control_s); {remedy}"
+                    f"{self.device.label}: was told {what}, but its status word is still"
+                    f" 0x{status:04X} after {self._control_s:g} s (safety.control_s); {remedy}"
                 )
             await asyncio.sleep(STATUS_PAUSE_S)
 
@@ -371,8 +373,8 @@ class Drive:
         for name in COUNTED_WITH:
             if not isfinite(told.get(name, 0.0)):
                 raise DeviceError(
-                    f"{self.device.label}: its {name} is {told[name]}, expected a number; compare the register map in "
-                    "the rig file with the device's manual"
+                    f"{self.device.label}: its {name} is {told[name]}, expected a number; compare"
+                    " the register map in the rig file with the device's manual"
                 )
         return told
 

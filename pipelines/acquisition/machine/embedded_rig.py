@@ -33,9 +33,22 @@ def embedded(
     """Run the virtual rig of a file; yields the rig's settings with the places where its devices
     are."""
     command = [
-        sys.executable, "-m", "exoid_cli", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
-        "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "exoid_cli",
+        "rig",
+        "serve",
+        str(path),
+        "--run",
+        run.run,
+        "--seed",
+        str(run.seed),
+        "--sample-rate-hz",
+        str(sample_rate_hz),
+        "--port",
+        "0",
+        "--until-input-ends",
+    ]
     with tempfile.TemporaryFile() as complaints:
         # It ends with its input, which the system closes even where this process is killed.
         process = subprocess.Popen(
@@ -100,7 +113,8 @@ def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, s
     words = complaints.read().decode(errors="replace").strip()
     if not words:
         raise DeviceError(
-            f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}` to see why"
+            f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}`"
+            " to see why"
         )
     # What the rig could not use is the user's to mend here as there.
     kind = SettingsError if said.process.returncode == SettingsError.exit_code else DeviceError

@@ -79,8 +79,8 @@ class Sensor:
         if samples < 0 or samples > self._most(now):
             how = "went back" if samples < 0 else "leapt"
             raise DeviceError(
-                f"{self.device.label}: its sample counter {how} from {last:.0f} to {count:.0f}; was it restarted? Its "
-                "zero may be another since"
+                f"{self.device.label}: its sample counter {how} from {last:.0f} to {count:.0f}; was"
+                " it restarted? Its zero may be another since"
             )
         self._last = count, now
         return True

@@ -72,8 +72,9 @@ class Machine:
             drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so
         ]:
             raise DeviceError(
-                f"{' and '.join(found)}: driven by somebody else, since angle or set-point change while exoid sends "
-                "nothing; end the other program, or hold the leg still; nothing was sent"
+                f"{' and '.join(found)}: driven by somebody else, since angle or set-point change"
+                " while exoid sends nothing; end the other program, or hold the leg still; nothing"
+                " was sent"
             )
 
     async def reset_faults(self) -> None:
@@ -87,8 +88,9 @@ class Machine:
         found = [drive.device.label for drive in self.drives if await drive.make_idle()]
         if found:
             raise DeviceError(
-                f"{' and '.join(found)}: enabled before the run began, by one that was killed perhaps; disabled now; "
-                "see to the leg, and to what else moves it, and start again"
+                f"{' and '.join(found)}: enabled before the run began, by one that was killed"
+                " perhaps; disabled now; see to the leg, and to what else moves it, and start"
+                " again"
             )
 
     async def refuse_other_rate(self, cycle_hz: float) -> None:
@@ -255,9 +257,12 @@ class Machine:
         j, other = (fast, slow) if gained[slow] > 0 else (slow, fast)
         what = "leapt" if gained[slow] > 0 else "went back" if gained[slow] < 0 else "stands still"
         return (
-            f"{self.drives[j].device.label}: its sample counter {what} ({readings[j].sequence - gained[j]}, then "
-            f"{readings[j].sequence}) while that of drive {self.rig.drive[other].joint} went on by {gained[other]} in "
-            f'{self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the rig file, if each drive '
+            f"{self.drives[j].device.label}: its sample counter {what}"
+            f" ({readings[j].sequence - gained[j]}, then "
+            f"{readings[j].sequence}) while that of drive {self.rig.drive[other].joint} went on by"
+            f" {gained[other]} in "
+            f'{self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the rig'
+            " file, if each drive "
             "has a clock of its own"
         )
 

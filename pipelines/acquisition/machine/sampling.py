@@ -275,7 +275,7 @@ def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
         return Latched()
     if machine.rig.clocks == "common" and machine.leads_are_vague:
         raise DeviceError(
-            "the lines are too slow to tell which samples of the drives' rings belong together; raise their speed, or "
-            'set clocks = "own" in the rig file'
+            "the lines are too slow to tell which samples of the drives' rings belong together;"
+            ' raise their speed, or set clocks = "own" in the rig file'
         )
     return Streams(machine, cycle_hz, judge)

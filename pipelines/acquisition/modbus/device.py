@@ -27,7 +27,9 @@ MEANING: dict[int, str] = {
 _GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
 REMEDY: dict[int, str] = {
     ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",
-    ExcCodes.DEVICE_BUSY: "end what else asks it, wait until it is ready, or lower acquire.sample_rate_hz",
+    ExcCodes.DEVICE_BUSY: (
+        "end what else asks it, wait until it is ready, or lower acquire.sample_rate_hz"
+    ),
     ExcCodes.GATEWAY_PATH_UNAVIABLE: _GATEWAY,
     ExcCodes.GATEWAY_NO_RESPONSE: _GATEWAY,
 }
@@ -70,8 +72,9 @@ class Device:
             (found,) = await self.read(entry.address, 1)
             if found != entry.value:
                 raise DeviceError(
-                    f"{self.label}: identity register {entry.address} holds 0x{found:04X}, expected "
-                    f"0x{entry.value:04X}: it is another device; check cabling and unit id, or correct the rig file"
+                    f"{self.label}: identity register {entry.address} holds 0x{found:04X}, expected"
+                    f" 0x{entry.value:04X}: it is another device; check cabling and unit id, or"
+                    " correct the rig file"
                 )
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
@@ -96,8 +99,8 @@ class Device:
         found = list(getattr(response, "values", []))
         if len(found) % words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(found)} registers, expected a multiple of {words}; "
-                "compare ring.words in the rig file with the device's manual"
+                f"{self.label}: answered {what} with {len(found)} registers, expected a multiple of"
+                f" {words}; compare ring.words in the rig file with the device's manual"
             )
         return found
 
@@ -135,8 +138,8 @@ class Device:
         response = await self._request(what, wait, request, **arguments)
         if words is not None and len(response.registers) != words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
-                "compare the register map in the rig file with the device's manual"
+                f"{self.label}: answered {what} with {len(response.registers)} registers, expected"
+                f" {words}; compare the register map in the rig file with the device's manual"
             )
         return list(response.registers)
 
@@ -150,12 +153,13 @@ class Device:
         except (ModbusException, OSError) as error:
             silent = Unanswered if self._client.connected else DeviceError
             raise silent(
-                f"{self.label}: did not answer {what} within {wait.seconds:.3g} s; check cable and power, "
-                f"or raise safety.{wait.setting} in the rig file"
+                f"{self.label}: did not answer {what} within {wait.seconds:.3g} s; check cable and"
+                f" power, or raise safety.{wait.setting} in the rig file"
             ) from error
         if isinstance(response, NoReply):
             raise DeviceError(
-                f"{self.label}: answered {what} with {response.found}; check that it speaks Modbus, and the line"
+                f"{self.label}: answered {what} with {response.found}; check that it speaks Modbus,"
+                " and the line"
             )
         # An exception reply is an answer like any other to pymodbus: nothing is raised.
         if response.isError():

@@ -67,15 +67,16 @@ def _locked(path: Path, name: str) -> IO[bytes]:
             file = os.fdopen(_opened(path), "rb+", buffering=0)
         except OSError as error:
             raise DeviceError(
-                f"{path}: cannot be opened ({error.strerror}), and so nobody knows whether another exoid uses {name}; "
-                "see to this file, or set TMPDIR to a folder that every user of the rig may write in; nothing was moved"
+                f"{path}: cannot be opened ({error.strerror}), and so nobody knows whether another"
+                f" exoid uses {name}; see to this file, or set TMPDIR to a folder that every user"
+                " of the rig may write in; nothing was moved"
             ) from error
         if not take(file, wait=False):
             with file:
                 pid = file.read(20).decode(errors="replace").strip() or "unknown"
             raise DeviceError(
-                f"{name}: another exoid (process {pid}) uses the devices there; wait for it to end, or end it; nothing "
-                "was moved"
+                f"{name}: another exoid (process {pid}) uses the devices there; wait for it to end,"
+                " or end it; nothing was moved"
             )
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), os.stat(path)):

@@ -116,8 +116,9 @@ class Line:
             return await self.client.connect()
         except BAD_SETTINGS as error:
             raise DeviceError(
-                f"{self._label}: the serial port cannot be set up like that ({error}); correct baud_rate, parity or "
-                'stop_bits in the rig file (a pseudo-terminal needs parity = "none")'
+                f"{self._label}: the serial port cannot be set up like that ({error}); correct"
+                " baud_rate, parity or stop_bits in the rig file (a pseudo-terminal needs parity ="
+                ' "none")'
             ) from error
 
     def close(self) -> None:
@@ -264,8 +265,8 @@ class Line:
         # Under TLS 1.3 a client is turned away only once it takes the connection for made.
         if isinstance(self._settings, TlsLine) and not self._has_answered:
             return (
-                f"the other end closed the line before its first answer{others}; it does not trust what certificate "
-                "and key in the rig file show, or has stopped"
+                f"the other end closed the line before its first answer{others}; it does not trust"
+                " what certificate and key in the rig file show, or has stopped"
             )
         return f"the line is lost{others}; check cable and power"
 
@@ -316,9 +317,12 @@ def _client(
     }
     if isinstance(settings, RtuLine):
         return AsyncModbusSerialClient(
-            settings.serial_port, baudrate=settings.baud_rate, parity=settings.parity[0].upper(),
-            stopbits=settings.stop_bits, **common,
-        )  # fmt: skip
+            settings.serial_port,
+            baudrate=settings.baud_rate,
+            parity=settings.parity[0].upper(),
+            stopbits=settings.stop_bits,
+            **common,
+        )
     if isinstance(settings, TlsLine):
         assert tls  # such a line has one
         client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
@@ -342,7 +346,8 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
             )
     except OSError as error:  # SSLError is one
         raise SettingsError(
-            f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM files"
+            f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM"
+            " files"
         ) from error
     return context
 
@@ -360,14 +365,26 @@ def _explained(error: OSError) -> str:
             f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); {advice}"
         )
     if isinstance(error, TimeoutError):
-        return "no TLS connection within safety.connect_s; check that the rig is on, and that the port speaks TLS"
+        return (
+            "no TLS connection within safety.connect_s; check that the rig is on, and that the port"
+            " speaks TLS"
+        )
     if isinstance(error, ssl.SSLError):
-        return f"no TLS connection ({error.reason or error}); check that the port speaks TLS, and certificate and key"
+        return (
+            f"no TLS connection ({error.reason or error}); check that the port speaks TLS, and"
+            " certificate and key"
+        )
     if error.errno == errno.ENOENT:
         there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-        return f"no such serial port; there is {there}; plug the adapter in, or correct serial_port in the rig file"
+        return (
+            f"no such serial port; there is {there}; plug the adapter in, or correct serial_port in"
+            " the rig file"
+        )
     if error.errno in (errno.EACCES, errno.EPERM):
-        return "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout $USER), log in anew"
+        return (
+            "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout"
+            " $USER), log in anew"
+        )
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         return "the serial port is busy; end the other program that uses it"
     return f"no connection ({error}); check that the rig is on, and the line in the rig file"

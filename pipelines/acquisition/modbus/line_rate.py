@@ -23,9 +23,9 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
     highest, slowest = highest_rate(rig, with_sensors=with_sensors)
     if slowest is not None and sample_rate_hz > highest:
         raise SettingsError(
-            f"line {slowest} ({rig.line[slowest].place}): {sample_rate_hz:g} samples a second are asked for, at most "
-            f"{floor(highest)} fit through; raise baud_rate, give devices lines of their own, or lower "
-            "acquire.sample_rate_hz"
+            f"line {slowest} ({rig.line[slowest].place}): {sample_rate_hz:g} samples a second are"
+            f" asked for, at most {floor(highest)} fit through; raise baud_rate, give devices lines"
+            " of their own, or lower acquire.sample_rate_hz"
         )
 
 

@@ -104,7 +104,10 @@ class Conversation:
         if isinstance(reply, ExceptionResponse) or reply.function_code != WRITE_MULTIPLE:
             return None
         if (reply.address, reply.count) != (asked.address, asked.count):
-            return f"{reply.count} registers written at {reply.address}, expected {asked.count} at {asked.address}"
+            return (
+                f"{reply.count} registers written at {reply.address}, expected {asked.count} at"
+                f" {asked.address}"
+            )
         return None
 
 

@@ -22,9 +22,10 @@ def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sens
         longest = waits * reply_s + 2.0 / sample_rate_hz
         if heartbeat_s is not None and heartbeat_s <= longest:
             raise SettingsError(
-                f"{key}: found {heartbeat_s:g}, expected more than {longest:.3g} s: for so long one lost reply leaves "
-                f"{rig.label_of(drive)} without a set-point ({waits} x reply_s of {reply_s:.3g} s, and two samples), "
-                "and its own watchdog would let go of the leg; lower safety.reply_s, or raise the time-out in the drive"
+                f"{key}: found {heartbeat_s:g}, expected more than {longest:.3g} s: for so long one"
+                f" lost reply leaves {rig.label_of(drive)} without a set-point ({waits} x reply_s"
+                f" of {reply_s:.3g} s, and two samples), and its own watchdog would let go of the"
+                " leg; lower safety.reply_s, or raise the time-out in the drive"
             )
 
 

@@ -17,15 +17,17 @@ def unnoticed(rig: RigSettings) -> list[str]:
     blind = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].enabled_mask]
     if blind:
         missing.append(
-            f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency stop that is "
-            "pressed and released is noticed only once the leg is safety.following_error_rad from its set-point "
-            f"({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g} rad), and until then "
-            "the leg leaps back by as much on its release"
+            f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency"
+            " stop that is pressed and released is noticed only once the leg is"
+            " safety.following_error_rad from its set-point"
+            f" ({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g}"
+            " rad), and until then the leg leaps back by as much on its release"
         )
     if deaf := [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]:
         missing.append(
-            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it reports is noticed "
-            "only once it says that it is no longer enabled, or the leg does not follow"
+            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it"
+            " reports is noticed only once it says that it is no longer enabled, or the leg does"
+            " not follow"
         )
     return missing
 
@@ -47,13 +49,13 @@ def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
         for limit in LIMITS:
             if getattr(drive.with_human, limit) is None:
                 raise SettingsError(
-                    f"drive[{i}].with_human.{limit}: missing; a run with_human needs the {drive.joint}'s own limit, no "
-                    f"higher than {getattr(drive, limit):g}"
+                    f"drive[{i}].with_human.{limit}: missing; a run with_human needs the"
+                    f" {drive.joint}'s own limit, no higher than {getattr(drive, limit):g}"
                 )
     if rig.sensor and rig.safety.with_human.cuff_force_n is None:
         raise SettingsError(
-            "safety.with_human.cuff_force_n: missing; a run with_human needs its own limit of the force on a cuff, no "
-            f"higher than {rig.safety.cuff_force_n:g} N"
+            "safety.with_human.cuff_force_n: missing; a run with_human needs its own limit of the"
+            f" force on a cuff, no higher than {rig.safety.cuff_force_n:g} N"
         )
     refuse_seldom_read(rig, sample_rate_hz)
 
@@ -69,7 +71,8 @@ def refuse_seldom_read(rig: RigSettings, sample_rate_hz: float) -> None:
     for i, sensor in enumerate(rig.sensor):
         if sensor.every > rig.safety.watchdog_s * sample_rate_hz:
             raise SettingsError(
-                f"sensor[{i}].every: found {sensor.every}, which is {sensor.every / sample_rate_hz:.3g} s at "
-                f"{sample_rate_hz:g} Hz; expected a force at least every {rig.safety.watchdog_s:g} s "
-                "(safety.watchdog_s), or nobody watches it; lower it"
+                f"sensor[{i}].every: found {sensor.every}, which is"
+                f" {sensor.every / sample_rate_hz:.3g} s at {sample_rate_hz:g} Hz; expected a force"
+                f" at least every {rig.safety.watchdog_s:g} s (safety.watchdog_s), or nobody"
+                " watches it; lower it"
             )

@@ -36,9 +36,10 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
         return
     less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
-        f"{late} of {made} cycles in which every device was asked took longer than the {1e3 / cycle_hz:g} ms from "
-        f"one set-point to the next; lower acquire.sample_rate_hz{less_often}, or close what else this computer does; "
-        "nothing was moved"
+        f"{late} of {made} cycles in which every device was asked took longer than the"
+        f" {1e3 / cycle_hz:g} ms from one set-point to the next; lower"
+        f" acquire.sample_rate_hz{less_often}, or close what else this computer does; nothing was"
+        " moved"
     )
 
 

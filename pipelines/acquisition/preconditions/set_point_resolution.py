@@ -22,8 +22,8 @@ def refuse_coarse_set_points(rig: RigSettings, sample_rate_hz: float) -> None:
         coarsest = drive.speed_rad_s / sample_rate_hz / FINEST_SHARE
         if count > coarsest:
             raise SettingsError(
-                f"map.drive.{drive.map}.write.reference: one count is {count:.3g} rad, expected at most "
-                f"{coarsest:.3g} rad, a quarter of what the {drive.joint} may move in a sample "
-                f"({drive.speed_rad_s:g} rad/s at {sample_rate_hz:g} Hz); correct its scale, or lower "
-                "acquire.sample_rate_hz"
+                f"map.drive.{drive.map}.write.reference: one count is {count:.3g} rad, expected at"
+                f" most {coarsest:.3g} rad, a quarter of what the {drive.joint} may move in a"
+                f" sample ({drive.speed_rad_s:g} rad/s at {sample_rate_hz:g} Hz); correct its"
+                " scale, or lower acquire.sample_rate_hz"
             )

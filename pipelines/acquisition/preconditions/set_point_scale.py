@@ -34,17 +34,17 @@ def _contradiction(map_: DriveMap) -> str | None:
     told, tells = map_.write.reference, map_.read.angle
     if told.scale * tells.scale < 0.0:
         return (
-            f"scale: found {told.scale:g} with {tells.scale:g} of read.angle, expected one sign for both, or the drive "
-            "leaps to the other side of zero as it is enabled; find out by `exoid rig check --by-hand` which is wrong, "
-            "and turn that"
+            f"scale: found {told.scale:g} with {tells.scale:g} of read.angle, expected one sign for"
+            " both, or the drive leaps to the other side of zero as it is enabled; find out by"
+            " `exoid rig check --by-hand` which is wrong, and turn that"
         )
     if map_.own_scale or not (apart := _apart(told, tells)):
         return None
     key, one, other = apart
     return (
-        f"{key}: found {one} with {other} of read.angle, expected the same, or the drive leaps by the difference as it "
-        "is enabled; correct one, or set own_scale = true beside `enable` where the drive's manual says that both are "
-        "right"
+        f"{key}: found {one} with {other} of read.angle, expected the same, or the drive leaps by"
+        " the difference as it is enabled; correct one, or set own_scale = true beside `enable`"
+        " where the drive's manual says that both are right"
     )
 
 

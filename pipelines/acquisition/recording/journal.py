@@ -225,8 +225,8 @@ class JournalFile:
                 raise ContractError(f"{path}: {_why_no_journal(path)}") from error
         if not isinstance(metadata, dict):
             raise ContractError(
-                f"{path}: its metadata are {_short(metadata)}, expected a table of keys and values; exoid wrote no "
-                "such journal, nothing was changed"
+                f"{path}: its metadata are {_short(metadata)}, expected a table of keys and values;"
+                " exoid wrote no such journal, nothing was changed"
             )
         self.metadata: dict[str, Any] = metadata
 
@@ -278,26 +278,33 @@ def _raise_if_the_disk_s(path: Path, error: OSError) -> None:
     """Raise what the disk said; not what Arrow makes of bytes that are missing or wrong."""
     if error.errno is not None:
         raise InputError(
-            f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another disk and recover it "
-            "there"
+            f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another"
+            " disk and recover it there"
         ) from error
 
 
 def _why_no_journal(path: Path) -> str:
     with open(path, "rb") as file:
         if file.read(len(MAGIC)) == MAGIC:
-            return "is no journal of a run but a Parquet file, of which nothing is to be recovered; see `exoid show`"
+            return (
+                "is no journal of a run but a Parquet file, of which nothing is to be recovered;"
+                " see `exoid show`"
+            )
     # Only what bears a journal's name can be what is left of one.
     if not path.name.endswith(JOURNAL):
-        return f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run left"
+        return (
+            f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run"
+            " left"
+        )
     size = path.stat().st_size
     if size <= NO_SAMPLE:
         return (
             "is no journal of a run, or not even its head was written and so no sample; delete it"
         )
     return (
-        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and no whole copy of it is "
-        "there; nothing was changed; keep it, samples may be in it; check the disk, and move it away to record here"
+        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and no"
+        " whole copy of it is there; nothing was changed; keep it, samples may be in it; check the"
+        " disk, and move it away to record here"
     )
 
 
@@ -362,11 +369,13 @@ def refuse_leftover(path: Path) -> None:
     with locked(path) as lock:
         if not lock.free:
             raise InputError(
-                f"{path}: another run is recording there now; choose another output or wait for its end"
+                f"{path}: another run is recording there now; choose another output or wait for"
+                " its end"
             )
     journal = JournalFile(path)
     rows = sum(batch.rows.num_rows for batch in journal.batches())
     raise InputError(
-        f"{path}: holds {rows} samples of a run {journal.metadata.get('run')} that was killed; `exoid recover {path}` "
-        f"makes a recording of them; or {'move it away, it is damaged' if journal.damaged else 'delete it'}"
+        f"{path}: holds {rows} samples of a run {journal.metadata.get('run')} that was killed;"
+        f" `exoid recover {path}` makes a recording of them; or"
+        f" {'move it away, it is damaged' if journal.damaged else 'delete it'}"
     )

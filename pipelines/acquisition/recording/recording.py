@@ -81,7 +81,10 @@ def account_of(journal: JournalFile) -> Account:
     said = None if last_words is None else _said(last_words)
     if said is None:
         # A full disk takes the last words with it: nobody can tell the two apart.
-        why = f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its disk was full"
+        why = (
+            f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its"
+            " disk was full"
+        )
         damaged = journal.damaged > 0 or last_words is not None
         why += ", or its last words are damaged" if damaged else ""
         return Account(
@@ -113,8 +116,8 @@ def _refuse_other_columns(journal: JournalFile) -> None:
         if found is None or found.type != expected.type:
             told = "is missing" if found is None else f"holds {found.type}"
             raise ContractError(
-                f"{journal.path}: its column {name} {told}, expected {expected.type}; exoid wrote no such journal, "
-                "nothing was changed"
+                f"{journal.path}: its column {name} {told}, expected {expected.type}; exoid wrote"
+                " no such journal, nothing was changed"
             )
 
 
@@ -127,8 +130,8 @@ def _positive(journal: JournalFile, *keys: str) -> float:
         return value
     told = "is missing" if value is None else f"is {value!r:.40}"
     raise ContractError(
-        f"{journal.path}: {'.'.join(keys)} of its metadata {told}, expected a number above 0 and up to {LARGEST:g}; "
-        "exoid wrote no such journal, nothing was changed"
+        f"{journal.path}: {'.'.join(keys)} of its metadata {told}, expected a number above 0 and up"
+        f" to {LARGEST:g}; exoid wrote no such journal, nothing was changed"
     )
 
 

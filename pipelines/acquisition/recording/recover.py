@@ -49,7 +49,8 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
     """
     if not path.exists():
         raise InputError(
-            f"{path}: no such file; {similar_file(path) or '`exoid recover` takes the journal that a killed run left'}"
+            f"{path}: no such file;"
+            f" {similar_file(path) or '`exoid recover` takes the journal that a killed run left'}"
         )
     if not path.is_file():  # a pipe would be waited for
         raise InputError(
@@ -78,5 +79,8 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
 
 def _why_no_sample(account: Account) -> str:
     if account.damaged:
-        return "no sample in it can be read, it is damaged; nothing was changed; keep it, and check the disk"
+        return (
+            "no sample in it can be read, it is damaged; nothing was changed; keep it, and check"
+            " the disk"
+        )
     return "holds no sample, the run ended before its recording began; delete it"

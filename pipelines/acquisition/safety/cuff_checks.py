@@ -28,16 +28,16 @@ class Cuffs:
                 continue  # a sensor that was not read
             if any(abs(axis) < LEAST_FORCE_N and axis != 0.0 for axis in force):
                 return (
-                    f"sensor {name}: tells forces of {_three(force)} N, smaller than any sensor resolves; check the "
-                    "word order in the rig file"
+                    f"sensor {name}: tells forces of {_three(force)} N, smaller than any sensor"
+                    " resolves; check the word order in the rig file"
                 )
             held = self._held[name]
             held.tell(tuple(force), cycle, travel)
             if cycle - held.since >= FROZEN_CYCLES and travel - held.travel > FROZEN_RAD:
                 return (
-                    f"sensor {name}: counts on, but tells forces of {_three(force)} N for "
-                    f"{(cycle - held.since) / self._rate:.3f} s while the leg was told to move; its registers are "
-                    "frozen"
+                    f"sensor {name}: counts on, but tells forces of {_three(force)} N for"
+                    f" {(cycle - held.since) / self._rate:.3f} s while the leg was told to move;"
+                    " its registers are frozen"
                 )
         return None
 

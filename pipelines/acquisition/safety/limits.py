@@ -63,9 +63,10 @@ class Limits:
             allowed = self._rig.safety.following_error_rad + drive.speed_rad_s * late / self._rate
             if not abs(error) <= allowed:
                 return (
-                    f"{drive.joint} angle {reading.angle:.3f} rad is {abs(error):.3f} rad from its set-point of "
-                    f"{reference:.3f} rad, allowed are {allowed:.3g} rad (safety.following_error_rad); is the leg "
-                    "blocked, or the drive without power?"
+                    f"{drive.joint} angle {reading.angle:.3f} rad is {abs(error):.3f} rad from its"
+                    f" set-point of {reference:.3f} rad, allowed are {allowed:.3g} rad"
+                    " (safety.following_error_rad); is the leg blocked, or the drive without"
+                    " power?"
                 )
         return None
 
@@ -78,8 +79,9 @@ class Limits:
             silent_s = (cycle - self._felt.setdefault(cuff, cycle)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
-                    f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f} s, allowed are "
-                    f"{self._rig.safety.watchdog_s:g} s; its counter stands still, or what it sends is no number"
+                    f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f}"
+                    f" s, allowed are {self._rig.safety.watchdog_s:g} s; its counter stands still,"
+                    " or what it sends is no number"
                 )
         return None
 
@@ -102,16 +104,25 @@ def sample_violation(
     """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
     low, high = drive.angle_rad
     if not low <= found.angle <= high:
-        return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
+        return (
+            f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to"
+            f" {high:g} rad"
+        )
     speed = found.velocity
     if isnan(speed):
         # The drive tells no speed: what the angle did since the last sample.
         speed = (found.angle - before.angle) * samples_hz / max(found.sequence - before.sequence, 1)
     # Written so that a NaN breaks every limit.
     if not abs(speed) <= drive.speed_rad_s:
-        return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
+        return (
+            f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g}"
+            " rad/s"
+        )
     if not abs(found.torque) <= drive.torque_nm:
-        return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
+        return (
+            f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of"
+            f" {drive.torque_nm:g} N·m"
+        )
     return None
 
 
@@ -125,13 +136,14 @@ def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: 
     low, high = drive.angle_rad
     if not low <= reference <= high:
         raise DeviceError(
-            f"{drive.joint}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
-            "it was not sent"
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due, outside its limits {low:g}"
+            f" to {high:g} rad; it was not sent"
         )
     if not abs(reference - last) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD:
         raise DeviceError(
-            f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with {allowed_s:.3f} s to "
-            f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with"
+            f" {allowed_s:.3f} s to get there, faster than its limit of {drive.speed_rad_s:g}"
+            " rad/s; it was not sent"
         )
 
 

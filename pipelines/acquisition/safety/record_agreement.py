@@ -77,7 +77,7 @@ class Agreement:
     ) -> str:
         name = "current" if what == "torque" else what
         return (
-            f"{self._label}: tells {what} {exchanged:.4g} {unit} of sample {sequence}, while its own record holds "
-            f"{recorded:.4g} {unit}; correct scale, sign and offset of {self._where}.read.{name} or "
-            f"{self._where}.ring.record.{name}"
+            f"{self._label}: tells {what} {exchanged:.4g} {unit} of sample {sequence}, while its"
+            f" own record holds {recorded:.4g} {unit}; correct scale, sign and offset of"
+            f" {self._where}.read.{name} or {self._where}.ring.record.{name}"
         )

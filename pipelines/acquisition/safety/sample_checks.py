@@ -77,9 +77,9 @@ class Stream:
         if self._unanswered:
             raise self._unanswered
         raise DeviceError(
-            f"watchdog: no new sample from {self._label} for {self._patience.waited(now):.3f} s, allowed are "
-            f"{self._patience.longest_s:g} s; its counter stands still, its answers are lost, or this computer is too "
-            "busy"
+            f"watchdog: no new sample from {self._label} for {self._patience.waited(now):.3f} s,"
+            f" allowed are {self._patience.longest_s:g} s; its counter stands still, its answers"
+            " are lost, or this computer is too busy"
         )
 
     def refuse_to_fall_behind(self, newest: int) -> None:
@@ -91,9 +91,10 @@ class Stream:
         # What fills one read waits for it.
         if newest - last > self._most + MOST_REGISTERS["read"]:
             raise DeviceError(
-                f"watchdog: {self._label} is at sample {newest}, but its record brought none after {last}, allowed are "
-                f"{self._patience.longest_s:g} s; the record stands still, its answers are lost, its registers are not "
-                "those in map.drive's ring, or this computer is too busy"
+                f"watchdog: {self._label} is at sample {newest}, but its record brought none after"
+                f" {last}, allowed are {self._patience.longest_s:g} s; the record stands still, its"
+                " answers are lost, its registers are not those in map.drive's ring, or this"
+                " computer is too busy"
             )
 
     def refuse_count(self, count: int) -> None:
@@ -103,12 +104,14 @@ class Stream:
         last = self._last.sequence
         if count < last:
             raise DeviceError(
-                f"{self._label}: its sample counter went back from {last} to {count}; was it restarted?"
+                f"{self._label}: its sample counter went back from {last} to {count}; was it"
+                " restarted?"
             )
         if count > last + self._most:
             raise DeviceError(
-                f"{self._label}: its sample counter leapt from {last} to {count}, expected at most {self._most} "
-                f"samples within the watchdog's {self._patience.longest_s:g} s; was it restarted?"
+                f"{self._label}: its sample counter leapt from {last} to {count}, expected at most"
+                f" {self._most} samples within the watchdog's {self._patience.longest_s:g} s; was"
+                " it restarted?"
             )
 
     def take(self, found: Reading, now: float) -> bool:
@@ -148,8 +151,8 @@ class Stream:
         be another."""
         if found is not before and not found.time > before.time:
             return (
-                f"{self._label}: its clock went from {before.time:.6f} to {found.time:.6f} s while its counter went "
-                f"from {before.sequence} to {found.sequence}; was it restarted?"
+                f"{self._label}: its clock went from {before.time:.6f} to {found.time:.6f} s while"
+                f" its counter went from {before.sequence} to {found.sequence}; was it restarted?"
             )
         if not (samples := self._settled(found)):
             return None
@@ -158,8 +161,8 @@ class Stream:
         if abs(rate / self._rate - 1.0) <= RATE_TOLERANCE:
             return None
         return (
-            f"{self._label}: samples {rate:.4g} times a second by its own clock, expected {self._rate:g}; "
-            "correct acquire.sample_rate_hz, or the unit of time in the rig file"
+            f"{self._label}: samples {rate:.4g} times a second by its own clock, expected"
+            f" {self._rate:g}; correct acquire.sample_rate_hz, or the unit of time in the rig file"
         )
 
     def _step(self, before: Reading, found: Reading) -> str | None:
@@ -168,8 +171,9 @@ class Stream:
         if not self._settled(found) or keeps_time(samples, seconds, self._rate):
             return None
         return (
-            f"{self._label}: its clock went on by {seconds:.6f} s while its counter went on by {samples} samples of "
-            f"{1 / self._rate:.6f} s; one of the two leapt: was it restarted, or is its answer damaged?"
+            f"{self._label}: its clock went on by {seconds:.6f} s while its counter went on by"
+            f" {samples} samples of {1 / self._rate:.6f} s; one of the two leapt: was it restarted,"
+            " or is its answer damaged?"
         )
 
     def _leap(self, before: Reading, found: Reading) -> str | None:
@@ -182,17 +186,18 @@ class Stream:
         speed = (found.angle - before.angle) / seconds
         if not abs(speed) <= limit:
             return (
-                f"{self._label}: its angle leapt from {before.angle:.4f} to {found.angle:.4f} rad within "
-                f"{seconds:.4f} s, faster than its limit of {limit:g} rad/s; {self._or_else(found)}check the encoder, "
-                "or the word order in the rig file"
+                f"{self._label}: its angle leapt from {before.angle:.4f} to {found.angle:.4f} rad"
+                f" within {seconds:.4f} s, faster than its limit of {limit:g} rad/s;"
+                f" {self._or_else(found)}check the encoder, or the word order in the rig file"
             )
         told = 0.5 * (before.velocity + found.velocity)
         if samples == 1 and abs(speed - told) > SPEED_SHARE * limit:
             mirrored = abs(speed + told) < SPEED_SHARE * abs(speed)
+            turn = "turn the sign of one of the two, or " if mirrored else ""
             return (
-                f"{self._label}: its angle went on at {speed:.3f} rad/s while it told a speed of {told:.3f} rad/s; "
-                f"{self._or_else(found)}{'turn the sign of one of the two, or ' if mirrored else ''}check the encoder, "
-                "or the registers of angle and velocity in the rig file"
+                f"{self._label}: its angle went on at {speed:.3f} rad/s while it told a speed of"
+                f" {told:.3f} rad/s; {self._or_else(found)}{turn}check"
+                " the encoder, or the registers of angle and velocity in the rig file"
             )
         return None
 
@@ -224,8 +229,8 @@ class Stream:
             return ""
         when = f"{seconds:.3f} s before it" if seconds else "before it"
         return (
-            f"samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
-            "make the motion slower"
+            f"samples or set-points were missed {when}, which may jerk a leg: see why answers are"
+            " lost or late, or make the motion slower"
         )
 
     def _echo(self, before: Reading, found: Reading) -> str | None:
@@ -236,8 +241,9 @@ class Stream:
         if not abs(found.reference - sent) > cycles * self._drive.speed_rad_s / self._cycle_hz:
             return None
         return (
-            f"{self._label}: follows a set-point of {found.reference:.4f} rad, but was sent {sent:.4f} rad; check the "
-            "register of reference in the rig file, or what else writes to the drive"
+            f"{self._label}: follows a set-point of {found.reference:.4f} rad, but was sent"
+            f" {sent:.4f} rad; check the register of reference in the rig file, or what else writes"
+            " to the drive"
         )
 
     def _frozen(self, before: Reading, found: Reading) -> str | None:
@@ -255,8 +261,9 @@ class Stream:
             # NaN: nothing else is known.
             if not self._contradicted(name, held, found, seconds) <= FROZEN_RAD:
                 return (
-                    f"{self._label}: tells {name} {held.value:.6g} {unit} for {seconds:.3f} s, while it was told to go "
-                    f"{went:.3f} rad; its register is frozen, or the joint is blocked"
+                    f"{self._label}: tells {name} {held.value:.6g} {unit} for {seconds:.3f} s,"
+                    f" while it was told to go {went:.3f} rad; its register is frozen, or the joint"
+                    " is blocked"
                 )
         return None
 

@@ -138,8 +138,8 @@ class Supervisor:
             # The drive goes from where the leg stands to its first set-point within one sample.
             if not abs(found - planned) <= min(REST_RAD, drive.speed_rad_s / self.rate):
                 raise DeviceError(
-                    f"the {drive.joint} moved from {planned:.3f} to {found:.3f} rad before its drive was enabled; keep "
-                    "the leg still and start again"
+                    f"the {drive.joint} moved from {planned:.3f} to {found:.3f} rad before its"
+                    " drive was enabled; keep the leg still and start again"
                 )
         if why := self._dropped(row) or self._limits.violation(row):
             raise DeviceError(why)
@@ -167,9 +167,9 @@ class Supervisor:
         ]
         if idle and waited_s > self.rig.safety.control_s:
             raise DeviceError(
-                f"drive {idle[0].joint}: was told to enable, but its status word does not say that it is after "
-                f"{self.rig.safety.control_s:g} s; see the drive's manual, correct enabled_mask and enabled_value in "
-                "the rig file, or raise safety.control_s there"
+                f"drive {idle[0].joint}: was told to enable, but its status word does not say that"
+                f" it is after {self.rig.safety.control_s:g} s; see the drive's manual, correct"
+                " enabled_mask and enabled_value in the rig file, or raise safety.control_s there"
             )
         if why := self._limits.violation(answers) or self._limits.straying(answers, self._start):
             raise DeviceError(why)
@@ -452,9 +452,9 @@ class Supervisor:
         past = row.sequence - self._first - end
         if past > LONGEST_RETURN_S * self.rate:
             raise DeviceError(
-                f"the set-points are not at the end of their path {LONGEST_RETURN_S:g} s after it, for samples are "
-                "missed again and again; its answers are lost too often, or a drive's counter has parted from the "
-                "other's"
+                f"the set-points are not at the end of their path {LONGEST_RETURN_S:g} s after it,"
+                " for samples are missed again and again; its answers are lost too often, or a"
+                " drive's counter has parted from the other's"
             )
         return past > 0 and bool((np.abs(self.sent - self._path(end)) <= self._nearest).all())
 
@@ -557,7 +557,10 @@ class Supervisor:
             self._go(State.DISABLED)
             return
         self.still_enabled = True
-        self.why = f"{self.why or 'the run is complete'}; and could not be disabled: {'; '.join(complaints)}"
+        self.why = (
+            f"{self.why or 'the run is complete'}; and could not be disabled:"
+            f" {'; '.join(complaints)}"
+        )
         if self.state is not State.ABORT:
             self._go(State.ABORT)
 
@@ -632,8 +635,8 @@ class Supervisor:
         if told.fault or not dropped:
             return told.fault
         return (
-            f"drive {self.rig.drive[joint].joint}: its status word says that it is no longer enabled; was the "
-            "emergency stop pressed?"
+            f"drive {self.rig.drive[joint].joint}: its status word says that it is no longer"
+            " enabled; was the emergency stop pressed?"
         )
 
     def _dropped(self, told: Row | Answers) -> str | None:
@@ -652,9 +655,9 @@ class Supervisor:
         allowed = drive.speed_rad_s * self.rig.safety.watchdog_s
         if not lag <= allowed:
             raise DeviceError(
-                f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed samples, allowed are "
-                f"{allowed:.3f} rad (speed_rad_s x watchdog_s); its answers are lost too often, or this computer is "
-                "too busy"
+                f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed"
+                f" samples, allowed are {allowed:.3f} rad (speed_rad_s x watchdog_s); its answers"
+                " are lost too often, or this computer is too busy"
             )
 
     def refuse_after_abort(self) -> None:

@@ -19,8 +19,8 @@ def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
     least = FEWEST_SAMPLES / sample_rate_hz
     if rig.safety.watchdog_s < least:
         raise SettingsError(
-            f"safety.watchdog_s: found {rig.safety.watchdog_s:g}, expected at least {least:.3g}, {FEWEST_SAMPLES} "
-            f"samples at {sample_rate_hz:g} Hz, or it stops every run; raise it"
+            f"safety.watchdog_s: found {rig.safety.watchdog_s:g}, expected at least {least:.3g},"
+            f" {FEWEST_SAMPLES} samples at {sample_rate_hz:g} Hz, or it stops every run; raise it"
         )
 
 

@@ -42,9 +42,14 @@ class Cause:
 
     @classmethod
     def of(
-        cls, fitted: Fitted, slopes: NDArray, regression: DecisionRegression, *, first: bool,
+        cls,
+        fitted: Fitted,
+        slopes: NDArray,
+        regression: DecisionRegression,
+        *,
+        first: bool,
         context: int = -1,
-    ) -> "Cause | None":  # fmt: skip
+    ) -> "Cause | None":
         """Return a fitted candidate as a cause; None where the baseline leaves nothing of it.
 
         Parameters

@@ -163,9 +163,18 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     laws, law_columns = law_rows(prepared, regression)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
-        prepared, regression, rows, tuple(causes), tuple(laws), law_columns, tuple(curves),
-        curve_columns, tuple(sorted(set(left_out) - in_library)), (), tuple(grids),
-    )  # fmt: skip
+        prepared,
+        regression,
+        rows,
+        tuple(causes),
+        tuple(laws),
+        law_columns,
+        tuple(curves),
+        curve_columns,
+        tuple(sorted(set(left_out) - in_library)),
+        (),
+        tuple(grids),
+    )
 
 
 def _effects(prepared: Prepared) -> list[Effect]:

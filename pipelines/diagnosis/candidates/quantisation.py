@@ -2,10 +2,9 @@
 it adds.
 
 Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x, whose
-first harmonic is
--(h / pi) sin(2 pi x / h) (Widrow and Kollar, 2008, Quantization Noise, chapter 4). So a step is a line of known phase
-in the spectrum of the residual over the torque. It is found also where noise came after the
-rounding, so that no value in the file lies on a grid.
+first harmonic is -(h / pi) sin(2 pi x / h) (Widrow and Kollar, 2008, Quantization Noise, chapter
+4). So a step is a line of known phase in the spectrum of the residual over the torque. It is found
+also where noise came after the rounding, so that no value in the file lies on a grid.
 """
 
 from collections.abc import Sequence

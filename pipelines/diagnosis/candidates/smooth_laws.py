@@ -90,10 +90,13 @@ class Spans:
         )
         tiny = np.finfo(float).tiny
         return cls(
-            0.5 * (low + high), np.maximum(0.5 * (high - low), tiny), np.maximum(speed, tiny),
-            np.maximum(acceleration, tiny), np.maximum(torque, tiny),
+            0.5 * (low + high),
+            np.maximum(0.5 * (high - low), tiny),
+            np.maximum(speed, tiny),
+            np.maximum(acceleration, tiny),
+            np.maximum(torque, tiny),
             max(float(run.time[-1] - run.time[0]) for run in runs),
-        )  # fmt: skip
+        )
 
 
 def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn], NDArray]:

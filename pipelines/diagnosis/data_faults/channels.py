@@ -92,8 +92,9 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
-            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, found)}: {who} gave stale values, "
-            "the last sample's again, though the joint moved; wait for new data before reading",
+            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, found)}: {who}"
+            " gave stale values, the last sample's again, though the joint moved; wait for new"
+            " data before reading",
             samples,
         )
 
@@ -107,10 +108,11 @@ def _copied(motion: Motion) -> Iterator[Fault]:
         ):
             one, other = (column(motion, k, "torque") for k in (i, j))
             yield Fault(
-                motion.file, other,
+                motion.file,
+                other,
                 f"{one} and {other} are equal in every sample: probably one drive was read twice; "
                 "check its address, register or column",
-            )  # fmt: skip
+            )
 
 
 def _count_of(angle: NDArray) -> float:
@@ -141,9 +143,9 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),
-            f"{the(motion.joints[joint])}'s angle is stuck: constant for "
-            f"{samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, found)}, while the rest moved on; "
-            "check the encoder's cable and the drive's status",
+            f"{the(motion.joints[joint])}'s angle is stuck: constant for"
+            f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, found)}, while the rest"
+            " moved on; check the encoder's cable and the drive's status",
             dilate(samples, reach),
         )
 
@@ -208,9 +210,9 @@ def _saturated(motion: Motion, joint: int, tops: NDArray) -> Fault:
     return Fault(
         motion.file,
         column(motion, joint, "torque"),
-        f"{the(motion.joints[joint])}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
-        f"({100 * samples.mean():.2g} %), {when(motion, tops)}; "
-        "raise the sensor's range or the drive's limit, or move more gently",
+        f"{the(motion.joints[joint])}'s torque is saturated: clipped at {limits} in {samples.sum()}"
+        f" samples ({100 * samples.mean():.2g} %), {when(motion, tops)}; raise the sensor's range"
+        " or the drive's limit, or move more gently",
         samples,
     )
 
@@ -220,8 +222,9 @@ def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
     return Fault(
         motion.file,
         column(motion, joint, "torque"),
-        f"{the(motion.joints[joint])}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
-        f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
+        f"{the(motion.joints[joint])}'s torque is stuck: constant for"
+        f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, stuck)}, while the joint"
+        " moved; check the current sensor and the drive's status",
         samples,
     )
 
@@ -256,8 +259,9 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             f"{CUFFS[0]}_force_x_n",
-            "all twelve cuff forces are constant all along with the person inside: no sensor answers. They are left "
-            "out; check the sensors' supply and bus, or leave their columns out",
+            "all twelve cuff forces are constant all along with the person inside: no sensor"
+            " answers. They are left out; check the sensors' supply and bus, or leave their"
+            " columns out",
             np.zeros(len(motion), dtype=bool),
         )
         return
@@ -272,8 +276,9 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
             yield Fault(
                 motion.file,
                 f"{cuff}_force_{axis}_n",
-                f"the {cuff.replace('_', ' ')} cuff's {axis} force is {'dead' if dead else 'stuck'}: constant "
-                f"{'all along' if dead else when(motion, still)} while other sensors changed; "
-                "check the sensor's supply and cable, or leave its column out",
+                f"the {cuff.replace('_', ' ')} cuff's {axis} force is"
+                f" {'dead' if dead else 'stuck'}: constant"
+                f" {'all along' if dead else when(motion, still)} while other sensors changed;"
+                " check the sensor's supply and cable, or leave its column out",
                 None if dead else samples,
             )

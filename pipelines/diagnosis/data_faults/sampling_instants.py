@@ -45,9 +45,10 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             "time_s",
-            f"clock jitter: the stamps are even, but all angles jump together as if taken {100 * jitter:.2g} % of a "
-            f"sample period rms ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; "
-            "store the instants of the samples, not the planned ones",
+            "clock jitter: the stamps are even, but all angles jump together as if taken"
+            f" {100 * jitter:.2g} % of a sample period rms"
+            f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; store the instants"
+            " of the samples, not the planned ones",
         )
 
 

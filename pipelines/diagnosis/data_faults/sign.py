@@ -43,11 +43,12 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
     yield Fault(
         motion.file,
         channel,
-        f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an inertia of {body:.4g} "
-        f"{inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses {loss:.2g} W ({lost_low:.2g} … "
-        f"{lost_high:.2g}), and the other way round both are a machine's (so they would be with "
-        f"{column(motion, 0, 'angle')} reversed instead: a mirror image); turn it round in {settings_of(motion)}, if "
-        "every run has it, and in this recording",
+        f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an"
+        f" inertia of {body:.4g} {inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses"
+        f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}), and the other way round both are a"
+        f" machine's (so they would be with {column(motion, 0, 'angle')} reversed instead: a mirror"
+        f" image); turn it round in {settings_of(motion)}, if every run has it, and in this"
+        " recording",
     )
 
 

@@ -77,9 +77,9 @@ def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             "time_s",
-            f"{_count(long.sum(), 'gap')} in the recording, the longest of {missing[k]} missing samples "
-            f"({missing[k] / motion.sample_rate_hz:.2f} s) after {motion.time[k]:.2f} s: the fit leaves them out; "
-            "record the run again if it repeats",
+            f"{_count(long.sum(), 'gap')} in the recording, the longest of {missing[k]} missing"
+            f" samples ({missing[k] / motion.sample_rate_hz:.2f} s) after {motion.time[k]:.2f} s:"
+            " the fit leaves them out; record the run again if it repeats",
             nothing_to_mask,
         )
     if few.any():
@@ -121,7 +121,8 @@ def _counter(motion: Motion) -> Iterator[Fault]:
             yield Fault(
                 motion.file,
                 "sequence",
-                f"the sample counter {what} {_count(bad.sum(), 'time')}, first at {first:.2f} s: {remedy}",
+                f"the sample counter {what} {_count(bad.sum(), 'time')}, first at {first:.2f} s:"
+                f" {remedy}",
             )
 
 
@@ -140,8 +141,8 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     return Fault(
         motion.file,
         "time_s",
-        f"clock jitter: irregular time steps that stray by {100 * jitter:.2g} % of a sample period rms "
-        f"({1e3 * jitter / motion.sample_rate_hz:.2g} ms) all along; {explained}",
+        f"clock jitter: irregular time steps that stray by {100 * jitter:.2g} % of a sample period"
+        f" rms ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) all along; {explained}",
         None if spoils else np.zeros(len(motion), dtype=bool),
     )
 
@@ -189,13 +190,20 @@ def _judged(asked: _Asked) -> tuple[str, bool]:
         )
     if asked.followed + SURE * asked.error >= HALF:
         return (
-            "the angles are too coarse to tell whether the stamps are right, and so to suffer where they are not: "
-            "no sample is left out; better take time from the device's clock"
-        ), False
+            (
+                "the angles are too coarse to tell whether the stamps are right, and so to suffer"
+                " where they are not: no sample is left out; better take time from the device's"
+                " clock"
+            ),
+            False,
+        )
     told = "the angles are smooth against the sample count, so only the stamps are wrong: "
     if asked.share < BELOW:
         return (
-            f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing is lost",
+            (
+                f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing"
+                " is lost"
+            ),
             False,
         )
     return f"{told}rebuild time_s from the device's counter and sample rate", True
@@ -212,7 +220,7 @@ def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             "time_s",
-            f"the clock runs at another rate than sample_rate_hz says: {1.0 + drift:.4g} nominal periods a sample, "
-            f"{motion.sample_rate_hz / (1.0 + drift):.5g} Hz in place of {motion.sample_rate_hz:g} Hz; "
-            "correct the one that is wrong",
+            f"the clock runs at another rate than sample_rate_hz says: {1.0 + drift:.4g} nominal"
+            f" periods a sample, {motion.sample_rate_hz / (1.0 + drift):.5g} Hz in place of"
+            f" {motion.sample_rate_hz:g} Hz; correct the one that is wrong",
         )

@@ -36,8 +36,14 @@ LAW_HOLDS = 0.8
 LARGEST_ANGLE_RAD = np.pi
 """No joint of a leg goes further from its zero; a pendulum may turn over."""
 TORQUE_UNITS = {
-    "N·mm": 1e3, "N·cm": 1e2, "kgf·cm": 10.197, "lbf·in": 8.851, "ozf·in": 141.6, "kgf·m": 0.10197, "kN·m": 1e-3,
-}  # fmt: skip
+    "N·mm": 1e3,
+    "N·cm": 1e2,
+    "kgf·cm": 10.197,
+    "lbf·in": 8.851,
+    "ozf·in": 141.6,
+    "kgf·m": 0.10197,
+    "kN·m": 1e-3,
+}
 SAME_UNIT = 1.3
 """Largest factor between a measured ratio and a unit's."""
 FOLLOWS = 0.7
@@ -60,15 +66,15 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
             yield Fault(
                 motion.file,
                 channel,
-                f"{channel} is in {unit}: it moves {factor:.3g} times as far as its set-point, all along; "
-                f"set the channel's scale in {settings_of(motion)}",
+                f"{channel} is in {unit}: it moves {factor:.3g} times as far as its set-point, all"
+                f" along; set the channel's scale in {settings_of(motion)}",
             )
         elif len(q) and motion.machine.is_exoskeleton and np.abs(q).max() > LARGEST_ANGLE_RAD:
             yield Fault(
                 motion.file,
                 channel,
-                f"{channel} is not in radians, or its zero is lost: {the(name)} would reach {np.abs(q).max():.3g} rad; "
-                "if these are degrees, multiply by pi/180",
+                f"{channel} is not in radians, or its zero is lost: {the(name)} would reach"
+                f" {np.abs(q).max():.3g} rad; if these are degrees, multiply by pi/180",
             )
 
 
@@ -233,6 +239,6 @@ def _torque_fault(run: Averages, joint: int, factor: float, witness: str) -> Fau
     return Fault(
         run.motion.file,
         channel,
-        f"{channel} is in another unit than N·m{guess}: a factor of {factor:.3g} against {witness}, all along; "
-        f"set the channel's scale in {settings_of(run.motion)}",
+        f"{channel} is in another unit than N·m{guess}: a factor of {factor:.3g} against {witness},"
+        f" all along; set the channel's scale in {settings_of(run.motion)}",
     )

@@ -88,7 +88,8 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
             yield _exchanged(
                 motion,
                 ((j, "angle"), (best, "angle")),
-                f"each follows the other's set-point (correlations {alike[j, best]:.2f} and {alike[best, j]:.2f})",
+                f"each follows the other's set-point (correlations {alike[j, best]:.2f} and"
+                f" {alike[best, j]:.2f})",
             )
 
 
@@ -111,8 +112,8 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
     if best is as_recorded:
         return
     why = (
-        f"rigid body and friction leave {_percent(misfit(best))} of the torques' power unexplained that way, "
-        f"{_percent(misfit(as_recorded))} as recorded"
+        f"rigid body and friction leave {_percent(misfit(best))} of the torques' power unexplained"
+        f" that way, {_percent(misfit(as_recorded))} as recorded"
     )
     if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
         mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
@@ -144,9 +145,10 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
         yield Fault(
             run.motion.file,
             f"{chosen[0]}_force_y_n",
-            f"cuff forces are those of no limb, unless {best} (swapped or reversed sensors, {len(chosen)} of them): "
-            f"then {_percent(misfits[best])} of their torque's power is left unexplained, not {_percent(as_recorded)}; "
-            "check the sensors' addresses and axes",
+            f"cuff forces are those of no limb, unless {best} (swapped or reversed sensors,"
+            f" {len(chosen)} of them): then {_percent(misfits[best])} of their torque's power is"
+            f" left unexplained, not {_percent(as_recorded)}; check the sensors' addresses and"
+            " axes",
         )
 
 
@@ -159,15 +161,19 @@ def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -
     channel, names = _names(motion, channels)
     mend = f"in {settings_of(motion)}, if every run has it, and in this recording"
     return Fault(
-        motion.file, channel, f"the sign of {names} is reversed, all along: {why}; turn it round {mend}"
-    )  # fmt: skip
+        motion.file,
+        channel,
+        f"the sign of {names} is reversed, all along: {why}; turn it round {mend}",
+    )
 
 
 def _exchanged(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
     channel, names = _names(motion, channels)
     return Fault(
-        motion.file, channel, f"{names} are swapped, all along: {why}; exchange the joints in {settings_of(motion)}"
-    )  # fmt: skip
+        motion.file,
+        channel,
+        f"{names} are swapped, all along: {why}; exchange the joints in {settings_of(motion)}",
+    )
 
 
 def _percent(share: float) -> str:

@@ -209,9 +209,13 @@ def _left(joint: str, share: float) -> str:
 def _words(joint: str, machine: Machine, words: str) -> str:
     own, others = machine.joint(joint), [other for other in machine.joints if other.name != joint]
     return words.format(
-        joint=the(joint), place=own.place, effort=own.effort, other=" and ".join(the(other.name) for other in others),
-        other_place=either(other.place for other in others), other_effort=either(other.effort for other in others),
-    )  # fmt: skip
+        joint=the(joint),
+        place=own.place,
+        effort=own.effort,
+        other=" and ".join(the(other.name) for other in others),
+        other_place=either(other.place for other in others),
+        other_effort=either(other.effort for other in others),
+    )
 
 
 def by_kind(
@@ -294,9 +298,12 @@ def _free_or_in_step(
 
 
 def _tone_in(
-    part: Callable[[Run, NDArray, NDArray], NDArray], above: float, runs: Sequence[Run], residuals: Sequence[NDArray],
+    part: Callable[[Run, NDArray, NDArray], NDArray],
+    above: float,
+    runs: Sequence[Run],
+    residuals: Sequence[NDArray],
     j: int,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all
     that it foretells.
 
@@ -362,13 +369,16 @@ def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) ->
     """Return how far each run's residual (m, O) stands above the noise floor, joint by joint."""
     return [
         Excess(
-            joint, run.motion.file, run.motion.run,
-            float(np.sqrt(np.mean(residual[run.usable[:, j], j] ** 2))), float(floor.rms[j]),
+            joint,
+            run.motion.file,
+            run.motion.run,
+            float(np.sqrt(np.mean(residual[run.usable[:, j], j] ** 2))),
+            float(floor.rms[j]),
         )
         for j, joint in enumerate(runs[0].motion.joints)
         for run, residual in zip(runs, residuals, strict=True)
         if run.usable[:, j].any()
-    ]  # fmt: skip
+    ]
 
 
 def describe(

@@ -114,7 +114,9 @@ class Detectable:
             "joint": self.effect.joint,
             "smallest_rms_nm": self.smallest_rms_nm if seen else None,
             "smallest": {
-                "value": self.smallest if seen else None, "unit": self.parameter.unit, "parameter": self.parameter.name,
+                "value": self.smallest if seen else None,
+                "unit": self.parameter.unit,
+                "parameter": self.parameter.name,
             },
             "shape": dict(self.shape),
             "best_rms_nm": self.best_rms_nm if np.isfinite(self.best_rms_nm) else None,
@@ -122,7 +124,7 @@ class Detectable:
             "limited_by": self.limited_by,
             "tied_with": list(self.tied_with),
             "never_apart": list(self.never_apart),
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -372,11 +374,16 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
         least = 0.0
     torque = sight.torque_rms[sight.joint(effect)]
     return Look(
-        candidate.shapes[0], size, size * unit if np.isfinite(size) else np.inf, by,
-        _squared(left) * growth if np.isfinite(growth) else np.inf, _unit(left), _orthonormal(span),
+        candidate.shapes[0],
+        size,
+        size * unit if np.isfinite(size) else np.inf,
+        by,
+        _squared(left) * growth if np.isfinite(growth) else np.inf,
+        _unit(left),
+        _orthonormal(span),
         _orthonormal(sight.left(_wide(effect, columns, _levels(effect), sight.runs))),
         least * unit < torque and largest * unit > LEAST * torque,
-    )  # fmt: skip
+    )
 
 
 def _companions(effect: Effect) -> list[int]:
@@ -449,10 +456,16 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     growth, by, left, column, value = now
     seen = np.isfinite(growth) and abs(np.log(growth)) < 0.2
     return Look(
-        (), value if seen else np.inf, sight.rms(effect, column) if seen else np.inf, by,
-        _squared(left) if seen else np.inf, _unit(left), _orthonormal(left[:, np.newaxis]),
-        np.zeros((len(left), 0)), plausible=True,
-    )  # fmt: skip
+        (),
+        value if seen else np.inf,
+        sight.rms(effect, column) if seen else np.inf,
+        by,
+        _squared(left) if seen else np.inf,
+        _unit(left),
+        _orthonormal(left[:, np.newaxis]),
+        np.zeros((len(left), 0)),
+        plausible=True,
+    )
 
 
 def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
@@ -512,10 +525,16 @@ def _detectable(
     ]
     names = [p.name for p in effect.shape] if look.shape else []
     return Detectable(
-        effect, look.rms, look.size, tuple(zip(names, look.shape, strict=True)),
-        min(other.rms for other in looks[effect]), look.by, tuple(label for _, label in alike),
-        tuple(label for share, label in alike if share < NEVER), torque_rms,
-    )  # fmt: skip
+        effect,
+        look.rms,
+        look.size,
+        tuple(zip(names, look.shape, strict=True)),
+        min(other.rms for other in looks[effect]),
+        look.by,
+        tuple(label for _, label in alike),
+        tuple(label for share, label in alike if share < NEVER),
+        torque_rms,
+    )
 
 
 def _alike(look: Look, unexplained: NDArray | float) -> NDArray:

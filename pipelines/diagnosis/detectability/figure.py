@@ -42,9 +42,14 @@ def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
         if one.best_rms_nm < 0.98 * width:
             axis.plot(one.best_rms_nm, row, "|", color="white", ms=9, mew=1.5)
         axis.annotate(
-            _note(one), (width, row), xytext=(3, 0), textcoords="offset points", va="center", fontsize=7,
+            _note(one),
+            (width, row),
+            xytext=(3, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7,
             bbox={"fc": "white", "ec": "none", "pad": 0.6},
-        )  # fmt: skip
+        )
     axis.set_yticks(rows, [_name(one) for one in group])
     axis.invert_yaxis()
     axis.set_xscale("log")
@@ -52,8 +57,15 @@ def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
     least = 0.1 if group[0].effect.on.is_exoskeleton else 0.005 * limit
     axis.set_xlim(0.6 * min(min(one.best_rms_nm for one in group), least), 30 * limit)
     axis.axvline(limit, color=ORANGE, lw=1)
-    axis.annotate("the joint's own torque", (limit, -0.8), fontsize=7, color=ORANGE, ha="center", va="bottom",
-                  annotation_clip=False)  # fmt: skip
+    axis.annotate(
+        "the joint's own torque",
+        (limit, -0.8),
+        fontsize=7,
+        color=ORANGE,
+        ha="center",
+        va="bottom",
+        annotation_clip=False,
+    )
     axis.grid(axis="y", visible=False)
     axis.set_xlabel(
         f"smallest effect that would be seen, {group[0].unit} rms (white tick: at its best shape)"

@@ -38,16 +38,33 @@ def planned_motions(
 
 
 def _motion(
-    time: NDArray, state: tuple[NDArray, NDArray, NDArray], load: NDArray, kind: str, plant: PlantSettings,
-    geometry: Geometry, trajectory: Trajectory, rate_hz: float,
-) -> Motion:  # fmt: skip
+    time: NDArray,
+    state: tuple[NDArray, NDArray, NDArray],
+    load: NDArray,
+    kind: str,
+    plant: PlantSettings,
+    geometry: Geometry,
+    trajectory: Trajectory,
+    rate_hz: float,
+) -> Motion:
     names = tuple(joint.name for joint in trajectory.joints)
     motion = Motion(
-        time, *state, torque=load.copy(), load=load, segment=np.zeros(len(time), np.int64),
-        valid=np.ones(len(time), bool), run=kind, sample_rate_hz=rate_hz, period_s=trajectory.period_s, joints=names,
-        geometry=geometry, file=kind,
-        metadata={"joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]},
-    )  # fmt: skip
+        time,
+        *state,
+        torque=load.copy(),
+        load=load,
+        segment=np.zeros(len(time), np.int64),
+        valid=np.ones(len(time), bool),
+        run=kind,
+        sample_rate_hz=rate_hz,
+        period_s=trajectory.period_s,
+        joints=names,
+        geometry=geometry,
+        file=kind,
+        metadata={
+            "joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]
+        },
+    )
     for joint, levels in zip(
         names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True
     ):

@@ -23,14 +23,23 @@ def at_block_rate(run: Run) -> Run:
     rate_hz = motion.sample_rate_hz / run.block.decimation
     block = BlockAverage(1)
     slow = replace(
-        motion, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :joints],
-        segment=motion.segment[run.starts], valid=run.valid, sample_rate_hz=rate_hz,
+        motion,
+        time=run.time,
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        torque=run.measured[:, :joints],
+        segment=motion.segment[run.starts],
+        valid=run.valid,
+        sample_rate_hz=rate_hz,
         cutoff_hz=min(motion.cutoff_hz, HIGHEST_CUTOFF * rate_hz),
         load=None if motion.load is None else run.average(motion.load),
         limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
         temperature=None if motion.temperature is None else run.average(motion.temperature),
         forces=None if motion.felt is None else run.average(motion.felt),
-        reference=None, measured_angle=None, sequence=None,
+        reference=None,
+        measured_angle=None,
+        sequence=None,
         metadata={**motion.metadata, "regression_filter": block.as_metadata(rate_hz)},
-    )  # fmt: skip
+    )
     return replace(run, motion=slow, block=block, starts=np.arange(len(run.time)), fast=None)

@@ -30,8 +30,15 @@ def thinned(motion: Motion) -> Motion:
     blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))
     rate = motion.sample_rate_hz / every.decimation
     return replace(
-        motion, **averaged, segment=motion.segment[starts], valid=every.all(motion.valid, starts),
-        sequence=None if motion.sequence is None else motion.sequence[starts], sample_rate_hz=rate,
-        load=None, limb_load=None, body=None, limb_body=None,
+        motion,
+        **averaged,
+        segment=motion.segment[starts],
+        valid=every.all(motion.valid, starts),
+        sequence=None if motion.sequence is None else motion.sequence[starts],
+        sample_rate_hz=rate,
+        load=None,
+        limb_load=None,
+        body=None,
+        limb_body=None,
         metadata={**motion.metadata, "regression_filter": blocks.as_metadata(rate)},
-    )  # fmt: skip
+    )

@@ -43,9 +43,9 @@ def _refuse_monsters(motion: Motion) -> None:
         largest = float(np.nanmax(np.abs(motion.torque[:, j])))
         if largest > MOST_NM:
             raise InputError(
-                f"{motion.file}: the {joint} torque reaches {largest:.3g} N·m, expected at most {MOST_NM:g} N·m; "
-                f"correct torque constant, gear ratio or the unit of the current in {settings_of(motion)}, "
-                "or the recording"
+                f"{motion.file}: the {joint} torque reaches {largest:.3g} N·m, expected at most"
+                f" {MOST_NM:g} N·m; correct torque constant, gear ratio or the unit of the current"
+                f" in {settings_of(motion)}, or the recording"
             )
 
 
@@ -62,9 +62,10 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
             times = alike * np.ptp(q[:, other]) / np.ptp(q[:, one])
             first, second = motion.joints[one], motion.joints[other]
             raise InputError(
-                f"{motion.file}: {first} and {second} hold the same angles ({second}'s are {times:.4g} times {first}'s "
-                "throughout, but for their zeros), expected a measurement of its own of each joint; "
-                f"correct their columns in {settings_of(motion)}"
+                f"{motion.file}: {first} and {second} hold the same angles ({second}'s are"
+                f" {times:.4g} times {first}'s throughout, but for their zeros), expected a"
+                " measurement of its own of each joint; correct their columns in"
+                f" {settings_of(motion)}"
             )
 
 
@@ -74,8 +75,9 @@ def _refuse_twins(motions: Sequence[Motion]) -> None:
     for one, other in combinations(motions, 2):
         if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
             raise InputError(
-                f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as {one.file} "
-                f"({one.run}, {one.purpose}), expected a measurement of its own in each; give each run once"
+                f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as"
+                f" {one.file} ({one.run}, {one.purpose}), expected a measurement of its own in"
+                " each; give each run once"
             )
 
 
@@ -91,18 +93,19 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_angle(motions, j)
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
-                f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s "
-                f"(faster than {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from reversals), "
-                f"expected {least:.2g} s {together}; "
-                f"excite {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or record longer; "
-                f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
+                f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
+                f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
+                f" reversals), expected {least:.2g} s {together}; excite"
+                f" {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or"
+                " record longer; if it did move, check its encoder, and the units of angle and"
+                f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
         raise InputError(
-            f"{files}: {' and '.join(machine.names)} move at once for {_rounded_down(lasts):.1f} s, "
-            f"expected {least:.2g} s {together}: errors are scored there; "
-            "excite both joints at the same time, or record longer"
+            f"{files}: {' and '.join(machine.names)} move at once for {_rounded_down(lasts):.1f} s,"
+            f" expected {least:.2g} s {together}: errors are scored there; excite both joints at"
+            " the same time, or record longer"
         )
 
 
@@ -126,9 +129,9 @@ def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
     if len(values) and np.ptp(values) == 0.0:
         here = motions[0].machine.joints[joint]
         raise InputError(
-            f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is {values[0]:.4g} "
-            f"{here.unit('angle')} in every row, expected a joint that moves; check its encoder, and which channel "
-            f"{settings_of(motions[0])} reads"
+            f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is"
+            f" {values[0]:.4g} {here.unit('angle')} in every row, expected a joint that moves;"
+            f" check its encoder, and which channel {settings_of(motions[0])} reads"
         )
 
 

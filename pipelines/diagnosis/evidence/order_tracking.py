@@ -340,9 +340,7 @@ class _Search:
             _step_over_angle(over_angle, self.waves, channels, 0.25 * self.orders.width),
             _step_over_time(over_time, self.waves, channels),
         )
-        return [
-            self._between(now, then, channels) for now, then in zip(lines, ahead, strict=True)
-        ]  # fmt: skip
+        return [self._between(now, then, channels) for now, then in zip(lines, ahead, strict=True)]
 
     def _between(
         self,

@@ -40,10 +40,14 @@ class ResidualShares:
     def as_json(self) -> dict[str, float | None]:
         """Return what ``router`` in the verdict says of a joint."""
         return {
-            "rms_nm": self.rms, "noise": self.noise, "repeats": self.repeats,
-            "wanders": self.wanders, "between_runs": self.between_runs, "unsplit": self.unsplit,
+            "rms_nm": self.rms,
+            "noise": self.noise,
+            "repeats": self.repeats,
+            "wanders": self.wanders,
+            "between_runs": self.between_runs,
+            "unsplit": self.unsplit,
             "with_person_only": self.with_person_only,
-        }  # fmt: skip
+        }
 
 
 def residual_shares(
@@ -78,15 +82,25 @@ def _of_joint(
     if not len(products):
         between = min(between, above)
         return ResidualShares(
-            np.sqrt(total), noisy / total, None, None, between / total, (above - between) / total,
+            np.sqrt(total),
+            noisy / total,
             None,
-        )  # fmt: skip
+            None,
+            between / total,
+            (above - between) / total,
+            None,
+        )
     repeats = float(np.clip(products.mean(), 0.0, above))
     between = min(between, repeats)
     return ResidualShares(
-        np.sqrt(total), noisy / total, (repeats - between) / total, (above - repeats) / total,
-        between / total, 0.0, _with_person_only(bands, repeated, total),
-    )  # fmt: skip
+        np.sqrt(total),
+        noisy / total,
+        (repeats - between) / total,
+        (above - repeats) / total,
+        between / total,
+        0.0,
+        _with_person_only(bands, repeated, total),
+    )
 
 
 def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:
@@ -116,6 +130,12 @@ def _with_person_only(
         powers.append(max(float(products.mean()), 0.0))
     alone, worn = powers
     of_all = sum(len(r) for r in repeated)
-    share = sum(len(r) for band, r in zip(bands, repeated, strict=True)
-                if band.run.motion.run == KINDS[1]) / of_all  # fmt: skip
+    share = (
+        sum(
+            len(r)
+            for band, r in zip(bands, repeated, strict=True)
+            if band.run.motion.run == KINDS[1]
+        )
+        / of_all
+    )
     return float(np.clip((worn - alone) * share / total, 0.0, 1.0))

@@ -152,9 +152,14 @@ def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) 
 
 
 def _slope(
-    fit: Fit, terms: list[Term], place: tuple[int, int], values: NDArray, run: Run, baseline: Baseline,
+    fit: Fit,
+    terms: list[Term],
+    place: tuple[int, int],
+    values: NDArray,
+    run: Run,
+    baseline: Baseline,
     plain: tuple[NDArray, NDArray],
-) -> NDArray:  # fmt: skip
+) -> NDArray:
     """Return the column (m, O, 1) of a shape of one term, as ``fit.slope`` does of all runs."""
     number, i = place
     step = step_of(fit.causes[number], i)

@@ -130,9 +130,12 @@ def onsets_of(
 
 
 def slope(
-    made: Fit, place: tuple[int, int, int], runs: Sequence[Run], baseline: Baseline,
+    made: Fit,
+    place: tuple[int, int, int],
+    runs: Sequence[Run],
+    baseline: Baseline,
     plain: Sequence[tuple[NDArray, NDArray]],
-) -> list[NDArray]:  # fmt: skip
+) -> list[NDArray]:
     """Return what a shape does to the prediction, per unit of it, (m, O) of each run.
 
     ``place`` is (cause, shape parameter, run), run -1 for all; ``plain`` are the fit's own columns

@@ -117,9 +117,13 @@ def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
         "scored": scored(run),
     }
     quantities: Mapping[str, NDArray] = {
-        "angle": run.state[0], "velocity": run.state[1], "acceleration": run.state[2], "torque": run.measured[:, :J],
-        "predicted": run.measured[:, :J] - residual[:, :J], "residual": residual[:, :J],
-    }  # fmt: skip
+        "angle": run.state[0],
+        "velocity": run.state[1],
+        "acceleration": run.state[2],
+        "torque": run.measured[:, :J],
+        "predicted": run.measured[:, :J] - residual[:, :J],
+        "residual": residual[:, :J],
+    }
     for j, joint in enumerate(joints):
         columns |= {joint.column(name): values[:, j] for name, values in quantities.items()}
     return pd.DataFrame(columns)

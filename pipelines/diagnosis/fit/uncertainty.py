@@ -119,9 +119,14 @@ def uncertainty(
             covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
     onsets = _onsets(fit, runs, baseline, misfit)
     return Uncertainty(
-        block_diag(covariance, *(((high - low) / (2.0 * critical)) ** 2 for low, high in onsets.values())),
-        critical, (*places, *onsets), block_diag(gram, np.zeros((len(onsets), len(onsets)))), onsets,
-    )  # fmt: skip
+        block_diag(
+            covariance, *(((high - low) / (2.0 * critical)) ** 2 for low, high in onsets.values())
+        ),
+        critical,
+        (*places, *onsets),
+        block_diag(gram, np.zeros((len(onsets), len(onsets)))),
+        onsets,
+    )
 
 
 def _correlated_blocks(run: Run) -> float:
@@ -157,9 +162,10 @@ def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
         (number, i, -1)
         for number, cause in enumerate(causes)
         for i, parameter in enumerate(cause.effect.shape)
-        if len(parameter.forms) > 1 and parameter.between_forms
+        if len(parameter.forms) > 1
+        and parameter.between_forms
         and (cause.shapes[0][i] > 0.0 or parameter.typical[0] < 0.0)
-    ]  # fmt: skip
+    ]
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:

@@ -138,11 +138,16 @@ class Evidence:
         parts = [(X[rows], regression.measured[rows]) for rows in outputs]
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
         return cls(
-            gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(auxiliary), 
+            gram,
+            right,
+            (elements := tuple(_elements(library, at))),
+            tuple(_background(library, at)),
+            dict(auxiliary),
             np.array(list(_explained(library, at, gram, right))),
-            Nonnegative.of(library, at, X.shape[1]), tuple(_contexts(library, elements)), _about(library),
-        )  # fmt: skip
+            Nonnegative.of(library, at, X.shape[1]),
+            tuple(_contexts(library, elements)),
+            _about(library),
+        )
 
     def packed(self) -> dict[str, Any]:
         """Return a row of a table: symmetric matrices as their upper triangles."""
@@ -153,12 +158,16 @@ class Evidence:
             "text": json.dumps(
                 {
                     "elements": [asdict(element) for element in self.elements],
-                    "background": self.background, "auxiliary": self.auxiliary,
-                    "explained": self.explained.tolist(), "contexts": self.contexts, "about": self.about,
-                    "nonnegative": self.nonnegative and {k: v.tolist() for k, v in vars(self.nonnegative).items()},
+                    "background": self.background,
+                    "auxiliary": self.auxiliary,
+                    "explained": self.explained.tolist(),
+                    "contexts": self.contexts,
+                    "about": self.about,
+                    "nonnegative": self.nonnegative
+                    and {k: v.tolist() for k, v in vars(self.nonnegative).items()},
                 }
             ),
-        }  # fmt: skip
+        }
 
     @classmethod
     def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
@@ -167,13 +176,17 @@ class Evidence:
         explained, nonnegative = np.array(text["explained"]), text["nonnegative"]
         right = np.frombuffer(row["right"]).reshape(len(explained), -1)
         return cls(
-            _symmetric(row["gram"], right.shape), right,
+            _symmetric(row["gram"], right.shape),
+            right,
             tuple(Element(**one) for one in text["elements"]),
             tuple((place, v, noise) for place, v, noise in text["background"]),
-            text["auxiliary"], explained,
-            nonnegative and Nonnegative(**{name: np.array(values) for name, values in nonnegative.items()}),
-            tuple(map(tuple, text["contexts"])), text["about"],
-        )  # fmt: skip
+            text["auxiliary"],
+            explained,
+            nonnegative
+            and Nonnegative(**{name: np.array(values) for name, values in nonnegative.items()}),
+            tuple(map(tuple, text["contexts"])),
+            text["about"],
+        )
 
 
 def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -> Iterator[float]:
@@ -300,12 +313,17 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
     return [
         replace(
-            of_laws[e.name, e.joint], columns=e.columns, variance=e.variance,
-            derivative=[], amplitudes=[], first=False,
+            of_laws[e.name, e.joint],
+            columns=e.columns,
+            variance=e.variance,
+            derivative=[],
+            amplitudes=[],
+            first=False,
         )
-        if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws else e
+        if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws
+        else e
         for e in elements
-    ]  # fmt: skip
+    ]
 
 
 Laws = dict[tuple[str, int | None, str], list[tuple[int, float]]]

@@ -45,13 +45,16 @@ class Finding:
     def as_json(self) -> dict[str, Any]:
         """Return what the verdict says of it."""
         return {
-            "level": self.level, "repeats": self.repeats, "joint": self.joint,
-            "family": self.family, "probability": self.probability,
+            "level": self.level,
+            "repeats": self.repeats,
+            "joint": self.joint,
+            "family": self.family,
+            "probability": self.probability,
             "causes": [_cause(label, p) for label, p in self.causes],
             "path": [
                 {"level": level, "value": value, "probability": p} for level, value, p in self.path
             ],
-        }  # fmt: skip
+        }
 
 
 def _cause(label: str, probability: float) -> dict[str, Any]:
@@ -84,10 +87,15 @@ def _of_cause(posterior: Posterior, named: Named) -> Finding:
     }
     family = _within(posterior, {"joint": element.joint, "family": element.family})
     return Finding(
-        "cause", element.repeats, element.joint, element.family, named.probability, alternatives,
+        "cause",
+        element.repeats,
+        element.joint,
+        element.family,
+        named.probability,
+        alternatives,
         tuple(_ranked(posterior, family, are_laws=True)),
         (*_path(posterior, shared), ("cause", element.label, named.probability)),
-    )  # fmt: skip
+    )
 
 
 def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
@@ -135,10 +143,14 @@ def _finding(
     deepest = [level for level in LEVELS if level in node] or ["repeats"]
     return Finding(
         "repeatability" if deepest[-1] == "repeats" else deepest[-1],
-        node.get("repeats"), node.get("joint"), node.get("family"), probability,
+        node.get("repeats"),
+        node.get("joint"),
+        node.get("family"),
+        probability,
         tuple(_ranked(posterior, inside, are_laws=False))[:CLOSEST],
-        tuple(_ranked(posterior, inside, are_laws=True)), _path(posterior, node),
-    )  # fmt: skip
+        tuple(_ranked(posterior, inside, are_laws=True)),
+        _path(posterior, node),
+    )
 
 
 def _path(posterior: Posterior, node: Mapping[str, Any]) -> tuple[tuple[str, Any, float], ...]:

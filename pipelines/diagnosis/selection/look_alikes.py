@@ -102,7 +102,7 @@ def _split(
     ways = [
         [(i, p), (law_of[i], 1.0 - p)] if i in law_of else [(i, 1.0)]
         for i, p in zip(chosen, kept, strict=True)
-    ]  # fmt: skip
+    ]
     return [
         (tuple(i for i, _ in way), float(np.prod([p for _, p in way]))) for way in product(*ways)
     ]
@@ -112,6 +112,12 @@ def _unlisted(cause: Element) -> Element:
     """Return the unlisted law of a cause's family and joint."""
     kind = UNLISTED + cause.family
     return Element(
-        law_label(kind, cause.joint), kind, cause.joint, cause.family,
-        is_law=True, columns=[], variance=[], repeats=cause.repeats,
-    )  # fmt: skip
+        law_label(kind, cause.joint),
+        kind,
+        cause.joint,
+        cause.family,
+        is_law=True,
+        columns=[],
+        variance=[],
+        repeats=cause.repeats,
+    )

@@ -135,7 +135,8 @@ def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
         d,
         label,
         "rejected",
-        "it was left out: at no shape is its torque finite and other than what rigid body and friction explain",
+        "it was left out: at no shape is its torque finite and other than what rigid body and"
+        " friction explain",
     )
 
 
@@ -152,7 +153,14 @@ def _without_numbers(d: Diagnosis, label: str, verdict: str, reason: str) -> dic
         for when in ("before", "after")
     }
     return {
-        "causes": [label], "parameters": [], "train_score": None, "gain_nm": None,
-        "gain_low_nm": None, "gain_high_nm": None, "probability": None, **blank,
-        "verdict": verdict, "reason": reason,
-    }  # fmt: skip
+        "causes": [label],
+        "parameters": [],
+        "train_score": None,
+        "gain_nm": None,
+        "gain_low_nm": None,
+        "gain_high_nm": None,
+        "probability": None,
+        **blank,
+        "verdict": verdict,
+        "reason": reason,
+    }

@@ -13,8 +13,10 @@ TELLING = 3.0
 NEARLY_ALL = 0.9
 """Share of the systematic error below which it is told that a cause may be a look-alike."""
 AUXILIARY = {
-    VoluntaryTorque.name: "cycle-to-cycle differences appear in cuff forces and drive torque "
-    "alike, so they come from the wearer",
+    VoluntaryTorque.name: (
+        "cycle-to-cycle differences appear in cuff forces and drive torque "
+        "alike, so they come from the wearer"
+    ),
 }
 """What auxiliary evidence is, by effect (``candidates/auxiliary_evidence.py``)."""
 
@@ -35,8 +37,9 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
         sentences.append(doubt[1])
     if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
         sentences.append(
-            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause removes nearly all: "
-            "a part of its probability is given to an unlisted effect that resembles it"
+            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause"
+            " removes nearly all: a part of its probability is given to an unlisted effect that"
+            " resembles it"
         )
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
@@ -55,7 +58,10 @@ def _differs(d: Diagnosis, label: str, effect: Effect) -> str:
     """List the values that runs have of a cause which differs from run to run."""
     (parameter,) = (p for p in effect.parameters if p.per_run)
     values = [f"{r['values'][parameter.name]:+.3g} in {r['file']}" for r in d.each_run[label]]
-    return f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(values)} ({parameter.unit})"
+    return (
+        f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(values)}"
+        f" ({parameter.unit})"
+    )
 
 
 def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
@@ -89,4 +95,7 @@ def _next(d: Diagnosis, named: Named) -> str | None:
         if odds < CERTAIN
         else f"over {CERTAIN:g} times"
     )
-    return f"the next listed cause in its place, {in_words(effect_labelled(rival))}, is {times} less likely"
+    return (
+        f"the next listed cause in its place, {in_words(effect_labelled(rival))}, is {times} less"
+        " likely"
+    )

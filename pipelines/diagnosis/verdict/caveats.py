@@ -27,15 +27,25 @@ def caveats(d: Diagnosis) -> list[str]:
         "counts and time stamps"
     )
     known = [
-        f"{effect.label} is assumed present (`known`). Its size is fitted; its presence was not tested"
+        f"{effect.label} is assumed present (`known`). Its size is fitted; its presence was not"
+        " tested"
         for effect in d.baseline.known
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
-        *known, *_at_ends(d), *_size_may_be_zero(d), *_default_length(d), *[noisy] * d.data.noisy_angles,
-        *_unrealizable(d), *doubtful, *(_reversal(d, one) for one in d.reversals), *_by_all_runs(d), *_differs(d),
-        *_one_run(d), *_one_kind(d),
-    ]  # fmt: skip
+        *known,
+        *_at_ends(d),
+        *_size_may_be_zero(d),
+        *_default_length(d),
+        *[noisy] * d.data.noisy_angles,
+        *_unrealizable(d),
+        *doubtful,
+        *(_reversal(d, one) for one in d.reversals),
+        *_by_all_runs(d),
+        *_differs(d),
+        *_one_run(d),
+        *_one_kind(d),
+    ]
 
 
 def floor_that_hides(d: Diagnosis) -> dict[str, float]:
@@ -75,8 +85,8 @@ def _at_ends(d: Diagnosis) -> list[str]:
 def _size_may_be_zero(d: Diagnosis) -> list[str]:
     """Say of which named causes the size may be zero, by the training runs."""
     return [
-        f"the training runs do not determine the size of {label_in_words(cause.label, d.baseline.machine)}: its 95 % "
-        "interval includes zero"
+        "the training runs do not determine the size of"
+        f" {label_in_words(cause.label, d.baseline.machine)}: its 95 % interval includes zero"
         for number, cause in enumerate(d.after.fit.causes)
         if not cause.effect.per_run
         and d.uncertainty.includes_zero(d.after.fit.values, d.after.fit.columns_of(number).slice)
@@ -87,7 +97,8 @@ def _unrealizable(d: Diagnosis) -> list[str]:
     if not d.causes or not d.lacks_mass:
         return []
     return [
-        f"the extended model's inertia is not physically realizable; treat the named causes with caution: {reason}"
+        "the extended model's inertia is not physically realizable; treat the named causes with"
+        f" caution: {reason}"
         for reason in d.unrealizable
     ]
 
@@ -125,8 +136,8 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
         return []
     named = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
     said = (
-        f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and that leaves an "
-        "error above the noise on the validation runs"
+        f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and"
+        " that leaves an error above the noise on the validation runs"
     )
     if d.causes:
         said += ". The gain is therefore a little too good: record another run to validate on"
@@ -148,9 +159,9 @@ def _differs(d: Diagnosis) -> list[str]:
     """Say where the validation runs lack what no training run shows."""
     machine = d.baseline.machine
     return [
-        f"{the(joint)}'s {machine.joint(joint).effort} error is {amount(machine, joint, validated)} on the "
-        f"validation runs and {amount(machine, joint, trained)} on the training runs. They differ in something "
-        "that no training run shows: train and validate on runs of both sorts"
+        f"{the(joint)}'s {machine.joint(joint).effort} error is {amount(machine, joint, validated)}"
+        f" on the validation runs and {amount(machine, joint, trained)} on the training runs. They"
+        " differ in something that no training run shows: train and validate on runs of both sorts"
         for joint, (validated, trained) in _differing(d).items()
     ]
 

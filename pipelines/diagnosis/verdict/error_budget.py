@@ -72,12 +72,18 @@ def shares_of_causes(
     orders = factorial(len(labels))
     return {
         label: sum(
-            (factorial(len(s)) * factorial(len(labels) - len(s) - 1) / orders * (left[s] - left[s | {label}])
-             for s in sets if label not in s),
+            (
+                factorial(len(s))
+                * factorial(len(labels) - len(s) - 1)
+                / orders
+                * (left[s] - left[s | {label}])
+                for s in sets
+                if label not in s
+            ),
             start=np.zeros(1),
         )
         for label in labels
-    }  # fmt: skip
+    }
 
 
 def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:

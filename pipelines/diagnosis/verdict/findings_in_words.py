@@ -33,9 +33,10 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     for cause, (label, _) in zip(told["causes"], finding.causes, strict=True):
         effect = d.effects.get(label) or d.effect_of(label)
         cause |= {
-            "family": family_of(label, weighed), "words": in_words(effect),
+            "family": family_of(label, weighed),
+            "words": in_words(effect),
             "dropped": label in against,
-        }  # fmt: skip
+        }
     # The most probable law tells whose angle, speed or load it is.
     law, p = next(iter(finding.laws), ("", 0.0))
     of_other_joint = p >= CRITERIA.likely and is_of_other_joint(law)

@@ -38,7 +38,10 @@ def _noise_without_periods(d: Diagnosis) -> str:
     if floor and d.selected.by_all:
         return ""  # the runs that were searched hold periods
     if floor:
-        return f" No training run holds two periods, so the noise that weighs causes is estimated from {_otherwise(d)}."
+        return (
+            " No training run holds two periods, so the noise that weighs causes is estimated from"
+            f" {_otherwise(d)}."
+        )
     which = "validation run" if weighed else "run"
     why = f"No {which} holds two periods" if d.has_periods else "No recording names a period"
     return f" {why}, so the noise floor is estimated from {_otherwise(d)}."
@@ -99,15 +102,18 @@ def _nothing(d: Diagnosis) -> str:
     joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
     said = (
-        "Nothing is missing that these data could show "
-        f"(probability {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest at "
-        f"{the(joint)}: {_size(d, place)}"
+        "Nothing is missing that these data could show (probability"
+        f" {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest"
+        f" at {the(joint)}: {_size(d, place)}"
     )
     if hiding := floor_that_hides(d).get(joint):
         said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
     said = f"{said}.{_dropped(d) or _nearest(d)}"
     if d.is_mostly_unexplained:
-        said += " Most of that error is not noise, and neither a listed cause nor a smooth law explains it."
+        said += (
+            " Most of that error is not noise, and neither a listed cause nor a smooth law"
+            " explains it."
+        )
     return said
 
 
@@ -133,7 +139,10 @@ def _unlisted(d: Diagnosis) -> str:
         if d.selected.shows_unlisted
         else "and these data do not tell which listed cause it is"
     )
-    said = f"Something is missing {which}: {first['words']} (probability {first['probability']:.2f}){also}."
+    said = (
+        f"Something is missing {which}: {first['words']} (probability"
+        f" {first['probability']:.2f}){also}."
+    )
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
     # An effect that resembles a listed cause is told by that cause.
     if laws and laws[0]["words"] != first["words"] and not laws[0]["law"].startswith(UNLISTED):
@@ -165,9 +174,15 @@ def _dropped(d: Diagnosis) -> str:
     said = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
         they, lower, s = ("they", "lower", "") if plural else ("it", "lowers", "s")
-        fitted = f"fitted to the training runs alone, {they} {lower} the error on the validation runs too little"
+        fitted = (
+            f"fitted to the training runs alone, {they} {lower} the error on the validation runs"
+            " too little"
+        )
         return f"{said} all runs together, but {fitted}, or raise{s} it."
-    return f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the validation runs."
+    return (
+        f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the"
+        " validation runs."
+    )
 
 
 def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
@@ -181,14 +196,17 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     most = int(((before**2 - after**2) / d.floor_rms**2).argmax())
     joint, machine = d.baseline.joints[most], d.baseline.machine
     gain = (
-        f"With {_they(causes)} {the(joint)}'s {machine.joint(joint).effort} "
-        f"error {'falls' if after[most] < before[most] else 'rises'} from {amount(machine, joint, before[most])}, "
-        f"{before[most] / d.floor_rms[most]:.2f} times the noise floor, to "
-        f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
+        f"With {_they(causes)} {the(joint)}'s {machine.joint(joint).effort} error"
+        f" {'falls' if after[most] < before[most] else 'rises'} from"
+        f" {amount(machine, joint, before[most])}, {before[most] / d.floor_rms[most]:.2f} times the"
+        f" noise floor, to {amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
     rest = [one for one in findings(d) if one["level"] != "cause"]
     also = "".join(f" Also missing: {one['words']} ({one['probability']:.2f})." for one in rest)
-    return f"Missing from the simulation: {named}. {gain}{_no_gain_at_its_own(d, causes)}{also}{_dropped(d)}"
+    return (
+        f"Missing from the simulation: {named}."
+        f" {gain}{_no_gain_at_its_own(d, causes)}{also}{_dropped(d)}"
+    )
 
 
 def _they(causes: list[dict[str, Any]]) -> str:

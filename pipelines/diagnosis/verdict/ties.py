@@ -13,8 +13,10 @@ class Tie:
 
 STRUCTURAL: dict[frozenset[str], Tie] = {
     frozenset({"torque_offset", "coulomb_asymmetry"}): Tie(
-        "while the joint always moves, a friction that differs with direction adds the same constant torque",
-        "hold the joint still and read the torque with the drive off: an offset of the sensor stays",
+        "while the joint always moves, a friction that differs with direction adds the same"
+        " constant torque",
+        "hold the joint still and read the torque with the drive off: an offset of the sensor"
+        " stays",
     ),
     frozenset({"base_tilt", "encoder_offset"}): Tie(
         "a tilted base turns gravity just as a first encoder with a shifted zero does",
@@ -22,15 +24,19 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
     ),
     frozenset({"encoder_offset", "mass_off_axis"}): Tie(
         "under one load a shifted zero and a mass beside the axis turn gravity alike",
-        "record with another load as well, a person or a known weight: an offset is one angle in both, a mass is not",
+        "record with another load as well, a person or a known weight: an offset is one angle in"
+        " both, a mass is not",
     ),
     frozenset({"base_tilt", "mass_off_axis"}): Tie(
         "under one load a tilted base and a mass beside the axis turn gravity alike",
-        "record with another load as well, a person or a known weight, or put a spirit level on the base",
+        "record with another load as well, a person or a known weight, or put a spirit level on the"
+        " base",
     ),
     frozenset({"torque_gain"}): Tie(
-        "where nothing else tells the load only the ratio of both gains shows: one too high is the other too low",
-        "hang a known weight on each joint in turn; or record the cuff forces, with and without the person",
+        "where nothing else tells the load only the ratio of both gains shows: one too high is the"
+        " other too low",
+        "hang a known weight on each joint in turn; or record the cuff forces, with and without the"
+        " person",
     ),
     frozenset({"backlash", "encoder_offset"}): Tie(
         "while the load pushes to one side only, play shifts the angle by a constant half of it",
@@ -38,23 +44,27 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
     ),
     frozenset({"parallel_spring", "torque_offset"}): Tie(
         "a soft spring that is far wound up adds little but a constant torque",
-        "let the joint rest with the drive off, and unhook the spring: an offset of the sensor stays",
+        "let the joint rest with the drive off, and unhook the spring: an offset of the sensor"
+        " stays",
     ),
     frozenset({"parallel_spring", "coulomb_asymmetry"}): Tie(
-        "a soft spring that is far wound up adds little but a constant torque, as friction does that differs with "
-        "direction while the joint always moves",
+        "a soft spring that is far wound up adds little but a constant torque, as friction does"
+        " that differs with direction while the joint always moves",
         "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
     ),
     frozenset({"friction_temperature", "friction_warmup"}): Tie(
         "while a run warms steadily, its temperature and its time rise together",
-        "repeat the motion with the drive warm: friction that follows the temperature is low from the start",
+        "repeat the motion with the drive warm: friction that follows the temperature is low from"
+        " the start",
     ),
     frozenset({"encoder_eccentricity", "encoder_offset"}): Tie(
-        "over less than half a turn an error once a turn is nearly a constant and a scale of the angle",
+        "over less than half a turn an error once a turn is nearly a constant and a scale of the"
+        " angle",
         "turn the joint to marks of known angle all the way round, and read the encoder",
     ),
     frozenset({"end_stop", "passive_joint_torque"}): Tie(
-        "with the person in every run, a stop of the machine and one of the person's joint are alike",
+        "with the person in every run, a stop of the machine and one of the person's joint are"
+        " alike",
         "record the machine with nobody in it through the same range",
     ),
     frozenset({"torque_drift", "torque_offset"}): Tie(
@@ -71,6 +81,7 @@ def tie_between(named: str, other: str, confirm_named: str, confirm_other: str) 
     if structural:
         return structural
     return Tie(
-        "along this motion their torques differ by less than noise and the other parameters can make up",
+        "along this motion their torques differ by less than noise and the other parameters can"
+        " make up",
         f"for the one: {confirm_named}; for the other: {confirm_other}",
     )

@@ -114,11 +114,13 @@ def _known(d: Diagnosis, effect: Effect) -> dict[str, Any]:
 def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [
         {
-            "name": r["name"], "value": r["value"], "unit": r["unit"],
+            "name": r["name"],
+            "value": r["value"],
+            "unit": r["unit"],
             "ci95": [r["ci95_low"], r["ci95_high"]],
         }
         for r in rows
-    ]  # fmt: skip
+    ]
 
 
 def _depends_on(
@@ -129,13 +131,15 @@ def _depends_on(
     return {
         joint: [
             {
-                "variable": one.variable, "share_before": one.share,
+                "variable": one.variable,
+                "share_before": one.share,
                 "share_after": left[joint, one.variable],
             }
-            for one in before if one.joint == joint
+            for one in before
+            if one.joint == joint
         ]
         for joint in dict.fromkeys(one.joint for one in before)
-    }  # fmt: skip
+    }
 
 
 def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:

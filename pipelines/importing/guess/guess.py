@@ -61,9 +61,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
                     f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round"
                 )
             raise InputError(
-                f"none of {_in_short(source.names)} goes forward as a clock does, over ten rows or more and at "
-                f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
-                "are uniform: docs/import.md tells how"
+                f"none of {_in_short(source.names)} goes forward as a clock does, over ten rows or"
+                f" more and at {clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by"
+                " hand, with time.rate_hz where rows are uniform: docs/import.md tells how"
             )
     for path in paths[1:]:
         _refuse_other_columns(path, source)
@@ -89,8 +89,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
         joints = group_joints([m for m in found if m.column in here], here, run.time_s, time.column)
         if not joints:
             raise InputError(
-                "no name of a column that changes says angle or position, and no column integrates to another among "
-                f"{_in_short(source.names)}; write the map by hand, docs/import.md tells how"
+                "no name of a column that changes says angle or position, and no column integrates"
+                f" to another among {_in_short(source.names)}; write the map by hand,"
+                " docs/import.md tells how"
             )
     single = {
         name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"
@@ -111,7 +112,8 @@ def _refuse_other_columns(path: Path, first: Source) -> None:
         lacking = set(first.names) - set(open_source(path, SourceSettings()).names)
         if lacking:
             raise InputError(
-                f"has no column {', '.join(sorted(lacking))}, which {first} has; guess a map for each of both kinds"
+                f"has no column {', '.join(sorted(lacking))}, which {first} has; guess a map for"
+                " each of both kinds"
             )
 
 

@@ -293,7 +293,7 @@ def _write_torque(
 
 def _what_torque(commanded: bool, rather: str) -> str:
     if commanded:
-        return f"commanded, not measured: what friction in the drive does to it is not in it {rather}".strip()
+        return f"commanded, not measured: it lacks the friction in the drive {rather}".strip()
     return rather
 
 

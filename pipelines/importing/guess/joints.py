@@ -64,9 +64,10 @@ def group_joints(
     """Return the joints of a log of columns (n,) at times (n,) s, in their columns' order, a limb's
     from the body."""
     usable = [
-        m for m in meanings
+        m
+        for m in meanings
         if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
-    ]  # fmt: skip
+    ]
     switches = [
         m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))
     ]
@@ -197,7 +198,9 @@ def _by_behaviour(
     rest = [m for m in usable if m not in (angle, velocity)]
     found = _joint("", [m for m in rest if m.quantity not in ("", "velocity")], 1, 1)
     why = {
-        "angle": f"no name says so, but {velocity.column} integrates to it ({share:.0%} of its variance)",
+        "angle": (
+            f"no name says so, but {velocity.column} integrates to it ({share:.0%} of its variance)"
+        ),
         "velocity": f"no name says so, but it integrates to {angle.column}",
     }
     joint = replace(
@@ -206,9 +209,11 @@ def _by_behaviour(
         why={**found.why, **why},
     )
     return [
-        joint
-        if joint.drive
-        else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)
+        (
+            joint
+            if joint.drive
+            else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)
+        )
     ]
 
 

@@ -23,9 +23,17 @@ WHOLE = 0.01
 """So near to a whole number, as its share, a ratio is taken for it: drives filter their
 velocities."""
 VELOCITY_OF = {
-    "rad": "rad/s", "mrad": "mrad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "cm": "cm/s", "mm": "mm/s",
-    "um": "mm/s", "in": "in/s", "counts": "counts/s",
-}  # fmt: skip
+    "rad": "rad/s",
+    "mrad": "mrad/s",
+    "deg": "deg/s",
+    "rev": "rev/s",
+    "m": "m/s",
+    "cm": "cm/s",
+    "mm": "mm/s",
+    "um": "mm/s",
+    "in": "in/s",
+    "counts": "counts/s",
+}
 ANGLES, VELOCITIES = (
     ("rad", "deg", "rev", "m", "mm"),
     ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s"),
@@ -89,7 +97,10 @@ def _from_slope(
 ) -> Units:
     """Return the pair of units that explains how much velocity integrates to a unit of angle."""
     slope, sign = abs(agreement.slope), int(np.sign(agreement.slope))
-    said = f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its variance)"
+    said = (
+        f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its"
+        " variance)"
+    )
     fitting = [
         (one, other)
         for one in dict.fromkeys((*ANGLES, unit))
@@ -143,10 +154,12 @@ def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
     """Return the unit that a speed would be in were it no motor's; None where none makes such a
     slope."""
     fitting = (
-        other for other in VELOCITIES
-        if other != velocity and UNITS[other].dimension == "angular velocity"
+        other
+        for other in VELOCITIES
+        if other != velocity
+        and UNITS[other].dimension == "angular velocity"
         and abs(_turns(slope, unit, other) - 1.0) < NEAR
-    )  # fmt: skip
+    )
     return next(fitting, None)
 
 

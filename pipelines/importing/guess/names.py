@@ -19,14 +19,17 @@ WORDS: dict[str, frozenset[str]] = {
     for quantity, words in {
         "time": "time t stamp timestamp timestamps clock zeit uhrzeit zeitstempel temps horodatage",
         "acceleration": "acc accel acceleration ddq qdd beschleunigung beschl",
-        "velocity": "vel velo velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit geschw vitesse",
+        "velocity": (
+            "vel velo velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit"
+            " geschw vitesse"
+        ),
         "torque": "tau torque trq tq effort moment drehmoment couple",
         "temperature": "temp temperature temperatur",
         "current": "cur current amp iq isq i strom courant intensite",
         "voltage": "vir u voltage spannung",
         "angle": (
-            "pos position angle ang theta th q qm phi enc encoder winkel drehwinkel lage stellung geber weg hub "
-            "displacement travel stroke codeur course"
+            "pos position angle ang theta th q qm phi enc encoder winkel drehwinkel lage stellung"
+            " geber weg hub displacement travel stroke codeur course"
         ),
         "force": "force load kraft last",
     }.items()
@@ -34,7 +37,8 @@ WORDS: dict[str, frozenset[str]] = {
 """Words for each quantity, English, German and French; the first that has one of a name's is
 meant."""
 COMMANDED = _words(
-    "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll sollwert consigne"
+    "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll"
+    " sollwert consigne"
 )
 FILTERED = _words("filt filtered lp smooth smoothed gefiltert filtre")
 MEASURED = _words("meas measured act actual msr fb feedback ist istwert mesure mesuree reel reelle")
@@ -44,21 +48,22 @@ SWITCHED = _words("servo drive motor torque power")
 DRIVES = _words("motor drive servo mot moteur antrieb actuator aktor")
 """What is fed by a current: ``motor_A`` is one, ``joint_A`` is a joint."""
 SOMETHING_ELSE = _words(
-    "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag limit bus supply "
-    "battery imu gyro grenze fehler schleppfehler schleppabstand abweichung nummer zustand modus zwischenkreis "
-    "batterie versorgung ecart erreur etat"
+    "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag"
+    " limit bus supply battery imu gyro grenze fehler schleppfehler schleppabstand abweichung"
+    " nummer zustand modus zwischenkreis batterie versorgung ecart erreur etat"
 )
 """Words that make of a torque or a position something else."""
 CONTAINERS = _words("state status")
 """Those of them that are what holds it in ``state.q``, a name within a name."""
 TALLIES = _words(
-    "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu index fifo buffer "
-    "queue missed lost dropped crc zyklus takt"
+    "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu"
+    " index fifo buffer queue missed lost dropped crc zyklus takt"
 )
 """Words of what is counted, or told in counts, and is no angle."""
 NOISE = _words(
-    "joint joints axis motor drive epos j m data value values log state states of in raw abs absolute wrapped "
-    "present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
+    "joint joints axis motor drive epos j m data value values log state states of in raw abs"
+    " absolute wrapped present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur"
+    " axe articulation de du la le en"
 )
 """Words that tell nothing of which joint it is."""
 JOINTS = {"huefte": "hip", "hueft": "hip", "hanche": "hip", "knie": "knee", "genou": "knee"}

@@ -85,7 +85,10 @@ def guess_time(
         why += (
             ""
             if usual
-            else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
+            else (
+                ", at which no machine is sampled: is it"
+                f" {' or '.join(fitting) or 'another column'}?"
+            )
         )
         pause_s = _longest_pause(values) * UNITS[chosen].factor if found in coarse else 0.0
         even = rate_hz if found in coarse else None
@@ -156,7 +159,10 @@ def write_time(proposal: Proposal, found: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
     if found.rate_hz is not None:
-        why = f"several rows have one stamp of {found.column}; taken for uniform, {found.unit} for its unit"
+        why = (
+            f"several rows have one stamp of {found.column}; taken for uniform, {found.unit} for"
+            " its unit"
+        )
         if found.pause_s:
             why += f"; but none came for {found.pause_s:.3g} s, which `rate_hz` leaves no gap for"
         proposal.key("rate_hz", float(f"{found.rate_hz:.6g}"), why, sure=False)

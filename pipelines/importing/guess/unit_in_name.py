@@ -7,15 +7,45 @@ from dataclasses import dataclass
 from pipelines.settings.units import ALIASES, UNITS
 
 QUANTITIES = {
-    "time": "time", "angle": "angle", "length": "angle", "counts": "angle", "counts per second": "velocity",
-    "angular velocity": "velocity", "velocity": "velocity", "torque": "torque", "force": "force", "current": "current",
-    "voltage": "voltage", "temperature": "temperature",
-}  # fmt: skip
+    "time": "time",
+    "angle": "angle",
+    "length": "angle",
+    "counts": "angle",
+    "counts per second": "velocity",
+    "angular velocity": "velocity",
+    "velocity": "velocity",
+    "torque": "torque",
+    "force": "force",
+    "current": "current",
+    "voltage": "voltage",
+    "temperature": "temperature",
+}
 """What is measured in a unit of each dimension; a share may be of anything."""
 OTHERS = (
-    *(f"{angle}/s{square}" for angle in ("rad", "deg", "°", "m", "mm", "rev") for square in ("²", "2", "^2")),
-    *("Nm/s", "Nm/rad", "Nm/deg", "Nm/A", "Nms", "A/s", "V/s", "W", "kW", "Hz", "kHz", "J", "bar", "Pa", "kg", "Ohm"),
-)  # fmt: skip
+    *(
+        f"{angle}/s{square}"
+        for angle in ("rad", "deg", "°", "m", "mm", "rev")
+        for square in ("²", "2", "^2")
+    ),
+    *(
+        "Nm/s",
+        "Nm/rad",
+        "Nm/deg",
+        "Nm/A",
+        "Nms",
+        "A/s",
+        "V/s",
+        "W",
+        "kW",
+        "Hz",
+        "kHz",
+        "J",
+        "bar",
+        "Pa",
+        "kg",
+        "Ohm",
+    ),
+)
 """Units of what no map asks for."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 

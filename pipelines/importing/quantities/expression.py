@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 from pipelines.errors import SettingsError
 
 OPERATORS: dict[type, Callable] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.UAdd: operator.pos, ast.USub: operator.neg,
-}  # fmt: skip
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
 MOST_OPERATIONS = 100
 """In one expression; what machines write by the thousand, nobody could check."""
 LARGEST = sys.float_info.max
@@ -79,7 +83,8 @@ class Expression:
                 raise self._refusal()
         if sum(hasattr(node, "op") for node in ast.walk(tree)) > MOST_OPERATIONS:
             raise self._refusal(
-                f", at most {MOST_OPERATIONS} of them; write what they make into a column of its own"
+                f", at most {MOST_OPERATIONS} of them; write what they make into a column of"
+                " its own"
             )
         if not self.names:
             raise self._refusal(", one column at least")

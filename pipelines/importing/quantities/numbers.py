@@ -31,7 +31,10 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     words = np.isnan(found) & pd.notna(values)
     if words.any():
         row = int(np.argmax(words))
-        seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])[:LONGEST]!r} in row {row}"
+        seen = (
+            f"{counted(int(words.sum()), 'row')} with text, the first"
+            f" {str(values[row])[:LONGEST]!r} in row {row}"
+        )
         findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
     return found
 

@@ -31,7 +31,10 @@ class Beginnings:
             first, of = self._first.setdefault(name, (begins, log))
             away = round((begins - first) / turn)
             if away:
-                seen = f"begins at {begins:.4g} and in {of} at {first:.4g}, about {abs(away)} of its counter's turns apart"
+                seen = (
+                    f"begins at {begins:.4g} and in {of} at {first:.4g}, about {abs(away)} of its"
+                    " counter's turns apart"
+                )
                 yield Finding(
                     name, seen, "kept; if all logs begin alike, say with begins_at at which reading"
                 )

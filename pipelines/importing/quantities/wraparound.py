@@ -22,12 +22,18 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
     impossible = (values >= 2.0**bits) | (values < -(2.0 ** (bits - 1)))
     if impossible.any():
         first = values[np.argmax(impossible)]
-        seen = f"{counted(int(impossible.sum()), 'row')} that {bits} bits cannot hold, the first {first:.10g}"
+        seen = (
+            f"{counted(int(impossible.sum()), 'row')} that {bits} bits cannot hold, the first"
+            f" {first:.10g}"
+        )
         findings.append(Finding(where, seen, "taken for missing"))
     negative = values >= 2.0 ** (bits - 1)
     if (negative & ~impossible).any():
         share = np.count_nonzero(negative & ~impossible) / len(values)
-        seen = f"a signed register of {bits} bits logged without its sign, {share:.0%} of the rows below 0"
+        seen = (
+            f"a signed register of {bits} bits logged without its sign, {share:.0%} of the rows"
+            " below 0"
+        )
         findings.append(Finding(where, seen, f"less 2^{bits} there"))
     found = np.where(negative, values - 2.0**bits, values)
     return np.where(impossible, np.nan, found)
@@ -58,7 +64,10 @@ def unwrapped(
     if turns[0]:
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
-        told = f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at in the map names another"
+        told = (
+            f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at in the map names"
+            " another"
+        )
         findings.append(Finding(where, seen, told))
     return found
 

@@ -31,7 +31,10 @@ def unused(settings: ImportMap, files: Collection[Path]) -> Iterator[str]:
     """Yield which recordings of a map are of none of the files."""
     for number, recording in enumerate(settings.recording):
         if not any(map(recording.is_of, files)):
-            yield f'recording[{number}] ({recording.purpose}) is of "{recording.files}", and no file given is; left out'
+            yield (
+                f'recording[{number}] ({recording.purpose}) is of "{recording.files}", and no file'
+                " given is; left out"
+            )
 
 
 def lacks(found: Metadata, made: Collection[str], map_path: Path) -> Iterator[str]:
@@ -51,6 +54,6 @@ def _unknown_mechanism(told: Mapping[str, Any]) -> str:
     if mechanisms_of(joints):
         return ""
     return (
-        f"`exoid run` ends at the motions of these: {in_words(joints)} make no mechanism that exoid could fit; leave "
-        "joints out of the map"
+        f"`exoid run` ends at the motions of these: {in_words(joints)} make no mechanism that exoid"
+        " could fit; leave joints out of the map"
     )

@@ -49,7 +49,10 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
             "geometry", "no thigh_length_m, from the first joint's axis to the second's", why
         )
     if not known:
-        seen = f"{in_words(joints)}, and of the mechanisms that exoid knows none has these: {known_in_words()}"
+        seen = (
+            f"{in_words(joints)}, and of the mechanisms that exoid knows none has these:"
+            f" {known_in_words()}"
+        )
         yield Finding(
             "joints",
             seen,
@@ -70,7 +73,10 @@ def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator
     name, (least, unit) = joint.joint.column("angle"), SHORTEST[joint.kind]
     way = float(np.ptp(columns[name]))
     if 0.0 < way < least:
-        seen = f"moves over {way:.3g} {unit} only, and what a joint does within {least:g} {unit} shows no mass"
+        seen = (
+            f"moves over {way:.3g} {unit} only, and what a joint does within {least:g} {unit} shows"
+            " no mass"
+        )
         yield Finding(name, seen, "kept; check its unit, scale and gear_ratio")
 
 
@@ -85,8 +91,9 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         far = np.flatnonzero((columns[name] < least) | (columns[name] > most))
         if usual > 0.0 and len(far):
             seen = (
-                f"{counted(len(far), 'row')} far off, the first {columns[name][far[0]]:.4g} at "
-                f"{columns['time_s'][far[0]]:.6g} s; 99 % lie between {middle - usual:.4g} and {middle + usual:.4g}"
+                f"{counted(len(far), 'row')} far off, the first {columns[name][far[0]]:.4g} at"
+                f" {columns['time_s'][far[0]]:.6g} s; 99 % lie between {middle - usual:.4g} and"
+                f" {middle + usual:.4g}"
             )
             yield Finding(name, seen, "kept; if it is a slip, a range at the reading leaves it out")
 
@@ -101,7 +108,10 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
     name = joint.joint.column("torque")
     reach = float(np.quantile(np.abs(_thinned(columns[name])), 0.99))
     if reach > STRONGEST[quantity]:
-        seen = f"reaches {reach:.4g} {unit}, and drives of legs, arms and robots at most some {STRONGEST[quantity]:g}"
+        seen = (
+            f"reaches {reach:.4g} {unit}, and drives of legs, arms and robots at most some"
+            f" {STRONGEST[quantity]:g}"
+        )
         yield Finding(
             name,
             seen,
@@ -135,5 +145,8 @@ def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> I
     ]
     mean, size = (sum(values) for values in zip(*powers, strict=True))
     if mean < -GIVES_BACK * size:
-        seen = f"the drives take {-mean:.3g} W out of the motion on the whole, as friction leaves them nothing to take"
+        seen = (
+            f"the drives take {-mean:.3g} W out of the motion on the whole, as friction leaves them"
+            " nothing to take"
+        )
         yield Finding("torque", seen, "kept; check the signs of angles and torques")

@@ -12,7 +12,9 @@ from pipelines.importing.sources.flatten import flattened
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
-MATLAB_CLASSES_OF_NUMBERS = (b"double", b"single", b"logical", *(f"{s}int{b}".encode() for s in ("", "u") for b in (8, 16, 32, 64)))  # fmt: skip  # noqa: E501
+MATLAB_CLASSES_OF_NUMBERS = frozenset(
+    b"double single logical int8 int16 int32 int64 uint8 uint16 uint32 uint64".split()
+)
 
 
 def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Source:
@@ -60,8 +62,8 @@ def _group(file: Any, table: str | None) -> Any:
         )
     if not hasattr(file[table], "visititems"):
         raise InputError(
-            f"source.table names {table!r}, which is a data set, expected the group that holds it; leave source.table "
-            "out and name the data set as a column"
+            f"source.table names {table!r}, which is a data set, expected the group that holds it;"
+            " leave source.table out and name the data set as a column"
         )
     return file[table]
 

@@ -30,7 +30,8 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
         content = scipy.io.loadmat(path, simplify_cells=True)
     except Exception as error:  # scipy tells of a damaged file by whatever error its bytes lead to
         raise InputError(
-            f"is a damaged .mat file ({type(error).__name__}: {error}); save it again, with -v7 or -v7.3"
+            f"is a damaged .mat file ({type(error).__name__}: {error}); save it again, with -v7 or"
+            " -v7.3"
         ) from error
     variables = {name: value for name, value in content.items() if not name.startswith("__")}
     if settings.table is not None:

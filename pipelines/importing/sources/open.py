@@ -42,7 +42,8 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
     # It is read more than once, and what nobody writes to is waited for without end.
     if not path.is_file():
         raise InputError(
-            "is a pipe or a device, expected a file; write what comes out of it to one, and name that"
+            "is a pipe or a device, expected a file; write what comes out of it to one, and name"
+            " that"
         )
     with open(path, "rb") as file:
         start = file.read(64)

@@ -71,7 +71,8 @@ def _refuse_twins(names: Sequence[str]) -> None:
     twins = [name for name, times in Counter(names).items() if times > 1]
     if twins:
         raise InputError(
-            f"has two columns {twins[0]!r}, and nobody knows which is meant; rename one and write it again"
+            f"has two columns {twins[0]!r}, and nobody knows which is meant; rename one and write"
+            " it again"
         )
 
 

@@ -32,10 +32,20 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
     try:
         # All columns: told to read only some, pandas would not see that a row has too many.
         reader = pd.read_csv(
-            path, sep=dialect.separator, decimal=dialect.decimal, comment=dialect.comment, header=None,
-            names=[*dialect.names, BEYOND], skiprows=dialect.rows_before, encoding=dialect.encoding,
-            encoding_errors="replace", chunksize=CHUNK, skipinitialspace=True, index_col=False, low_memory=False,
-        )  # fmt: skip
+            path,
+            sep=dialect.separator,
+            decimal=dialect.decimal,
+            comment=dialect.comment,
+            header=None,
+            names=[*dialect.names, BEYOND],
+            skiprows=dialect.rows_before,
+            encoding=dialect.encoding,
+            encoding_errors="replace",
+            chunksize=CHUNK,
+            skipinitialspace=True,
+            index_col=False,
+            low_memory=False,
+        )
         with reader:
             for part in reader:
                 if part[BEYOND].notna().any():
@@ -54,14 +64,18 @@ def _why_not(error: str, dialect: Dialect) -> str:
     if line := re.search(r"in line (\d+), saw", error):
         return _too_many_fields(f"line {line[1]}", dialect)
     if row := re.search(r"EOF inside string starting at row (\d+)", error):
-        return f"line {int(row[1]) + 1} opens a quotation mark that nothing closes; close it, or drop the line"
+        return (
+            f"line {int(row[1]) + 1} opens a quotation mark that nothing closes; close it, or drop"
+            " the line"
+        )
     return f"cannot be read as text ({error}); export it anew"
 
 
 def _too_many_fields(where: str, dialect: Dialect) -> str:
     return (
-        f"{where} has more than the {len(dialect.names)} fields of the others, and nobody knows which is which; mend "
-        f"it, or say in the map's [source] how the file is written (read with {dialect.in_words})"
+        f"{where} has more than the {len(dialect.names)} fields of the others, and nobody knows"
+        " which is which; mend it, or say in the map's [source] how the file is written (read with"
+        f" {dialect.in_words})"
     )
 
 

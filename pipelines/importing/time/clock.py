@@ -81,8 +81,8 @@ def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
         numbers(known, column, [])
     )
     raise SettingsError(
-        f"{column!r} holds {holds}, the first {str(known[0])[:LONGEST]!r}, and time.unit = {unit!r} in the map says "
-        f"otherwise; set it to {' or '.join(right)}"
+        f"{column!r} holds {holds}, the first {str(known[0])[:LONGEST]!r}, and time.unit = {unit!r}"
+        f" in the map says otherwise; set it to {' or '.join(right)}"
     )
 
 
@@ -117,8 +117,8 @@ def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDA
     found = whole_nanoseconds(raw) if settings.unit == "iso8601" or raw.dtype.kind in "mM" else raw
     if settings.unit == "iso8601" and len(raw) and not np.isfinite(found).any():
         raise InputError(
-            f"has {str(raw[0])[:LONGEST]!r} where a date should be, expected dates as 2026-01-31 12:00:00.125; write "
-            "them so, or correct time.column or time.unit in the map"
+            f"has {str(raw[0])[:LONGEST]!r} where a date should be, expected dates as 2026-01-31"
+            " 12:00:00.125; write them so, or correct time.column or time.unit in the map"
         )
     return whole(found) if found.dtype.kind in "iu" else numbers(found, "time", findings)
 
@@ -134,8 +134,8 @@ def whole(found: NDArray) -> NDArray:
     """
     if found.dtype.kind == "u" and len(found) and found.max() > np.iinfo(np.int64).max:
         raise InputError(
-            f"has the time stamp {found.max()}, more than any clock counts; correct time.column in the map, or mark "
-            "stamps that are missing as such"
+            f"has the time stamp {found.max()}, more than any clock counts; correct time.column in"
+            " the map, or mark stamps that are missing as such"
         )
     return found.astype(np.int64)
 
@@ -231,8 +231,8 @@ def runs_backwards(time: NDArray) -> bool:
 def _refuse_backwards(time: NDArray) -> None:
     if runs_backwards(time):
         raise InputError(
-            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the last; turn the order "
-            "of its rows round, or correct time.column in the map"
+            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
+            " last; turn the order of its rows round, or correct time.column in the map"
         )
 
 
@@ -252,7 +252,10 @@ def _without_strays(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> 
     )
     if stray.any():
         first = rows[int(np.argmax(stray)) + 1]
-        seen = f"{counted(int(stray.sum()), 'stamp')} far from both neighbours, the first in row {first}"
+        seen = (
+            f"{counted(int(stray.sum()), 'stamp')} far from both neighbours, the first in row"
+            f" {first}"
+        )
         findings.append(Finding("time", seen, "left out"))
     return rows[np.concatenate([[True], ~stray, [True]])] if len(rows) > 2 else rows
 
@@ -323,7 +326,10 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
 
 
 def _repeated(again: int, rows: int, first: int) -> Finding:
-    seen = f"{counted(again, 'row')} ({again / rows:.1%}) with the stamp of another, the first is row {first}"
+    seen = (
+        f"{counted(again, 'row')} ({again / rows:.1%}) with the stamp of another, the first is row"
+        f" {first}"
+    )
     advice = (
         ""
         if again < 0.05 * rows

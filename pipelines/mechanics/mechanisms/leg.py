@@ -128,8 +128,9 @@ def _broken(X: NDArray, geometry: Geometry) -> list[str]:
         broken.append(f"X2 = {X2:.4g} kg·m² is not positive: the shank would have no inertia")
     if X2 * (X1 - X2) <= (geometry.thigh_length_m * X3) ** 2:
         broken.append(
-            f"X2 (X1 - X2) = {X2 * (X1 - X2):.4g} is not above (L1 X3)² = "
-            f"{(geometry.thigh_length_m * X3) ** 2:.4g} kg²·m⁴: the mass matrix is not positive definite"
+            f"X2 (X1 - X2) = {X2 * (X1 - X2):.4g} is not above (L1 X3)² ="
+            f" {(geometry.thigh_length_m * X3) ** 2:.4g} kg²·m⁴: the mass matrix is not positive"
+            " definite"
         )
     return broken
 
@@ -149,7 +150,10 @@ def _inertia_forms(geometry: Geometry) -> NDArray:
 
 LEG = Mechanism(
     name="leg",
-    title="two revolute joints in series, whose axes are parallel, under gravity: a leg, any double pendulum",
+    title=(
+        "two revolute joints in series, whose axes are parallel, under gravity: a leg, any double"
+        " pendulum"
+    ),
     kinds=("revolute", "revolute"),
     places=("hip", "knee"),
     has_gravity=True,
@@ -180,7 +184,10 @@ LEG = Mechanism(
 
 LEVEL_LEG = replace(
     LEG,
-    title="two revolute joints in series whose parallel axes are vertical, or their links balanced: a planar arm",
+    title=(
+        "two revolute joints in series whose parallel axes are vertical, or their links balanced: a"
+        " planar arm"
+    ),
     has_gravity=False,
     parameters=LEG.parameters[:3],
     bends_at=("knee",),

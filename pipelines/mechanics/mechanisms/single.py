@@ -1,13 +1,13 @@
 """One joint: a pendulum, a turntable, a slide or a lift.
 
-===========  =========  =======  ==========================================================================
+===========  =========  =======  ==========================================================
 mechanism    joint      gravity  torque or force of the drive
-===========  =========  =======  ==========================================================================
+===========  =========  =======  ==========================================================
 pendulum     revolute   yes      X1 ddq + X2 g sin q, with q from the downward vertical
 turntable    revolute   no       X1 ddq
 lift         prismatic  yes      X1 ddq + X2
 slide        prismatic  no       X1 ddq
-===========  =========  =======  ==========================================================================
+===========  =========  =======  ==========================================================
 
 Gravity pulls a prismatic joint with the same force wherever it stands. Counterweights and springs
 of constant force do so too, and mostly are there where it matters; so X2 of a lift is that force,
@@ -140,7 +140,9 @@ PENDULUM = Mechanism(
 
 TURNTABLE = replace(
     PENDULUM,
-    title="one revolute joint that gravity does not turn: its axis is vertical, or its load balanced",
+    title=(
+        "one revolute joint that gravity does not turn: its axis is vertical, or its load balanced"
+    ),
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,

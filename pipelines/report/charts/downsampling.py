@@ -47,9 +47,11 @@ def _of_stretches(columns: NDArray, stretches: int) -> NDArray[np.intp]:
     for column in columns.T:
         values = column[place]
         missing = np.isnan(values)
-        for chosen in (np.argmin(np.where(missing, np.inf, values), axis=1),
-                       np.argmax(np.where(missing, -np.inf, values), axis=1),
-                       np.argmax(missing, axis=1)[missing.any(axis=1)]):  # fmt: skip
+        for chosen in (
+            np.argmin(np.where(missing, np.inf, values), axis=1),
+            np.argmax(np.where(missing, -np.inf, values), axis=1),
+            np.argmax(missing, axis=1)[missing.any(axis=1)],
+        ):
             begin = first if len(chosen) == stretches else first[missing.any(axis=1)]
             kept.append(begin + chosen)
     return np.unique(np.minimum(np.concatenate(kept), n - 1))

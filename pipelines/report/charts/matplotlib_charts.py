@@ -32,9 +32,14 @@ def chart_figure(chart: Chart) -> Figure:
     cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
     heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
     figure, axes = plt.subplots(
-        len(chart.panels), 1, sharex=True, squeeze=False, height_ratios=heights,
-        figsize=(NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)), layout="constrained",
-    )  # fmt: skip
+        len(chart.panels),
+        1,
+        sharex=True,
+        squeeze=False,
+        height_ratios=heights,
+        figsize=(NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)),
+        layout="constrained",
+    )
     for axis, panel in zip(axes[:, 0], chart.panels, strict=True):
         _draw(axis, chart, panel)
     axes[-1, 0].set_xlabel(chart.x_label)
@@ -112,8 +117,10 @@ def budget_figure(bars: Sequence[Bar]) -> Figure:
         axis.legend(
             [Patch(color=TONES[segment.tone]) for segment in shown],
             [f"{segment.label}: {digits(segment.rms)} {bar.unit}" for segment in shown],
-            loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8,
-        )  # fmt: skip
+            loc="center left",
+            bbox_to_anchor=(1.01, 0.5),
+            fontsize=8,
+        )
     return figure
 
 

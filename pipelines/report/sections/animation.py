@@ -14,8 +14,10 @@ FRAMES_HZ = 50.0
 LONGEST_S = 40.0
 """Of a longer run the stretch is shown in which the first model is furthest off."""
 DRAWN: dict[tuple[Kind, ...], str] = {
-    ("revolute", "revolute"): "leg", ("revolute",): "pendulum", ("prismatic",): "slider",
-}  # fmt: skip
+    ("revolute", "revolute"): "leg",
+    ("revolute",): "pendulum",
+    ("prismatic",): "slider",
+}
 """Machines that there is a drawing of, by the kinds of their joints."""
 SHANK_TO_THIGH = 1.05
 """The shank's drawn length: no file tells it, and no torque depends on it."""

@@ -68,7 +68,9 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
     return Chart(
         key=f"control-{joint.name}",
         title=f"{joint.name} under adaptive RBF control",
-        caption=f"From rest; errors count from {settled:g} s on, when the network has learnt the leg.",
+        caption=(
+            f"From rest; errors count from {settled:g} s on, when the network has learnt the leg."
+        ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(

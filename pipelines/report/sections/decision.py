@@ -9,9 +9,12 @@ from pipelines.wording.findings import PARTS, Row, Shares, outcomes, rows, searc
 
 OUTCOMES = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
 TONES = {
-    "noise": "noise", "wanders": "wanders", "between_runs": "runs", "unsplit": "before",
+    "noise": "noise",
+    "wanders": "wanders",
+    "between_runs": "runs",
+    "unsplit": "before",
     "repeats": "left",
-}  # fmt: skip
+}
 """Names of colours, in the order in which the parts are laid end to end."""
 
 
@@ -67,9 +70,13 @@ def decision(verdict: Mapping[str, Any]) -> Decision | None:
 def _split(verdict: Mapping[str, Any], one: Shares) -> Split:
     parts = [(PARTS[name], tone, one.parts[name]) for name, tone in TONES.items()]
     return Split(
-        one.joint, torque_unit(dict(verdict), one.joint), one.rms, _end_to_end(parts),
-        one.with_person_only, one.predicted,
-    )  # fmt: skip
+        one.joint,
+        torque_unit(dict(verdict), one.joint),
+        one.rms,
+        _end_to_end(parts),
+        one.with_person_only,
+        one.predicted,
+    )
 
 
 def _end_to_end(told: list[tuple[str, str, float]]) -> tuple[Part, ...]:

@@ -61,8 +61,11 @@ def _torque_chart(
     return Chart(
         key=f"torque-{_stem(run)}-{joint.name}",
         title=f"{joint.name} {quantity}",
-        caption=f"Measured and computed from the motion, in the blocks that were fitted; below, what each model leaves "
-        f"away from reversals{', on the band of the noise floor' if floor else ''}.",
+        caption=(
+            "Measured and computed from the motion, in the blocks that were fitted; below, what"
+            " each model leaves away from"
+            f" reversals{', on the band of the noise floor' if floor else ''}."
+        ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(
@@ -70,7 +73,7 @@ def _torque_chart(
             Panel(f"error, {unit}", tuple(errors), band=floor),
         ),
         group=run,
-    )  # fmt: skip
+    )
 
 
 def angle_charts(session: Session) -> Iterator[Chart]:
@@ -126,10 +129,19 @@ def scores(session: Session, run: str) -> list[Score]:
         replays = replayed(session, what).get(run, {})
         for key, quantity, words, times, prefix in rows if replays else ():
             for joint in session.joints:
-                told = [replays[model].metadata.get(key, {}).get(joint.name) if model in replays else None
-                        for model in models_of(session)]  # fmt: skip
+                told = [
+                    (
+                        replays[model].metadata.get(key, {}).get(joint.name)
+                        if model in replays
+                        else None
+                    )
+                    for model in models_of(session)
+                ]
                 name = joint.place if quantity == "angle" else joint.effort
-                where = f"{joint.name} {name}, {words.format(drive=joint.effort)}, {prefix}{joint.unit(quantity)}"
+                where = (
+                    f"{joint.name} {name}, {words.format(drive=joint.effort)},"
+                    f" {prefix}{joint.unit(quantity)}"
+                )
                 values = tuple(None if value is None else times * value for value in told)
                 found.append(Score(where, values, LARGER if strays_further(*values) else ""))
                 if what == "windows":
@@ -161,9 +173,10 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
             else f"; only about reversals, where {STANDS}"
         )
         yield Score(
-            f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values,
+            f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}",
+            values,
             LARGER + about if grew else "",
-        )  # fmt: skip
+        )
         grew_away = grew
 
 
@@ -201,8 +214,10 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
     return Chart(
         key=f"angle-{_stem(run)}-{joint.name}",
         title=f"{joint.name} {where} in simulations of one second",
-        caption=f"Each second the model starts where the machine was and gets the recorded {drive}; below, how far it "
-        "strays.",
+        caption=(
+            f"Each second the model starts where the machine was and gets the recorded {drive};"
+            " below, how far it strays."
+        ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(Panel(f"{where}, {unit}", tuple(angles)), Panel(f"error, m{unit}", tuple(errors))),

@@ -146,13 +146,24 @@ def estimates(table: Table) -> list[Estimate]:
 
 
 def _estimate(row: Mapping[str, Any]) -> Estimate:
-    low, high, error = (None if row[key] is None or row[key] != row[key] else float(row[key])
-               for key in ("ci95_low", "ci95_high", "std_error"))  # fmt: skip
+    low, high, error = (
+        None if row[key] is None or row[key] != row[key] else float(row[key])
+        for key in ("ci95_low", "ci95_high", "std_error")
+    )
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     return Estimate(
-        row["effect"], row["name"], row["symbol"], joint, run, row["unit"], float(row["value"]), low, high, error,
+        row["effect"],
+        row["name"],
+        row["symbol"],
+        joint,
+        run,
+        row["unit"],
+        float(row["value"]),
+        low,
+        high,
+        error,
         bool(row.get("each_run")),
-    )  # fmt: skip
+    )
 
 
 def _method(method: Any) -> str:

@@ -130,7 +130,8 @@ def stale(session: Session) -> list[str]:
             if one.state == "changed":
                 made.setdefault(one.name, []).append(origin.file)
     return [
-        f"{name} has changed since {_few(files)} {'was' if len(files) == 1 else 'were'} made of it; {AGAIN}"
+        f"{name} has changed since {_few(files)} {'was' if len(files) == 1 else 'were'} made of it;"
+        f" {AGAIN}"
         for name, files in made.items()
     ]
 
@@ -185,8 +186,8 @@ def changed_settings(session: Session) -> list[str]:
             if any(told[key] != value for key, value in is_now.items() if key in told):
                 made.setdefault(name, []).append(session.shown(one.path))
     return [
-        f"{_few(files)} {'was' if len(files) == 1 else 'were'} made with another [{name}] than {session.config.name} "
-        f"has now; {AGAIN}"
+        f"{_few(files)} {'was' if len(files) == 1 else 'were'} made with another [{name}] than"
+        f" {session.config.name} has now; {AGAIN}"
         for name, files in made.items()
     ]
 
@@ -344,7 +345,11 @@ def _simulate(session: Session, artifact: Artifact) -> Words | None:
 
 
 _MADE_BY = {
-    "trajectory": _design, "recording": _record, "motion": _filter, "parameters": _identify, "verdict": _diagnose,
+    "trajectory": _design,
+    "recording": _record,
+    "motion": _filter,
+    "parameters": _identify,
+    "verdict": _diagnose,
     "simulation": _simulate,
-}  # fmt: skip
+}
 """By contract, in the order of an experiment: the words of the command that makes such a file."""

@@ -45,8 +45,11 @@ def against(session: Session, joint: Joint) -> list[Against]:
     found = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
-            found += [_along(other, quantity, f"other_{variable}") for quantity, variable in DEPENDENCES.items()
-                      if variable != "acceleration"]  # fmt: skip
+            found += [
+                _along(other, quantity, f"other_{variable}")
+                for quantity, variable in DEPENDENCES.items()
+                if variable != "acceleration"
+            ]
     return [*found, Against("time", "time", "time, s", "time_s")]
 
 
@@ -102,8 +105,10 @@ def _chart(
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
         title=f"{joint.name} error against {one.title}",
-        caption="Dots are blocks of validation runs away from reversals, lines their running means, each of "
-        f"{FEWEST} blocks or more; the band is the noise floor.",
+        caption=(
+            "Dots are blocks of validation runs away from reversals, lines their running means,"
+            f" each of {FEWEST} blocks or more; the band is the noise floor."
+        ),
         x_label=one.label,
         x=places[order],
         panels=(

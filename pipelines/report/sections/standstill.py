@@ -69,18 +69,20 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
     grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])
     if grew:
         yield (
-            f"Reversals included, {the(name)}'s {push} error is {digits(all_before)} → {digits(all_after)} "
-            f"{joint.unit('torque')} with the causes, and {digits(before)} → {digits(after)} away from them: a joint "
-            f"that stands is held by any {push} up to the one that breaks it free, and no model of speed can tell which"
+            f"Reversals included, {the(name)}'s {push} error is {digits(all_before)} →"
+            f" {digits(all_after)} {joint.unit('torque')} with the causes, and {digits(before)} →"
+            f" {digits(after)} away from them: a joint that stands is held by any {push} up to the"
+            " one that breaks it free, and no model of speed can tell which"
             + (". What is named raises the most that can hold it" if holds else "")
         )
     if strays_further(strayed, strays):
         why = (
-            f"nothing corrects such a simulation, and a small error of {push} decides when a joint that stands comes "
-            "free; the table of each run tells apart the seconds in which it never stands"
+            f"nothing corrects such a simulation, and a small error of {push} decides when a joint"
+            " that stands comes free; the table of each run tells apart the seconds in which it"
+            " never stands"
         )
         yield (
-            f"Simulated for 1 s by the recorded {push}, {the(name)} strays {digits(1e3 * strayed)} → "
-            f"{digits(1e3 * strays)} m{joint.unit('angle')} with the causes: "
+            f"Simulated for 1 s by the recorded {push}, {the(name)} strays {digits(1e3 * strayed)}"
+            f" → {digits(1e3 * strays)} m{joint.unit('angle')} with the causes: "
             + (why if grew or holds else "these files do not tell why")
         )

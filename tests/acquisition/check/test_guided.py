@@ -111,7 +111,8 @@ def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(
 ):
     def stopped(rig_file, settings, excitation, output, *given, **named_too):
         raise DeviceError(
-            f"hip drive: no answer; the leg was stopped{f', samples are in {output}' if named else ''}"
+            "hip drive: no answer; the leg was"
+            f" stopped{f', samples are in {output}' if named else ''}"
         )
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

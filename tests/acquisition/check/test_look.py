@@ -91,24 +91,76 @@ def test_nothing_is_written_to_a_real_rig(checked):
 @pytest.mark.parametrize(
     ("was", "believed", "words"),
     [
-        (ANGLE, ANGLE.replace("scale", 'word_order = "little", scale'),
-         ["angle reads", 'with word_order = "big" it would be', "correct map.drive.servo.read.angle"]),
-        (FORCE_Y, FORCE_Y.replace("unit", 'word_order = "little", unit'),
-         ["force_y reads", 'with word_order = "big" it would be', "correct map.sensor.force.read.force_y"]),
-        (FORCE_Y, FORCE_Y.replace("float32", "int32"),
-         ["force_y reads", 'with type = "float32" it would be']),
-        (TIME, TIME.replace('"us"', '"ms"'),
-         ["its clock goes on by 1000 s in each second by its counter", 'with unit = "us" the two agree']),
-        (VELOCITY, VELOCITY.replace("1e-5", "-1e-5"),
-         ["velocity is negative where the angle grows", "turn the sign of map.drive.servo.read.velocity.scale"]),
-        (VELOCITY, VELOCITY.replace('"rad/s"', '"deg/s"'),
-         ["velocity is 0.01", "times the rate of change", 'with unit = "rad/s" the two agree']),
-        (TEMPERATURE, TEMPERATURE.replace("0.1", "10.0"), ["temperature reads 2400 °C, expected -20 to 150 °C"]),
-        (FORCE_Y, FORCE_Y.replace("unit", "offset = 60.0, unit"),
-         ["force_y is 6", "N with nobody in the machine, expected within ±20 N", "tare the sensor"]),
+        (
+            ANGLE,
+            ANGLE.replace("scale", 'word_order = "little", scale'),
+            [
+                "angle reads",
+                'with word_order = "big" it would be',
+                "correct map.drive.servo.read.angle",
+            ],
+        ),
+        (
+            FORCE_Y,
+            FORCE_Y.replace("unit", 'word_order = "little", unit'),
+            [
+                "force_y reads",
+                'with word_order = "big" it would be',
+                "correct map.sensor.force.read.force_y",
+            ],
+        ),
+        (
+            FORCE_Y,
+            FORCE_Y.replace("float32", "int32"),
+            ["force_y reads", 'with type = "float32" it would be'],
+        ),
+        (
+            TIME,
+            TIME.replace('"us"', '"ms"'),
+            [
+                "its clock goes on by 1000 s in each second by its counter",
+                'with unit = "us" the two agree',
+            ],
+        ),
+        (
+            VELOCITY,
+            VELOCITY.replace("1e-5", "-1e-5"),
+            [
+                "velocity is negative where the angle grows",
+                "turn the sign of map.drive.servo.read.velocity.scale",
+            ],
+        ),
+        (
+            VELOCITY,
+            VELOCITY.replace('"rad/s"', '"deg/s"'),
+            ["velocity is 0.01", "times the rate of change", 'with unit = "rad/s" the two agree'],
+        ),
+        (
+            TEMPERATURE,
+            TEMPERATURE.replace("0.1", "10.0"),
+            ["temperature reads 2400 °C, expected -20 to 150 °C"],
+        ),
+        (
+            FORCE_Y,
+            FORCE_Y.replace("unit", "offset = 60.0, unit"),
+            [
+                "force_y is 6",
+                "N with nobody in the machine, expected within ±20 N",
+                "tare the sensor",
+            ],
+        ),
     ],
-    ids=["word order", "word order of a float", "type", "unit of time", "sign", "unit of velocity", "hot", "offset"],
-)  # fmt: skip
+    ids=[
+        "word order",
+        "word order of a float",
+        "type",
+        "unit of time",
+        "sign",
+        "unit of velocity",
+        "hot",
+        "offset",
+    ],
+)
 def test_a_register_described_wrongly_is_found_by_what_it_reads(checked, was, believed, words):
     said = told(checked(believed={was: believed}))
     assert [word for word in words if word not in said] == [], said
@@ -188,7 +240,10 @@ EVERY = 'map = "force"\n'
 def test_sensors_that_are_hardly_ever_due_are_judged_by_what_they_told_alone(checked, shipped):
     report = checked(shipped, served={EVERY: f"{EVERY}every = 1000\n"})
     assert [finding for finding in report.findings if finding.device.startswith("sensor")] == []
-    seldom = "rig: sensor[0].every: found 1000, which is 25 s at 40 Hz; expected a force at least every 10 s"
+    seldom = (
+        "rig: sensor[0].every: found 1000, which is 25 s at 40 Hz; expected a force at least every"
+        " 10 s"
+    )
     assert (seldom in told(report)) == (shipped == "real_time")
 
 

@@ -50,8 +50,8 @@ def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first
         # There is no rig to connect to.
         acquire(path, settings, excitation, tmp_path / "test.parquet")
     assert str(caught.value).endswith(
-        f"another exoid (process {os.getpid()}) uses the devices there; wait for it to end, or end it; nothing "
-        "was moved"
+        f"another exoid (process {os.getpid()}) uses the devices there; wait for it to end, or end"
+        " it; nothing was moved"
     )
     assert not list(tmp_path.glob("*.journal"))
 

@@ -25,7 +25,6 @@ from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
 from pipelines.settings.rig import SafetySettings, load_rig
-
 from tests.acquisition.conftest import free_port
 
 TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")
@@ -40,11 +39,30 @@ def certificates(tmp_path_factory):
     folder = tmp_path_factory.mktemp("certificates")
     for name in ("own", "other"):
         subprocess.run(
-            ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2",
-             "-subj", f"/CN={name}", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", f"{name}.key", "-out",
-             f"{name}.pem"],
-            cwd=folder, check=True, capture_output=True,
-        )  # fmt: skip
+            [
+                "openssl",
+                "req",
+                "-x509",
+                "-newkey",
+                "ec",
+                "-pkeyopt",
+                "ec_paramgen_curve:P-256",
+                "-nodes",
+                "-days",
+                "2",
+                "-subj",
+                f"/CN={name}",
+                "-addext",
+                "subjectAltName=IP:127.0.0.1",
+                "-keyout",
+                f"{name}.key",
+                "-out",
+                f"{name}.pem",
+            ],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+        )
     locked = [
         "openssl",
         "pkey",
@@ -141,7 +159,9 @@ def test_devices_can_be_on_several_lines_of_different_kinds(line_of, on_line, re
         replace={
             'unit = 2\nmap = "servo"\n': 'unit = 2\nline = "knee"\nmap = "servo"\n',
             'unit = 13\nmap = "force"\n': 'unit = 13\nline = "cuffs"\nmap = "force"\n',
-            "[map.drive.servo]\n": f"[line.knee]\n{serial_line}\n[line.cuffs]\n{gateway}\n[map.drive.servo]\n",
+            "[map.drive.servo]\n": (
+                f"[line.knee]\n{serial_line}\n[line.cuffs]\n{gateway}\n[map.drive.servo]\n"
+            ),
         },
     )
     # The two that are on lines are nowhere else.
@@ -221,10 +241,13 @@ def test_a_lost_line_is_one_error_that_names_it_and_all_who_are_on_it(
         waited, answers = on(path, ask)
     place = load_rig(path).line["leg"].place
     told = {str(answer) for answer in answers}
-    devices = "drive hip (unit 1), drive knee (unit 2), sensor thigh_front (unit 11), sensor thigh_back (unit 12), "
+    devices = (
+        "drive hip (unit 1), drive knee (unit 2), sensor thigh_front (unit 11), sensor thigh_back"
+        " (unit 12), "
+    )
     assert told == {
-        f"line leg ({place}): the line is lost, and with it {devices}sensor shank_front (unit 13), sensor shank_back "
-        "(unit 14); check cable and power"
+        f"line leg ({place}): the line is lost, and with it {devices}sensor shank_front (unit 13),"
+        " sensor shank_back (unit 14); check cable and power"
     }
     assert waited < 10.0  # it is not waited for an answer that cannot come
 
@@ -275,8 +298,10 @@ def test_a_serial_port_that_is_not_there_is_named_with_those_that_are(on_line, l
 def test_a_serial_port_that_another_program_uses_is_not_shared(serve, on_line, line_of, tmp_path):
     path = on_line(line_of("rtu"))
     with serve(path, None), serial.Serial(str(tmp_path / "port"), exclusive=True):
-        assert connecting(path) == (
-            f"line leg ({tmp_path}/port): the serial port is busy; end the other program that uses it"
+        assert (
+            connecting(path)
+            == f"line leg ({tmp_path}/port): the serial port is busy; end the other program that"
+            " uses it"
         )
 
 
@@ -324,15 +349,33 @@ def test_a_certificate_out_of_its_time_is_told_as_that(
 ):
     stamp = [f"{datetime.now(UTC) + timedelta(days=days + more):%Y%m%d%H%M%SZ}" for more in (0, 1)]
     (tmp_path / "ca.cnf").write_text(
-        "[ca]\ndefault_ca = c\n[c]\ndatabase = index\nserial = serial\nnew_certs_dir = .\ndefault_md = sha256\n"
-        "policy = any\nx509_extensions = x\n[any]\ncommonName = optional\n[x]\nsubjectAltName = IP:127.0.0.1\n"
+        "[ca]\ndefault_ca = c\n[c]\ndatabase = index\nserial = serial\nnew_certs_dir ="
+        " .\ndefault_md = sha256\npolicy = any\nx509_extensions = x\n[any]\ncommonName ="
+        " optional\n[x]\nsubjectAltName = IP:127.0.0.1\n"
     )
     (tmp_path / "index").touch()
     (tmp_path / "serial").write_text("01\n")
     key = str(certificates / "own.key")
     requested = ["openssl", "req", "-new", "-key", key, "-subj", "/CN=own", "-out", "own.csr"]
-    signed = ["openssl", "ca", "-batch", "-config", "ca.cnf", "-selfsign", "-keyfile", key, "-in", "own.csr",
-              "-startdate", stamp[0], "-enddate", stamp[1], "-notext", "-out", "timed.pem"]  # fmt: skip
+    signed = [
+        "openssl",
+        "ca",
+        "-batch",
+        "-config",
+        "ca.cnf",
+        "-selfsign",
+        "-keyfile",
+        key,
+        "-in",
+        "own.csr",
+        "-startdate",
+        stamp[0],
+        "-enddate",
+        stamp[1],
+        "-notext",
+        "-out",
+        "timed.pem",
+    ]
     for command in (requested, signed):
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     timed = {kind: str(tmp_path / "timed.pem") for kind in ("ca", "rig_certificate")}
@@ -353,7 +396,8 @@ def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(
         nobody.write_text(re.sub(pattern, shown, path.read_text(), flags=re.MULTILINE))
         why = connecting(nobody)
     assert re.match(
-        r"line leg .*: (the other end closed the line before its first answer, .*does not trust|no )",
+        r"line leg .*: (the other end closed the line before its first answer, .*does not"
+        r" trust|no )",
         why,
     )
     assert "certificate and key" in why
@@ -437,9 +481,11 @@ def test_a_line_too_slow_for_the_rate_is_refused_before_anything_moves(on_line, 
     # 52 + 52 characters of two exchanges and 17 of a look at the counter, 10 bits each, and 6 times
     # 4 ms of silence.
     assert 1 / (121 * 10 / 9600 + 0.024) == pytest.approx(6.7, abs=0.05)
-    assert str(caught.value) == (
-        f"{path}: line leg ({path.with_name('port')}): 200 samples a second are asked for, at most 6 fit through; "
-        "raise baud_rate, give devices lines of their own, or lower acquire.sample_rate_hz"
+    assert (
+        str(caught.value)
+        == f"{path}: line leg ({path.with_name('port')}): 200 samples a second are asked for, at"
+        " most 6 fit through; raise baud_rate, give devices lines of their own, or lower"
+        " acquire.sample_rate_hz"
     )
     assert touched == []
 

@@ -74,7 +74,10 @@ def test_sensors_on_a_line_take_their_share_of_every_sample_that_reads_them(rig_
 
 def test_what_drives_record_themselves_takes_its_share_of_a_line(rig_file):
     def highest(baud_rate, **changes):
-        table = f'[line.leg]\ntransport = "rtu"\nserial_port = "x"\nbaud_rate = {baud_rate}\nsilence_s = 0.0002\n'
+        table = (
+            f'[line.leg]\ntransport = "rtu"\nserial_port = "x"\nbaud_rate = {baud_rate}\nsilence_s'
+            " = 0.0002\n"
+        )
         on_it = {
             'map = "servo"': 'map = "servo"\nline = "leg"',
             "[map.drive.servo]\n": table + "[map.drive.servo]\n",

@@ -193,14 +193,34 @@ def test_a_queue_of_short_reads_is_emptied_at_twenty_samples_a_set_point():
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("capacity = 2048", "capacity = 2000", "an unsigned counter whose range is a multiple of the capacity"),
+        (
+            "capacity = 2048",
+            "capacity = 2000",
+            "an unsigned counter whose range is a multiple of the capacity",
+        ),
         ("capacity = 2048", "capacity = 16384", "such a ring ends beyond address 65535; lower it"),
-        ("words = 10", "words = 9", "words: found 9, but the record's registers take 10; correct one"),
-        ("newest = { address = 120", "newest = { address = 1010", "newest: register 1010 is part of the ring itself"),
-        ("capacity = 2048", "fifo = 50", "expected newest, address and capacity (a ring that FC03 reads), or fifo"),
-        ("record_rate_hz = 1000.0", "", "record_rate_hz: missing; sampling = \"recorder\" needs the rate"),
+        (
+            "words = 10",
+            "words = 9",
+            "words: found 9, but the record's registers take 10; correct one",
+        ),
+        (
+            "newest = { address = 120",
+            "newest = { address = 1010",
+            "newest: register 1010 is part of the ring itself",
+        ),
+        (
+            "capacity = 2048",
+            "fifo = 50",
+            "expected newest, address and capacity (a ring that FC03 reads), or fifo",
+        ),
+        (
+            "record_rate_hz = 1000.0",
+            "",
+            'record_rate_hz: missing; sampling = "recorder" needs the rate',
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_ring_that_cannot_be_is_refused_with_its_key(rig_file, old, new, words):
     with pytest.raises(SettingsError) as caught:
         load_rig(rig_file("recorder", replace={old: new}))

@@ -57,11 +57,15 @@ def test_a_lost_reply_leaves_its_drive_without_a_set_point_for_as_long_as_is_sta
 
 @pytest.mark.parametrize(
     ("table", "devices", "with_sensors", "waits"),
-    [(TCP, ("unit = 1\n", "unit = 2\n"), False, [2, 2]), (TCP, ("unit = 1\n",), False, [1, 1]),
-     (RTU, ("unit = 1\n",), False, [2, 1]), (TCP, ("unit = 2\n", "unit = 12\n"), False, [1, 1]),
-     (TCP, ("unit = 2\n", "unit = 12\n"), True, [1, 2])],
-)  # fmt: skip
-def test_a_drive_is_left_alone_for_twice_as_long_on_a_line_that_it_shares_or_where_replies_look_alike(
+    [
+        (TCP, ("unit = 1\n", "unit = 2\n"), False, [2, 2]),
+        (TCP, ("unit = 1\n",), False, [1, 1]),
+        (RTU, ("unit = 1\n",), False, [2, 1]),
+        (TCP, ("unit = 2\n", "unit = 12\n"), False, [1, 1]),
+        (TCP, ("unit = 2\n", "unit = 12\n"), True, [1, 2]),
+    ],
+)
+def test_a_drive_on_a_shared_line_or_with_replies_that_look_alike_is_silent_twice_as_long(
     with_line, table, devices, with_sensors, waits
 ):
     rig = load_rig(with_line(table, *devices))
@@ -78,10 +82,12 @@ def test_a_drive_that_would_let_go_after_a_lost_reply_is_refused_before_anything
     run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
     with pytest.raises(SettingsError) as caught:
         acquire(path, run, excitation, tmp_path / "test.parquet")
-    assert str(caught.value) == (
-        f"{path}: plant.heartbeat_s: found 0.5, expected more than 0.61 s: for so long one lost reply leaves drive hip "
-        "(127.0.0.1:502, unit 1) without a set-point (2 x reply_s of 0.3 s, and two samples), and its own watchdog "
-        "would let go of the leg; lower safety.reply_s, or raise the time-out in the drive"
+    assert (
+        str(caught.value)
+        == f"{path}: plant.heartbeat_s: found 0.5, expected more than 0.61 s: for so long one lost"
+        " reply leaves drive hip (127.0.0.1:502, unit 1) without a set-point (2 x reply_s of"
+        " 0.3 s, and two samples), and its own watchdog would let go of the leg; lower"
+        " safety.reply_s, or raise the time-out in the drive"
     )
 
 
@@ -119,8 +125,9 @@ def test_a_watchdog_that_would_bite_between_two_samples_is_refused_before_anythi
     run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
     with pytest.raises(SettingsError) as refused:
         acquire(path, run, excitation, path.with_name("test.parquet"), 200.0)
-    assert str(refused.value) == (
-        f"{path}: safety.watchdog_s: found 0.01, expected at least 0.015, 3 samples at 200 Hz, or it stops every run; "
-        "raise it"
+    assert (
+        str(refused.value)
+        == f"{path}: safety.watchdog_s: found 0.01, expected at least 0.015, 3 samples at 200 Hz,"
+        " or it stops every run; raise it"
     )
     assert "watchdog_s: found 0.01" in str([*unfit(load_rig(path), 200.0)])

@@ -26,9 +26,16 @@ def slowly(record):
 
         with pytest.raises(DeviceError) as refused:
             record(
-                shipped="real_time", run=run, rate_hz=RATE_HZ, replace=AT_RATE, fault=slow, served_as=seen,
-                torque_nm=1e4, cuff_force_n=1e4, speed_rad_s=50.0,
-            )  # fmt: skip
+                shipped="real_time",
+                run=run,
+                rate_hz=RATE_HZ,
+                replace=AT_RATE,
+                fault=slow,
+                served_as=seen,
+                torque_nm=1e4,
+                cuff_force_n=1e4,
+                speed_rad_s=50.0,
+            )
         return str(refused.value), told
 
     return run
@@ -37,8 +44,8 @@ def slowly(record):
 def test_a_rate_that_drives_are_too_slow_for_is_refused_before_any_is_told_anything(slowly):
     why, told = slowly(0.011, "drives", "exo_alone")
     assert (
-        "cycles in which every device was asked took longer than the 20 ms from one set-point to the next"
-        in why
+        "cycles in which every device was asked took longer than the 20 ms from one set-point to"
+        " the next" in why
     )
     assert why.endswith(
         "lower acquire.sample_rate_hz, or close what else this computer does; nothing was moved"

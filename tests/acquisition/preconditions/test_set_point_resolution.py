@@ -22,9 +22,11 @@ def test_set_points_that_would_leap_a_count_are_refused_at_the_rate_at_which_the
     run = RunSettings(name="test", run="with_human", purpose="train", duration_s=1.0)
     with pytest.raises(SettingsError) as caught:
         acquire(path, run, excitation, tmp_path / "test.parquet", 200.0)
-    assert str(caught.value) == (
-        f"{path}: map.drive.servo.write.reference: one count is 0.00332 rad, expected at most 0.00275 rad, a quarter "
-        "of what the hip may move in a sample (2.2 rad/s at 200 Hz); correct its scale, or lower acquire.sample_rate_hz"
+    assert (
+        str(caught.value)
+        == f"{path}: map.drive.servo.write.reference: one count is 0.00332 rad, expected at most"
+        " 0.00275 rad, a quarter of what the hip may move in a sample (2.2 rad/s at 200 Hz);"
+        " correct its scale, or lower acquire.sample_rate_hz"
     )
 
 

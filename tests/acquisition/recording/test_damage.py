@@ -155,8 +155,10 @@ def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
     with pytest.raises(InputError) as refused:
         recover(written.path)
-    assert str(refused.value) == (
-        f"{written.path}: no sample in it can be read, it is damaged; nothing was changed; keep it, and check the disk"
+    assert (
+        str(refused.value)
+        == f"{written.path}: no sample in it can be read, it is damaged; nothing was changed; keep"
+        " it, and check the disk"
     )
     with pytest.raises(InputError, match=r"holds 0 samples .* or move it away, it is damaged"):
         refuse_leftover(written.path)
@@ -176,8 +178,10 @@ def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_an
         _recorded(output, lock, DeviceError, told, None)
     place = place_for(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
     left = "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
-    assert str(raised.value) == (
-        f"{told}; {left} the disk did not give back all that was written; check the disk, {written.path} is kept"
+    assert (
+        str(raised.value)
+        == f"{told}; {left} the disk did not give back all that was written; check the disk,"
+        f" {written.path} is kept"
     )
     assert place.exists() == (lost < 8)
     assert written.path.exists()

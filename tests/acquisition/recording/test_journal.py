@@ -151,9 +151,10 @@ def test_a_killed_runs_journal_is_not_recorded_over(tmp_path):
     fill(path, 100).close()
     with pytest.raises(InputError) as caught:
         refuse_leftover(path)
-    assert str(caught.value) == (
-        f"{path}: holds 100 samples of a run exo_alone that was killed; `exoid recover {path}` makes a recording of "
-        "them; or delete it"
+    assert (
+        str(caught.value)
+        == f"{path}: holds 100 samples of a run exo_alone that was killed; `exoid recover {path}`"
+        " makes a recording of them; or delete it"
     )
     assert len(read_journal(path)[0]) == 100
 

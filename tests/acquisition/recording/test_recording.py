@@ -27,8 +27,10 @@ from tests.acquisition.conftest import free_port
 
 LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
 QUEUE = {
-    'newest = { address = 120, type = "uint32" }\naddress = 1000\ncapacity = 2048\n': "fifo = 1000\n",
-}  # fmt: skip
+    'newest = { address = 120, type = "uint32" }\naddress = 1000\ncapacity = 2048\n': (
+        "fifo = 1000\n"
+    ),
+}
 
 
 @pytest.fixture
@@ -378,10 +380,12 @@ RING_ANGLE = 'angle = { address = 4, type = "int32", scale = 1e-6'
 
 @pytest.mark.parametrize(
     ("right", "wrong", "what"),
-    [(RING_CURRENT, RING_CURRENT.replace("1.0", "-1.0"), "torque"),
-     (RING_CURRENT, RING_CURRENT.replace("1.0", "0.5"), "torque"),
-     (RING_ANGLE, f"{RING_ANGLE}, offset = 0.05", "angle")],
-)  # fmt: skip
+    [
+        (RING_CURRENT, RING_CURRENT.replace("1.0", "-1.0"), "torque"),
+        (RING_CURRENT, RING_CURRENT.replace("1.0", "0.5"), "torque"),
+        (RING_ANGLE, f"{RING_ANGLE}, offset = 0.05", "angle"),
+    ],
+)
 def test_a_record_that_contradicts_the_exchanges_of_its_samples_ends_the_run(
     record, right, wrong, what
 ):

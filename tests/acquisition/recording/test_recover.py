@@ -22,8 +22,11 @@ COLUMNS = [
     "sequence",
 ]
 METADATA = {
-    "run": "exo_alone", "purpose": "train", "sample_rate_hz": RATE, "config": {"run": {"duration_s": 1.0}},
-}  # fmt: skip
+    "run": "exo_alone",
+    "purpose": "train",
+    "sample_rate_hz": RATE,
+    "config": {"run": {"duration_s": 1.0}},
+}
 
 
 def row(index):
@@ -108,8 +111,10 @@ def test_nothing_is_overwritten(killed, tmp_path):
     (tmp_path / "taken.parquet").write_text("a month of work")
     with pytest.raises(InputError) as caught:
         recover(killed, tmp_path / "taken.parquet")
-    assert str(caught.value) == (
-        f"{tmp_path / 'taken.parquet'}: is there already and is not overwritten; name another file with -o"
+    assert (
+        str(caught.value)
+        == f"{tmp_path / 'taken.parquet'}: is there already and is not overwritten; name another"
+        " file with -o"
     )
     (tmp_path / "one.aborted.parquet").write_text("another")
     assert recover(killed).path == tmp_path / "one.aborted-2.parquet"
@@ -119,8 +124,10 @@ def test_nothing_is_overwritten(killed, tmp_path):
 def test_a_recording_is_written_under_no_name_but_that_of_a_parquet_file(killed, tmp_path, name):
     with pytest.raises(InputError) as refused:
         recover(killed, tmp_path / name)
-    assert str(refused.value) == (
-        f"{tmp_path / name}: expected a name that ends in .parquet, which is what is written; name another"
+    assert (
+        str(refused.value)
+        == f"{tmp_path / name}: expected a name that ends in .parquet, which is what is written;"
+        " name another"
     )
     assert killed.exists()
     assert not (tmp_path / name).exists()
@@ -178,9 +185,17 @@ def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(
 
 @pytest.mark.parametrize(
     ("column", "value"),
-    [("time_s", 0.9), ("time_s", 0.1), ("time_s", np.nan), ("sequence", 7000), ("sequence", 2**40),
-     ("hip_angle_rad", np.nan), ("hip_angle_rad", 1e3), ("knee_torque_nm", np.inf)],
-)  # fmt: skip
+    [
+        ("time_s", 0.9),
+        ("time_s", 0.1),
+        ("time_s", np.nan),
+        ("sequence", 7000),
+        ("sequence", 2**40),
+        ("hip_angle_rad", np.nan),
+        ("hip_angle_rad", 1e3),
+        ("knee_torque_nm", np.inf),
+    ],
+)
 @pytest.mark.parametrize("at", [100, 119, 120])
 def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(
     tmp_path, column, value, at

@@ -86,14 +86,18 @@ def row(hip=None, knee=None, forces=None):
         ({"hip": {"angle": 1.8}}, "hip angle 1.800 rad is outside its limits -0.35 to 1.75 rad"),
         ({"knee": {"velocity": -3.6}}, "knee speed -3.600 rad/s is above its limit of 3.5 rad/s"),
         ({"hip": {"torque": -151.0}}, "hip torque -151.0 N·m is above its limit of 150 N·m"),
-        ({"forces": np.array([[np.nan] * 3, [0.0, -401.0, 0.0], [np.nan] * 3, [np.nan] * 3])},
-         "thigh_back force y -401 N is above the limit of 400 N"),
-        ({"forces": np.array([[np.nan] * 3, [0.0, 0.0, np.nan], [np.nan] * 3, [np.nan] * 3])},
-         "thigh_back force z nan N is above the limit of 400 N"),
+        (
+            {"forces": np.array([[np.nan] * 3, [0.0, -401.0, 0.0], [np.nan] * 3, [np.nan] * 3])},
+            "thigh_back force y -401 N is above the limit of 400 N",
+        ),
+        (
+            {"forces": np.array([[np.nan] * 3, [0.0, 0.0, np.nan], [np.nan] * 3, [np.nan] * 3])},
+            "thigh_back force z nan N is above the limit of 400 N",
+        ),
         ({"knee": {"angle": np.nan}}, "knee angle nan rad is outside its limits -2.1 to 0.35 rad"),
         ({"hip": {"torque": np.nan}}, "hip torque nan N·m is above its limit of 150 N·m"),
     ],
-)  # fmt: skip
+)
 def test_each_limit_is_watched_at_every_sample(rig_file, found, message):
     limits = Limits(load_rig(rig_file()), RATE)
     assert limits.violation(row()) is None
@@ -143,9 +147,9 @@ def test_an_exception_reply_ends_the_run_with_device_and_registers(stopped, tmp_
     why = stopped(fault=After(300, refuse_exchanges))
     assert "drive knee (127.0.0.1:" in why
     assert (
-        "unit 2): answered an exchange (writing registers 200 to 202, reading 100 to 113) with Modbus exception 4: "
-        "it failed; see the device's manual and its own display"
-    ) in why
+        "unit 2): answered an exchange (writing registers 200 to 202, reading 100 to 113) with"
+        " Modbus exception 4: it failed; see the device's manual and its own display" in why
+    )
     table = aborted(tmp_path)
     assert "Modbus exception 4" in table.metadata["abort"]
     assert 50 < len(table.frame) < 150
@@ -235,16 +239,16 @@ def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stoppe
     journal = journal_of(tmp_path / "test.parquet")
     assert why.startswith("watchdog: no new sample from drive hip")
     assert (
-        f"its samples are in {journal}, but could not be written as a recording: [Errno 28] No space left"
-        in why
+        f"its samples are in {journal}, but could not be written as a recording: [Errno 28] No"
+        " space left" in why
     )
     assert len(read_journal(journal)[0]) > 50
 
 
 def test_a_register_that_tells_no_number_ends_the_run_before_that_is_recorded(stopped, tmp_path):
     """A recording that holds an infinity could not be written."""
-    hot = {"temperature = { address = 112, type = \"int16\", scale = 0.1":
-           "temperature = { address = 114, type = \"float32\", scale = 1.0"}  # fmt: skip
+    was = 'temperature = { address = 112, type = "int16", scale = 0.1'
+    hot = {was: 'temperature = { address = 114, type = "float32", scale = 1.0'}
 
     def burn(device, function):
         shows(device, lambda true: replace(true, temperature=np.inf * true.temperature))
@@ -266,9 +270,11 @@ def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_tr
     monkeypatch.setattr(Limits, "cuff_violation", fails)
     why = stopped(raises=ExoidError)
     samples, log = len(aborted(tmp_path).frame), tmp_path / "test.aborted.log"
-    assert why == (
-        f"a fault of exoid's own (ZeroDivisionError('a bug')); please report it with {log}; the leg was stopped, "
-        f"its {samples} samples so far are in {tmp_path / 'test.aborted.parquet'}"
+    assert (
+        why
+        == f"a fault of exoid's own (ZeroDivisionError('a bug')); please report it with {log}; the"
+        f" leg was stopped, its {samples} samples so far are in"
+        f" {tmp_path / 'test.aborted.parquet'}"
     )
     assert 'raise ZeroDivisionError("a bug")' in log.read_text()
     assert (
@@ -285,8 +291,8 @@ def test_a_full_disk_stops_the_leg_and_is_told(stopped, monkeypatch):
     monkeypatch.setattr("pipelines.acquisition.recording.journal.Journal.flush", full)
     why = stopped(watchdog_s=0.5, duration_s=4.0)
     assert (
-        "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room, then"
-        in why
+        "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room,"
+        " then" in why
     )
 
 
@@ -344,7 +350,8 @@ def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(
     monkeypatch.setattr(Servo, "hear", remember)
     why = stopped(shipped="real_time", rate_hz=rate_hz)
     assert re.match(
-        rf"drive (hip|knee) .*: its sample counter goes up by (19\d|20\d)(\.\d)? a second, expected {rate_hz:g}; "
+        r"drive (hip|knee) .*: its sample counter goes up by (19\d|20\d)(\.\d)? a second, expected"
+        rf" {rate_hz:g}; "
         r"correct acquire.sample_rate_hz, or the rate that is set in the drive; nothing was moved",
         why,
     )
@@ -369,9 +376,11 @@ def shows(device, sample):
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
 @pytest.mark.parametrize(
     ("counter", "words"),
-    [(lambda count: 0 * count, "its sample counter went back from"),
-     (lambda count: count + 900, "its sample counter leapt from")],
-)  # fmt: skip
+    [
+        (lambda count: 0 * count, "its sample counter went back from"),
+        (lambda count: count + 900, "its sample counter leapt from"),
+    ],
+)
 def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows_it(
     stopped, shipped, counter, words
 ):
@@ -383,9 +392,15 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
         sent.extend([hip._told] if hip.enabled else [])
 
     why = stopped(
-        shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0, torque_nm=1000.0,
-        speed_rad_s=50.0, replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
-    )  # fmt: skip
+        shipped=shipped,
+        served_as=served,
+        fault=After(150, leap),
+        rate_hz=50.0,
+        duration_s=4.0,
+        torque_nm=1000.0,
+        speed_rad_s=50.0,
+        replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
+    )
     assert words in why
     # What the speed limit allows, and some missed samples.
     assert np.abs(np.diff(sent)).max() < 3.0 * 3 / 50
@@ -473,9 +488,10 @@ def test_a_leg_that_stands_outside_its_limits_is_not_moved(record):
     served = []
     with pytest.raises(DeviceError) as caught:
         record(served_as=served, replace={"angle_rad = [-2.1, 0.35]": "angle_rad = [-2.1, -0.2]"})
-    assert str(caught.value) == (
-        "the knee stands at 0.000 rad, outside its limits -2.1 to -0.2 rad; move the leg by hand, or check the "
-        "encoder's zero"
+    assert (
+        str(caught.value)
+        == "the knee stands at 0.000 rad, outside its limits -2.1 to -0.2 rad; move the leg by"
+        " hand, or check the encoder's zero"
     )
     assert served[0].rig.sample.sequence[0] == 0
 
@@ -494,7 +510,8 @@ def test_a_rig_that_is_not_there_is_named_with_its_address(record):
         record(believed={"unit = 2": 'unit = 2\nhost = "127.0.0.9"'})
     assert "drive knee (127.0.0.9:" in str(caught.value)
     assert str(caught.value).endswith(
-        "unit 2): refuses the connection; check that the rig is on, and host and port in the rig file"
+        "unit 2): refuses the connection; check that the rig is on, and host and port in the rig"
+        " file"
     )
 
 
@@ -533,14 +550,25 @@ WRITTEN = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "ra
 
 @pytest.mark.parametrize(
     ("written", "found"),
-    [(WRITTEN.replace("1e-6", "4e-6"), "scale: found 4e-06 rad with 1e-06 rad"),
-     (WRITTEN.replace('"rad"', '"deg"'), "unit: found deg with rad"),
-     (WRITTEN.replace("1e-6", "1e-4").replace('"rad"', '"deg"'), "scale: found 0.0001 deg with 1e-06 rad"),
-     (WRITTEN.replace("unit", "offset = 0.05, unit"), "offset: found 0.05 rad with 0 rad"),
-     (WRITTEN.replace("unit", 'word_order = "little", unit'), "word_order: found little with big"),
-     (WRITTEN.replace("unit", 'byte_order = "little", unit'), "byte_order: found little with big"),
-     (WRITTEN.replace('"int32", scale = 1e-6', '"float32"'), "type: found float32 with int32")],
-)  # fmt: skip
+    [
+        (WRITTEN.replace("1e-6", "4e-6"), "scale: found 4e-06 rad with 1e-06 rad"),
+        (WRITTEN.replace('"rad"', '"deg"'), "unit: found deg with rad"),
+        (
+            WRITTEN.replace("1e-6", "1e-4").replace('"rad"', '"deg"'),
+            "scale: found 0.0001 deg with 1e-06 rad",
+        ),
+        (WRITTEN.replace("unit", "offset = 0.05, unit"), "offset: found 0.05 rad with 0 rad"),
+        (
+            WRITTEN.replace("unit", 'word_order = "little", unit'),
+            "word_order: found little with big",
+        ),
+        (
+            WRITTEN.replace("unit", 'byte_order = "little", unit'),
+            "byte_order: found little with big",
+        ),
+        (WRITTEN.replace('"int32", scale = 1e-6', '"float32"'), "type: found float32 with int32"),
+    ],
+)
 def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_unless_that_is_meant(
     rig_file, written, found
 ):

@@ -31,7 +31,10 @@ def judged(recorded_torque, exchanged_torque=lambda k: 10.0 * np.sin(0.1 * k), c
 def test_a_record_of_currents_of_another_sign_or_scale_ends_the_run(factor):
     with pytest.raises(
         DeviceError,
-        match=r"drive hip.*: tells torque .* N·m of sample 49, while its own record holds .*record\.current",
+        match=(
+            r"drive hip.*: tells torque .* N·m of sample 49, while its own record holds"
+            r" .*record\.current"
+        ),
     ):
         judged(lambda k: factor * 10.0 * np.sin(0.1 * k))
 

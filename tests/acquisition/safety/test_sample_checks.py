@@ -84,9 +84,12 @@ REGISTERS = "check the encoder, or the "
 
 @pytest.mark.parametrize(
     ("after", "when", "damage"),
-    [(0, "before it", {"angle": 0.9}), (35, "0.035 s before it", {"angle": 0.7}),
-     (35, "0.035 s before it", {"velocity": -2.0})],
-)  # fmt: skip
+    [
+        (0, "before it", {"angle": 0.9}),
+        (35, "0.035 s before it", {"angle": 0.7}),
+        (35, "0.035 s before it", {"velocity": -2.0}),
+    ],
+)
 def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(
     hip, after, when, damage
 ):
@@ -95,11 +98,14 @@ def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(
     take(hip, *(moved(number) for number in range(again, again + after)))
     with pytest.raises(DeviceError) as raised:
         take(hip, replace(moved(again + after), **damage))
-    told = f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
+    told = (
+        f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers"
+        " are lost or late, or "
+    )
     assert f"{told}make the motion slower; else {REGISTERS}" in str(raised.value)
 
 
-def test_a_limit_that_is_broken_after_set_points_were_left_out_is_told_with_them_though_no_sample_is_missing(
+def test_a_limit_broken_after_set_points_were_left_out_is_reported_with_them(
     hip,
 ):
     swing(hip, BEGINS + 400)

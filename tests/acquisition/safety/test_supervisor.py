@@ -191,7 +191,7 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where
 
 
 @pytest.mark.parametrize("on_by", [0, 1])
-def test_a_drive_that_went_on_with_the_plan_through_a_silence_is_led_on_though_it_is_asked_a_sample_later(
+def test_a_drive_that_followed_the_plan_through_a_silence_is_led_on_a_sample_later(
     supervisor, on_by
 ):
     path = np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0]
@@ -368,9 +368,12 @@ def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_i
 
 @pytest.mark.parametrize(
     ("kind", "what", "words"),
-    [("counter", 7, "its sample counter leapt"), ("counter", -7, "its sample counter went back"),
-     ("freeze", None, "its sample counter stands still")],
-)  # fmt: skip
+    [
+        ("counter", 7, "its sample counter leapt"),
+        ("counter", -7, "its sample counter went back"),
+        ("freeze", None, "its sample counter stands still"),
+    ],
+)
 @pytest.mark.parametrize("joint", [0, 1])
 def test_of_two_counters_that_part_the_one_that_did_it_is_named(tmp_path, kind, what, words, joint):
     run = RunSettings(name="x", run="exo_alone", purpose="train", duration_s=0.5)

@@ -47,8 +47,11 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
     or ``tone``."""
     j = d.baseline.joints.index(joint)
     variable = next((v for v in VARIABLES if v.name == name), None)
-    chosen = [i for i, run in enumerate(d.validate)
-              if run.motion.run in kinds and (variable is None or knows(variable, [run], j))]  # fmt: skip
+    chosen = [
+        i
+        for i, run in enumerate(d.validate)
+        if run.motion.run in kinds and (variable is None or knows(variable, [run], j))
+    ]
     runs = [d.validate[i] for i in chosen]
     before, after = ([e.residuals[i][:, j] for i in chosen] for e in (d.before, d.after))
     if variable is None:
@@ -56,7 +59,10 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
             runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j
         )
     else:
-        label = f"{_title(variable, d.baseline.joints, j)}, {unit_at(d.baseline.machine.joints[j].kind, variable.unit)}"
+        label = (
+            f"{_title(variable, d.baseline.joints, j)},"
+            f" {unit_at(d.baseline.machine.joints[j].kind, variable.unit)}"
+        )
         x = [np.asarray(variable.of(run, j)) for run in runs]
     return Against(
         label=label,

@@ -46,8 +46,9 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         axis.legend(
             [Patch(color=colours[key]) for key in shares],
             [_line(words_of(key, d), share, total, units[joint]) for key, share in shares.items()],
-            loc="center left", bbox_to_anchor=(1.01, 0.5),
-        )  # fmt: skip
+            loc="center left",
+            bbox_to_anchor=(1.01, 0.5),
+        )
     last = d.baseline.machine.joints[-1]
     axes[-1, 0].set_xlabel(
         f"mean square of the {last.effort} error on runs no fit has seen, ({last.unit('torque')})²"
@@ -85,9 +86,14 @@ def stack(
         axis.barh(row, width, left=start, color=colours[key], height=0.7, edgecolor="white", lw=0.5)
         if abs(width) > ROOM * whole:
             axis.text(
-                start + 0.5 * width, row, rms(share), ha="center", va="center", fontsize=8,
+                start + 0.5 * width,
+                row,
+                rms(share),
+                ha="center",
+                va="center",
+                fontsize=8,
                 color="black" if key in (FLOOR, WANDERS) else "white",
-            )  # fmt: skip
+            )
         right, left = (right + width, left) if width >= 0 else (right, left + width)
     axis.grid(axis="y", visible=False)
 
@@ -116,5 +122,8 @@ def _line(words: str, share: float, total: float, unit: str) -> str:
     if abs(share) < NEGLIGIBLE * total:
         return f"{words}: none"
     if share < 0:
-        return f"{words}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the square"
+        return (
+            f"{words}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the"
+            " square"
+        )
     return f"{words}: {rms(share)} {unit} rms, {share / total:.0%} of the square"

@@ -20,16 +20,26 @@ from pipelines.wording.label import label_in_words
 from pipelines.wording.law import LAW
 
 COLOURS = {
-    "noise": NOISE, "wanders": WANDERS, "between_runs": "#5b87e5", "repeats": BLUE, "unsplit": GREY,
-}  # fmt: skip
+    "noise": NOISE,
+    "wanders": WANDERS,
+    "between_runs": "#5b87e5",
+    "repeats": BLUE,
+    "unsplit": GREY,
+}
 """Of the residual's parts: the more of it a model could explain, the darker."""
 DARK = ("repeats", "unsplit", "between_runs")
 """Parts on which numbers are white."""
 ORDER = ("noise", "wanders", "between_runs", "unsplit", "repeats")
 FAMILIES = {
-    "person": "#3b0764", "transmission": "#7c2d12", "angle": "#7e22ce", "speed": "#0f766e",
-    "load": "#ea580c", "reversal": "#65a30d", "sensor": "#f59e0b", "time": "#fde68a",
-}  # fmt: skip
+    "person": "#3b0764",
+    "transmission": "#7c2d12",
+    "angle": "#7e22ce",
+    "speed": "#0f766e",
+    "load": "#ea580c",
+    "reversal": "#65a30d",
+    "sensor": "#f59e0b",
+    "time": "#fde68a",
+}
 """Of each family of laws, by rising lightness, so that they differ in grey too."""
 UNLISTED = "////"
 """Hatching of a law that nobody listed."""
@@ -87,9 +97,15 @@ def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
             person = min(told["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
             if person > NEGLIGIBLE:
                 axis.barh(
-                    row, person, left=start - person, height=0.6, fill=False, hatch="..",
-                    edgecolor="white", lw=0,
-                )  # fmt: skip
+                    row,
+                    person,
+                    left=start - person,
+                    height=0.6,
+                    fill=False,
+                    hatch="..",
+                    edgecolor="white",
+                    lw=0,
+                )
                 seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
     units = {joint: of["torque"] for joint, of in said["units"].items()}
     names = [f"{j}\n{router[j]['rms_nm']:.3g} {units[j]} rms" for j in router]
@@ -101,18 +117,28 @@ def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
     axis.set_xlabel(f"share of the mean square, 0.1 s averages, {searched_runs(said)}", fontsize=8)
     words = [one for one in (*map(PARTS.get, ORDER), PERSON) if one in seen]
     axis.legend(
-        [seen[one] for one in words], words, loc="upper left", bbox_to_anchor=(-0.02, -0.32),
-        fontsize=8, ncols=2,
-    )  # fmt: skip
+        [seen[one] for one in words],
+        words,
+        loc="upper left",
+        bbox_to_anchor=(-0.02, -0.32),
+        fontsize=8,
+        ncols=2,
+    )
     _title(axis, "Does the error of rigid body and friction repeat?")
 
 
 def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None:
     axis.text(
-        start + 0.5 * share, row, f"{share:.0%}", ha="center", va="center", fontsize=8,
-        color="white" if part in DARK else "black", zorder=3,
+        start + 0.5 * share,
+        row,
+        f"{share:.0%}",
+        ha="center",
+        va="center",
+        fontsize=8,
+        color="white" if part in DARK else "black",
+        zorder=3,
         bbox={"facecolor": COLOURS[part], "edgecolor": "none", "pad": 1},
-    )  # fmt: skip
+    )
 
 
 def _dependence(axis: Axes, said: Mapping[str, Any]) -> None:
@@ -211,9 +237,14 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
             height = 1.3 + words.count("\n")
             colour = FAMILIES.get(str(family), GREY)
             axis.barh(
-                top + 0.5 * height, bar.probability, height=height, color=colour,
-                hatch=UNLISTED if unlisted else None, edgecolor="white", lw=0.8,
-            )  # fmt: skip
+                top + 0.5 * height,
+                bar.probability,
+                height=height,
+                color=colour,
+                hatch=UNLISTED if unlisted else None,
+                edgecolor="white",
+                lw=0.8,
+            )
             ticks.append((top + 0.5 * height, words, named))
             if family:
                 families[family] = Patch(color=colour)
@@ -233,9 +264,13 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     if any(unlisted for bar in bars for _, _, unlisted, _ in bar.elements):
         families["unlisted law"] = Patch(facecolor=GREY, hatch=UNLISTED, edgecolor="white")
     axis.legend(
-        families.values(), families.keys(), loc="upper left", bbox_to_anchor=(-0.02, -0.14),
-        fontsize=8, ncols=4,
-    )  # fmt: skip
+        families.values(),
+        families.keys(),
+        loc="upper left",
+        bbox_to_anchor=(-0.02, -0.14),
+        fontsize=8,
+        ncols=4,
+    )
 
 
 def _title(axis: Axes, words: str) -> None:

@@ -14,7 +14,10 @@ SHOWN = ("angle", "speed", "load", "time", "phase")
 """Always; another variable only where it predicts something."""
 SOMETHING, MOST = 0.05, 6
 """Share from which a variable predicts something, and most variables beside the phase."""
-EXPLAINED = "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward, or another run."
+EXPLAINED = (
+    "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward,"
+    " or another run."
+)
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
@@ -42,8 +45,10 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
     drawn.suptitle(
         "What the torque error depends on, most first; the phase of the period last",
-        x=0.01, ha="left", fontweight="bold",
-    )  # fmt: skip
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
     drawn.text(0.01, 0.925, EXPLAINED, fontsize=8.5, va="top")
     drawn.tight_layout(rect=(0, 0, 1, 0.94))
     return drawn

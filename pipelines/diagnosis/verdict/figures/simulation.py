@@ -70,12 +70,20 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for row, label in zip(axes, words, strict=True):
         row[0].set_ylabel(label)
     lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
-    drawn.legend([h for some, _ in lines for h in some], [w for _, some in lines for w in some],
-                 loc="upper left", bbox_to_anchor=(0.01, 0.965), ncols=4)  # fmt: skip
+    drawn.legend(
+        [h for some, _ in lines for h in some],
+        [w for _, some in lines for w in some],
+        loc="upper left",
+        bbox_to_anchor=(0.01, 0.965),
+        ncols=4,
+    )
     drawn.suptitle(
-        f"Simulated and measured where the baseline is furthest off ({d.validate[stretch.run].motion.file})",
-        x=0.02, ha="left", fontweight="bold",
-    )  # fmt: skip
+        "Simulated and measured where the baseline is furthest off"
+        f" ({d.validate[stretch.run].motion.file})",
+        x=0.02,
+        ha="left",
+        fontweight="bold",
+    )
     axes[0, 0].set_xlim(stretch.begin, stretch.end)
     drawn.align_ylabels()
     drawn.tight_layout(rect=(0, 0, 1, 0.96))

@@ -63,17 +63,26 @@ def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
         fontsize=9,
     )
     axis.set_ylim(len(budget) - 0.5, -0.5)
-    ends = [(lowest(shares) * 100 / totals[joint], highest(shares) * 100 / totals[joint])
-            for joint, shares in budget.items()]  # fmt: skip
+    ends = [
+        (lowest(shares) * 100 / totals[joint], highest(shares) * 100 / totals[joint])
+        for joint, shares in budget.items()
+    ]
     axis.set_xlim(min(low for low, _ in ends), max(high for _, high in ends))
     units = " and ".join(dict.fromkeys(of["torque"] for of in said["units"].values()))
     axis.set_xlabel(f"share of the mean square error, %; numbers: {units} rms")
-    there = [key for key in next(iter(budget.values()))
-             if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())]  # fmt: skip
+    there = [
+        key
+        for key in next(iter(budget.values()))
+        if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())
+    ]
     axis.legend(
-        [Patch(color=colours[key]) for key in there], [words_of(key, d) for key in there],
-        loc="upper left", bbox_to_anchor=(-0.02, -0.2), fontsize=8, ncols=2,
-    )  # fmt: skip
+        [Patch(color=colours[key]) for key in there],
+        [words_of(key, d) for key in there],
+        loc="upper left",
+        bbox_to_anchor=(-0.02, -0.2),
+        fontsize=8,
+        ncols=2,
+    )
 
 
 def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
@@ -103,8 +112,13 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [
         Patch(color=NOISE, alpha=0.5)
     ]
-    axis.legend(handles, [words for words, _ in lines] + ["noise floor"], loc="upper left",
-                bbox_to_anchor=(-0.02, -0.2), fontsize=8)  # fmt: skip
+    axis.legend(
+        handles,
+        [words for words, _ in lines] + ["noise floor"],
+        loc="upper left",
+        bbox_to_anchor=(-0.02, -0.2),
+        fontsize=8,
+    )
 
 
 def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
@@ -112,8 +126,11 @@ def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str
     most."""
     first = said["causes"][0]
     joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
-    runs = [(run, b - a) for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
-            if effect.explains(run.motion)]  # fmt: skip
+    runs = [
+        (run, b - a)
+        for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
+        if effect.explains(run.motion)
+    ]
     j = d.baseline.joints.index(joint)
     moved, by = [run for run, _ in runs], [change for _, change in runs]
     known = [v for v in VARIABLES if v.name != "phase" and knows(v, moved, j)]
