@@ -97,18 +97,19 @@ HELD = (
 - ``BEFORE_EVIDENCE``: they act before the evidence is stored.
 - ``base_rate``: the mixture of the sessions decides it.
 - ``model_error``: learning hardly tells it from twice as much, under which a second cause beside a
-large one is lost.
+  large one is lost.
 - ``lines``: learning tells no difference over a factor of thirty.
 - ``background_line``: good drives ripple by a percent of their torque. Too few sessions have such
   drives; learned alone it called their ripple missing.
 - ``each_run``: too few sessions have sensors that are tared anew at each start. It is of sessions
-that had more.
+  that had more.
 - ``look_alike``: learned from the verdicts of a blind examination, by ``python -m tests.learn
-look-alikes``.
+  look-alikes``.
 - The others decide what is reported of probabilities and errors, and whether all runs are searched.
 """
 
-LEARNED = """\ They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177
+LEARNED = """\
+They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177
 sessions whose evidence was stored by revision 1b85b45 (`python -m tests.learn fit --most 60`), they
 gave the truth of these a mean log probability of -1.29 instead of -1.48, and that of 356 others
 -1.56 instead of -1.57: they were left as they are. But `cause` is lower by ln(3/2): a cause chooses

@@ -18,7 +18,8 @@ from tests.learn.vector import from_vector, to_vector
 
 TITLE = "Worlds and forms left out"
 COLUMNS = ("left out", "learned from", "judged on", "learned without it", "as shipped")
-ABOUT = """\ Measured by `python -m tests.learn cross-validate --most {most}`. Each world is left
+ABOUT = """\
+Measured by `python -m tests.learn cross-validate --most {most}`. Each world is left
 out in turn, and so is each third of the forms that effects have in the worlds. The criteria are
 learned anew from the other sessions and judged on those left out. Each learned number starts at
 twice its shipped value, the prior's learned odds at zero. Numbers that are not learned, and the

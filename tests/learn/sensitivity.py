@@ -29,7 +29,8 @@ COLUMNS = (
     "right first, smaller",
     "right first, neutral",
 )
-ABOUT = """\ Measured by `make sensitivity` on {sessions} simulated sessions of seeds for tuning,
+ABOUT = """\
+Measured by `make sensitivity` on {sessions} simulated sessions of seeds for tuning,
 whose evidence was stored by revision {revisions}. As they stand the criteria give the truth a mean
 log probability of {score:.3f}, and the most probable set is the truth in {share:.1%}. The table has
 the changes of both where one number is multiplied by 1.3 (larger), divided by 1.3 (smaller), or set
