@@ -18,7 +18,7 @@ from exoid_cli.steps import AgainOption, only
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
-    from pipelines.acquisition.loop import Progress
+    from pipelines.acquisition.progress import Progress
     from pipelines.mechanics.trajectory import Trajectory
     from pipelines.settings import Experiment
     from pipelines.settings.rig import RigSettings

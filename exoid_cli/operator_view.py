@@ -16,7 +16,7 @@ from exoid_cli.big_word import HEIGHT, big
 from exoid_cli.canvas import Canvas
 
 if TYPE_CHECKING:
-    from pipelines.acquisition.loop import Progress
+    from pipelines.acquisition.progress import Progress
     from pipelines.settings.rig import RigSettings
 
 CUFFS = ("thigh front", "thigh back", "shank front", "shank back")

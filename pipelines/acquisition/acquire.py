@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
+from pipelines.acquisition.loop import Loop
 from pipelines.acquisition.machine.embedded_rig import embedded
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.sampling import sampling_of
@@ -27,11 +27,13 @@ from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded
 from pipelines.acquisition.preconditions.rehearsal import refuse_unkept_rate
 from pipelines.acquisition.preconditions.set_point_resolution import refuse_coarse_set_points
 from pipelines.acquisition.preconditions.set_point_scale import refuse_misplaced_set_points
+from pipelines.acquisition.progress import Progress, Report
 from pipelines.acquisition.recording.columns import columns_of
 from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
 from pipelines.acquisition.recording.recording import account_of, place_for, write_recording
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.states import State
+from pipelines.acquisition.uninterrupted import run_to_its_end
 from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.beside import journal_of
@@ -165,20 +167,20 @@ async def _record(
     machine = Machine(rig, with_sensors=with_human, samples_per_cycle=supervisor.samples_per_cycle)
     report(Progress(duration_s=run.duration_s))
     try:
-        supervisor.check()
+        supervisor.start_checks()
         start = await _ready(machine, supervisor.rate, reset_faults, stopped_by)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
-        supervisor.take(plan, start)
+        supervisor.load_plan(plan, start)
         if rig.clock == "real_time":
             await _heeding(refuse_unkept_rate(machine, supervisor.rate), stopped_by)
-        sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
+        sampling = sampling_of(machine, supervisor.rate, supervisor.check_records)
         await _heeding(machine.empty_records(), stopped_by)
         try:
             with _opened(path, ["time_s", *columns_of(machine)], metadata) as journal:
                 claim()
                 loop = Loop(machine, supervisor, sampling, plan, journal, report, stopped_by)
                 await loop.run()
-                journal.end(supervisor.why, loop.found())
+                journal.end(supervisor.why, loop.metadata())
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
             raise DeviceError(
                 f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes"

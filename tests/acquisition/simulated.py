@@ -11,15 +11,17 @@ from unittest.mock import patch
 
 from pymodbus.client.base import ModbusBaseClient
 
-from pipelines.acquisition import loop, pacing
+from pipelines.acquisition import exchange as exchanges
+from pipelines.acquisition import holding, loop, pacing, progress, stopping
 from pipelines.acquisition.acquire import _finish, _record
-from pipelines.acquisition.loop import Loop, run_to_its_end
+from pipelines.acquisition.loop import Loop
 from pipelines.acquisition.machine import drive, force_sensor, machine
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.recording import journal
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.states import State
+from pipelines.acquisition.uninterrupted import run_to_its_end
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import registers_of
@@ -461,9 +463,12 @@ def _patched(simulated, time, run, plan, own):
             run.followed_since = time.now
 
     with ExitStack() as stack:
-        for module in (drive, loop, machine, pacing, force_sensor):
+        timed = (drive, exchanges, force_sensor, holding, loop, machine, pacing, progress, stopping)
+        for module in timed:
             stack.enter_context(patch.object(module, "time", time))
-        stack.enter_context(patch("pipelines.acquisition.loop.exact_event_loop", lambda: time))
+        stack.enter_context(
+            patch("pipelines.acquisition.uninterrupted.exact_event_loop", lambda: time)
+        )
         # A line gives everybody their turn; every request then goes to the simulated rig.
         for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))

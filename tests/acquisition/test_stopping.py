@@ -61,14 +61,14 @@ def times(share):
 )
 def test_a_stop_lets_go_of_a_leg_that_is_pressed_or_does_not_follow(joint, found):
     supervisor = Supervisor(load_rig(datasets() / "rigs" / "real_time.toml"), 200.0)
-    supervisor.check()
-    supervisor.take(Plan(np.zeros((200, 2)), 50, 150), np.zeros(2))
+    supervisor.start_checks()
+    supervisor.load_plan(Plan(np.zeros((200, 2)), 50, 150), np.zeros(2))
     supervisor.abort(DeviceError("made up"))
     at_rest = Reading(0, 0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 0.0, enabled=True)
-    supervisor.feel(joint, at_rest)
-    assert supervisor.stop(joint, 10.0) == (0.0, True)
-    supervisor.feel(joint, Reading(**{**vars(at_rest), **found}))
-    assert supervisor.stop(joint, 10.1) is None
+    supervisor.safe_stop.check(joint, at_rest)
+    assert supervisor.safe_stop.set_point(joint, 10.0) == (0.0, True)
+    supervisor.safe_stop.check(joint, Reading(**{**vars(at_rest), **found}))
+    assert supervisor.safe_stop.set_point(joint, 10.1) is None
 
 
 @pytest.mark.parametrize("at", range(150, 162))

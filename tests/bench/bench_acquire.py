@@ -8,8 +8,8 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.loop import Progress
 from pipelines.acquisition.machine.embedded_rig import embedded
+from pipelines.acquisition.progress import Progress
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig

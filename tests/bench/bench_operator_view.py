@@ -13,7 +13,7 @@ from rich.console import Console as RichConsole
 from exoid_cli.console import Console
 from exoid_cli.operator_view import OperatorView
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.loop import Progress
+from pipelines.acquisition.progress import Progress
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig

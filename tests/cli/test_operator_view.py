@@ -12,9 +12,9 @@ from rich.console import Console
 from exoid_cli.big_word import big
 from exoid_cli.canvas import Canvas
 from exoid_cli.operator_view import Gauge, OperatorView, leg, plain_line
-from pipelines.acquisition.loop import Progress
 from pipelines.acquisition.machine.drive import Reading
 from pipelines.acquisition.machine.row import Row
+from pipelines.acquisition.progress import Progress
 from pipelines.acquisition.states import State
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig

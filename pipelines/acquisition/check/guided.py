@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.loop import Progress
+from pipelines.acquisition.progress import Progress
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings

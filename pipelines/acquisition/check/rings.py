@@ -9,9 +9,9 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.machine import Machine
-from pipelines.acquisition.safety.record_agreement import Agreement
-from pipelines.acquisition.safety.sample_checks import Stream
-from pipelines.acquisition.safety.stuck_register import Told
+from pipelines.acquisition.safety.record_agreement import RecordAgreement
+from pipelines.acquisition.safety.sample_stream import SampleStream
+from pipelines.acquisition.safety.set_point_history import SetPointHistory
 from pipelines.errors import DeviceError, ExoidError
 
 DRAINS = 40
@@ -52,14 +52,14 @@ async def _judged(
     machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float
 ) -> str | None:
     """Return what is wrong with one drive's record."""
-    told, begun = Told(), False
-    stream = Stream(machine.rig, j, cycle_hz, told)
-    agreement = Agreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
+    history, begun = SetPointHistory(), False
+    stream = SampleStream(machine.rig, j, cycle_hz, history)
+    agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
     await drive.empty_record()
     for _ in range(DRAINS):
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
-        agreement.tell(reading)
+        agreement.add(reading)
         try:
             found = await drive.drain(reading.sequence)
         except DeviceError as error:
@@ -68,9 +68,9 @@ async def _judged(
                 " manual"
             )
         for record in found:
-            told.tell(record.sequence, record.reference)  # nobody sends any
-            agreement.judge(record)
-            begun |= stream.take(record, time.monotonic())
+            history.add(record.sequence, record.reference)  # nobody sends any
+            agreement.check(record)
+            begun |= stream.check(record, time.monotonic())
         await asyncio.sleep(0.0 if drive.in_lockstep else 1.0 / cycle_hz)
     for probe in drives:
         probe.taken()

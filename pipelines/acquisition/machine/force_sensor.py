@@ -6,7 +6,7 @@ from math import inf
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.wraparound import Counter
-from pipelines.acquisition.safety.watchdog import Patience
+from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import RigSettings, SensorSettings, registers_of
@@ -26,7 +26,7 @@ class Sensor:
         self.device = Device(f"sensor {settings.cuff}", settings.unit, line, rig.safety)
         self.block = Block(registers_of(self.map.read))
         self._turn = rig.turn_of(settings)
-        self._patience = Patience(rig.safety.watchdog_s)
+        self._watchdog = Watchdog(rig.safety.watchdog_s)
         self._in_lockstep, self._reply_s = rig.clock == "lockstep", rig.safety.longest_reply_s
         self._counter = Counter(self.block.span("sequence"))
         self._first: tuple[float, float] | None = None
@@ -49,18 +49,18 @@ class Sensor:
         DeviceError
             It has not answered for too long; never Unanswered, which is survived.
         """
-        self._patience.waited(time.monotonic())
+        self._watchdog.waited(time.monotonic())
         try:
             told = self.block.decode(
                 await self.device.read(self.block.address, self.block.count, in_motion=True)
             )
         except Unanswered as error:
-            if self._patience.is_over(time.monotonic()):
+            if self._watchdog.has_expired(time.monotonic()):
                 raise DeviceError(str(error)) from error
             self._owes = not self.device.line.tells_replies_apart
             return None
         now = time.monotonic()
-        self._patience.hear(now)
+        self._watchdog.reset(now)
         owed, self._owes = self._owes, False
         if owed or not self._goes_on(self._counter(told["sequence"]), now):
             return None

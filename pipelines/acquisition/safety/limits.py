@@ -1,4 +1,4 @@
-"""What may be measured, what may be sent, and how set-points slow down."""
+"""The limits of what may be measured and sent, and how set-points slow down."""
 
 from collections.abc import Sequence
 from math import copysign, isfinite, isnan
@@ -27,36 +27,39 @@ class Limits:
         self._rate = sample_rate_hz
         self._samples_per_cycle = rig.samples_per_cycle(sample_rate_hz)
         self._sensors = {CUFFS.index(sensor.cuff): sensor for sensor in sensors}
-        self._felt: dict[int, int] = {}
-        """Of each cuff the machine's counter at its last fresh sample."""
+        self._cuff_read_at: dict[int, int] = {}
+        """By cuff, the machine's cycle of its last new sample."""
         self._last: dict[int, Reading] = {}
-        """Of each drive the last sample that it told."""
+        """By drive, its last sample."""
 
-    def violation(self, told: Row | Answers) -> str | None:
-        """Return which limit is broken by what came, None if it keeps them all."""
+    def violation(self, samples: Row | Answers) -> str | None:
+        """Return which limit samples break, None if they keep all."""
         samples_hz = self._rate * self._samples_per_cycle
-        for j, (drive, found) in enumerate(zip(self._rig.drive, told.drives, strict=True)):
+        for j, (drive, found) in enumerate(zip(self._rig.drive, samples.drives, strict=True)):
             if isinstance(found, Reading):
                 if why := sample_violation(drive, self._last.get(j, found), found, samples_hz):
                     return why
                 self._last[j] = found
-        return self.cuff_violation(told)
+        return self.cuff_violation(samples)
 
-    def cuff_violation(self, told: Row | Answers) -> str | None:
-        """Return which cuff's force is above its limit, or could be unseen: its sensor tells
-        nothing any more."""
-        first = told.drives[0]
+    def cuff_violation(self, samples: Row | Answers) -> str | None:
+        """Return which cuff's force is above its limit, or is not measured any more."""
+        first = samples.drives[0]
         cycle = first.sequence // self._samples_per_cycle if isinstance(first, Reading) else None
-        return self.force_violation(told.forces) or (
-            None if cycle is None else self._silence(told.forces, cycle)
+        return self.force_violation(samples.forces) or (
+            None if cycle is None else self._silence(samples.forces, cycle)
         )
 
-    def straying(self, told: Row | Answers, in_force: NDArray, late: int = 0) -> str | None:
+    def straying(
+        self, samples: Row | Answers, set_points: Sequence[float], late: int = 0
+    ) -> str | None:
         """Return which joint is too far from its set-point, (J,) rad, None if none is.
 
-        A drive that has been told nothing for so many samples ``late`` may have gone on meanwhile.
+        A drive that was sent nothing for so many samples ``late`` may have gone on meanwhile.
         """
-        for drive, reading, reference in zip(self._rig.drive, told.drives, in_force, strict=True):
+        for drive, reading, reference in zip(
+            self._rig.drive, samples.drives, set_points, strict=True
+        ):
             if not isinstance(reading, Reading):
                 continue
             error = reading.angle - reference
@@ -71,12 +74,11 @@ class Limits:
         return None
 
     def _silence(self, forces: NDArray, cycle: int) -> str | None:
-        """Return which cuff sensor has told nothing for too long: its limit would be watched by
-        nobody."""
+        """Return which cuff sensor has had no new sample for too long."""
         for cuff, sensor in self._sensors.items():
             if all(map(isfinite, forces[cuff].tolist())):
-                self._felt[cuff] = cycle
-            silent_s = (cycle - self._felt.setdefault(cuff, cycle)) / self._rate
+                self._cuff_read_at[cuff] = cycle
+            silent_s = (cycle - self._cuff_read_at.setdefault(cuff, cycle)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
                     f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f}"
@@ -99,39 +101,41 @@ class Limits:
 
 
 def sample_violation(
-    drive: DriveSettings, before: Reading, found: Reading, samples_hz: float
+    drive: DriveSettings, before: Reading, reading: Reading, samples_hz: float
 ) -> str | None:
     """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
     low, high = drive.angle_rad
-    if not low <= found.angle <= high:
+    if not low <= reading.angle <= high:
         return (
-            f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to"
+            f"{drive.joint} angle {reading.angle:.3f} rad is outside its limits {low:g} to"
             f" {high:g} rad"
         )
-    speed = found.velocity
+    speed = reading.velocity
     if isnan(speed):
-        # The drive tells no speed: what the angle did since the last sample.
-        speed = (found.angle - before.angle) * samples_hz / max(found.sequence - before.sequence, 1)
+        # The drive reports no velocity: the angle's change since the last sample counts.
+        speed = (
+            (reading.angle - before.angle) * samples_hz / max(reading.sequence - before.sequence, 1)
+        )
     # Written so that a NaN breaks every limit.
     if not abs(speed) <= drive.speed_rad_s:
         return (
             f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g}"
             " rad/s"
         )
-    if not abs(found.torque) <= drive.torque_nm:
+    if not abs(reading.torque) <= drive.torque_nm:
         return (
-            f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of"
+            f"{drive.joint} torque {reading.torque:.1f} N·m is above its limit of"
             f" {drive.torque_nm:g} N·m"
         )
     return None
 
 
 def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: float) -> None:
-    """Stand between the plan and the wire: refuse a set-point (rad) that no planned motion may ask
-    for.
+    """Refuse a set-point (rad) that no planned motion may ask for.
 
-    Whatever went wrong before, it is a number, within its joint's limits, and no further from the
-    ``last`` one than its speed limit leads in the time that it is allowed, s.
+    It stands between the plan and the line. Whatever went wrong before, a set-point is a number,
+    within its joint's limits, and no further from the ``last`` one than its speed limit leads in
+    the time that it is allowed, s.
     """
     low, high = drive.angle_rad
     if not low <= reference <= high:
@@ -148,16 +152,16 @@ def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: 
 
 
 def clamped(value: float, low: float, high: float) -> float:
-    """Return what is nearest to a value within bounds; NaN stays NaN."""
-    # In this order: what a NaN is compared with does not take its place.
+    """Return the value within bounds that is nearest; NaN stays NaN."""
+    # In this order a NaN stays: comparisons with it are false.
     return min(max(value, low), high)
 
 
 def slowed(
     reference: float, speed: float, deceleration: float, time_s: float
 ) -> tuple[float, float]:
-    """Return set-point (rad) and speed (rad/s) a while later of one that slows down to rest."""
+    """Return set-point (rad) and speed (rad/s) after some time of slowing down to rest."""
     moving_s = min(time_s, abs(speed) / deceleration)
     path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)
-    left = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
-    return float(reference + path), float(left)
+    remaining = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
+    return float(reference + path), float(remaining)

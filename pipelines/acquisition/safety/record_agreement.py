@@ -1,8 +1,7 @@
-"""One drive's two accounts of its samples: what exchanges bring, and what its own record holds,
-number by number.
+"""Whether a drive's own record agrees with the answers to exchanges, sample by sample.
 
 Each has registers of its own in the rig file. Where their scales, signs or zeros differ, one of
-them is wrong, and which of them nobody can tell from the numbers.
+them is wrong; the numbers do not show which.
 """
 
 from collections import OrderedDict
@@ -26,11 +25,11 @@ NEAR_RAD = 1e-3
 half."""
 
 
-class Agreement:
-    """Holds one drive's record against what exchanges brought of the same samples."""
+class RecordAgreement:
+    """Compares one drive's record with the answers to exchanges of the same samples."""
 
     def __init__(self, rig: RigSettings, joint: int, rate_hz: float) -> None:
-        """Judge the record of a joint's drive, which holds samples at a rate."""
+        """Compare the record of a joint's drive, which holds samples at a rate."""
         drive = rig.drive[joint]
         self._label, self._where, self._rate_hz = (
             rig.label_of(drive),
@@ -40,15 +39,14 @@ class Agreement:
         self._exchanged: OrderedDict[int, Reading] = OrderedDict()
         self._compared, self._xx, self._xy, self._yy = 0, 0.0, 0.0, 0.0
 
-    def tell(self, exchanged: Reading) -> None:
-        """Take in what an exchange brought."""
+    def add(self, exchanged: Reading) -> None:
+        """Take the sample of an exchange."""
         self._exchanged[exchanged.sequence] = exchanged
         while len(self._exchanged) > MOST_HELD:
             self._exchanged.popitem(last=False)
 
-    def judge(self, recorded: Reading) -> None:
-        """Raise DeviceError where a recorded sample cannot be the one that an exchange brought
-        under its number."""
+    def check(self, recorded: Reading) -> None:
+        """Raise DeviceError where a recorded sample differs from the exchange of that number."""
         exchanged = self._exchanged.pop(recorded.sequence, None)
         if exchanged is None:
             return

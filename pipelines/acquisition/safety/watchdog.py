@@ -1,20 +1,19 @@
-"""How long it is borne that somebody says nothing."""
+"""The watchdog: stops a run when a device has not answered for too long."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
 FEWEST_SAMPLES = 3
-"""That the watchdog waits for: one that is late and one that is lost are no reason to stop a
-leg."""
+"""Samples that the watchdog waits for at least: a late one and a lost one are no reason to stop."""
 
 
 def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse a watchdog that would bite between two samples.
+    """Refuse a watchdog that expires between two samples.
 
     Raises
     ------
     SettingsError
-        Tells how long it should wait.
+        With the shortest time that is allowed.
     """
     least = FEWEST_SAMPLES / sample_rate_hz
     if rig.safety.watchdog_s < least:
@@ -24,23 +23,24 @@ def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
         )
 
 
-class Patience:
-    """The time since somebody was heard last; instants ``now`` are the host's, s."""
+class Watchdog:
+    """The time since a device answered last; instants ``now`` are the host's, s."""
 
     def __init__(self, longest_s: float) -> None:
+        """Wait for an answer, s at most."""
         self.longest_s = longest_s
-        self._heard: float | None = None
+        self._answered_at: float | None = None
 
-    def hear(self, now: float) -> None:
-        """Note that there was something to hear."""
-        self._heard = now
+    def reset(self, now: float) -> None:
+        """Note an answer."""
+        self._answered_at = now
 
     def waited(self, now: float) -> float:
-        """Return for how long nothing was heard, s; the first question begins the wait."""
-        if self._heard is None:
-            self._heard = now
-        return now - self._heard
+        """Return the time since the last answer, s; the first call begins the wait."""
+        if self._answered_at is None:
+            self._answered_at = now
+        return now - self._answered_at
 
-    def is_over(self, now: float) -> bool:
-        """Tell whether that is too long."""
+    def has_expired(self, now: float) -> bool:
+        """Return whether that is too long."""
         return self.waited(now) > self.longest_s

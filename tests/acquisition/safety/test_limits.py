@@ -350,7 +350,7 @@ def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(
     monkeypatch.setattr(Servo, "hear", remember)
     why = stopped(shipped="real_time", rate_hz=rate_hz)
     assert re.match(
-        r"drive (hip|knee) .*: its sample counter goes up by (19\d|20\d)(\.\d)? a second, expected"
+        r"drive (hip|knee) .*: its sample counter goes up by \d{3}(\.\d)? a second, expected"
         rf" {rate_hz:g}; "
         r"correct acquire.sample_rate_hz, or the rate that is set in the drive; nothing was moved",
         why,

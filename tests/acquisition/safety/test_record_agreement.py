@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipelines.acquisition.machine.drive import Reading
-from pipelines.acquisition.safety.record_agreement import COMPARED, Agreement
+from pipelines.acquisition.safety.record_agreement import COMPARED, RecordAgreement
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
@@ -21,10 +21,10 @@ def reading(k, angle=0.0, torque=0.0, velocity=0.0):
 
 
 def judged(recorded_torque, exchanged_torque=lambda k: 10.0 * np.sin(0.1 * k), count=3 * COMPARED):
-    agreement = Agreement(RIG, 0, RATE_HZ)
+    agreement = RecordAgreement(RIG, 0, RATE_HZ)
     for k in range(count):
-        agreement.tell(reading(k, torque=exchanged_torque(k)))
-        agreement.judge(reading(k, torque=recorded_torque(k)))
+        agreement.add(reading(k, torque=exchanged_torque(k)))
+        agreement.check(reading(k, torque=recorded_torque(k)))
 
 
 @pytest.mark.parametrize("factor", [-1.0, 0.5, 2.0, 0.0])
@@ -51,12 +51,12 @@ def test_of_a_torque_that_is_hardly_there_or_is_not_recorded_nothing_is_said():
 
 
 def test_an_angle_of_another_zero_ends_the_run_and_one_that_was_latched_a_sample_later_does_not():
-    agreement = Agreement(RIG, 0, RATE_HZ)
-    agreement.tell(reading(1, angle=0.3, velocity=2.0))
-    agreement.judge(reading(1, angle=0.302))
-    agreement.tell(reading(2, angle=0.3))
+    agreement = RecordAgreement(RIG, 0, RATE_HZ)
+    agreement.add(reading(1, angle=0.3, velocity=2.0))
+    agreement.check(reading(1, angle=0.302))
+    agreement.add(reading(2, angle=0.3))
     with pytest.raises(
         DeviceError, match=r"tells angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"
     ):
-        agreement.judge(reading(2, angle=0.35))
-    agreement.judge(reading(3, angle=1.0))  # of which no exchange told
+        agreement.check(reading(2, angle=0.35))
+    agreement.check(reading(3, angle=1.0))  # of which no exchange told

@@ -56,8 +56,8 @@ def test_every_state_leads_to_rest():
 @pytest.fixture
 def supervisor():
     supervisor = Supervisor(load_rig(datasets() / "rigs" / "real_time.toml"), RATE)
-    supervisor.check()
-    supervisor.take(
+    supervisor.start_checks()
+    supervisor.load_plan(
         Plan(np.linspace(0.0, 0.5, 200)[:, np.newaxis] * [1.0, -1.0], 50, 150), np.zeros(2)
     )
     return supervisor
@@ -72,13 +72,13 @@ def row(sequence, angle=0.0):
 
 def enable(supervisor):
     for joint in range(2):
-        supervisor.rest(joint, 10.0)
+        supervisor.rest_set_point(joint, 10.0)
 
 
 def step(supervisor, found, now):
     """Send what is due at a sample; return it, (J,) rad."""
-    supervisor.next(found, now)
-    return [supervisor.step(joint, now) for joint in range(2)]
+    supervisor.advance(found, now)
+    return [supervisor.set_point(joint, now) for joint in range(2)]
 
 
 def answers(row):
@@ -95,27 +95,30 @@ def test_what_one_drive_and_the_cuffs_told_is_judged_though_the_other_drive_did_
     supervisor.begin(row(100), 10.0)
     step(supervisor, 101, 10.005)
     assert (
-        supervisor.judge(Answers((row(101).drives[0], LOST), row(101).forces, None), 10.006) is None
+        supervisor.check_answers(Answers((row(101).drives[0], LOST), row(101).forces, None), 10.006)
+        is None
     )
     step(supervisor, 102, 10.01)
     pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
     with pytest.raises(DeviceError, match="thigh_front force x 401 N is above the limit"):
-        supervisor.judge(Answers((LOST, LOST), pressed, None), 10.011)
+        supervisor.check_answers(Answers((LOST, LOST), pressed, None), 10.011)
     loaded = replace(row(102).drives[0], torque=151.0)
     with pytest.raises(DeviceError, match=r"hip torque 151\.0 N·m is above its limit"):
-        supervisor.judge(Answers((loaded, LOST), row(102).forces, None), 10.011)
+        supervisor.check_answers(Answers((loaded, LOST), row(102).forces, None), 10.011)
 
 
 def test_the_drive_that_is_silent_for_too_long_is_named_though_the_other_one_answers(supervisor):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     for k in range(1, 20):
-        supervisor.judge(
+        supervisor.check_answers(
             Answers((row(100 + k).drives[0], LOST), row(100).forces, None), 10.0 + k / RATE
         )
     with pytest.raises(Unanswered, match="drive knee: did not answer"):
         too_late = 10.001 + supervisor.rig.safety.watchdog_s
-        supervisor.judge(Answers((row(120).drives[0], LOST), row(100).forces, None), too_late)
+        supervisor.check_answers(
+            Answers((row(120).drives[0], LOST), row(100).forces, None), too_late
+        )
 
 
 def test_a_state_cannot_be_skipped(supervisor):
@@ -132,16 +135,16 @@ def test_after_an_abort_no_set_point_of_the_plan_follows_and_the_first_reason_st
     assert (supervisor.state, supervisor.why) == (State.ABORT, "the first")
     assert isinstance(supervisor.fault, ValueError)
     for ask in (
-        lambda: supervisor.next(102, 10.01),
-        lambda: supervisor.step(0, 10.01),  # whose turn comes only now
-        lambda: supervisor.judge(answers(row(102)), 10.01),
+        lambda: supervisor.advance(102, 10.01),
+        lambda: supervisor.set_point(0, 10.01),  # whose turn comes only now
+        lambda: supervisor.check_answers(answers(row(102)), 10.01),
     ):
         with pytest.raises(DeviceError, match="the first"):
             ask()
 
 
 def test_many_small_leaps_of_a_counter_do_not_add_up_to_a_speed_above_the_limit(supervisor):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [2.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
@@ -149,16 +152,16 @@ def test_many_small_leaps_of_a_counter_do_not_add_up_to_a_speed_above_the_limit(
     with pytest.raises(DeviceError, match=r"faster than its limit of 3 rad/s; it was not sent"):
         for k in range(1, 100):  # the counter goes on twice as fast as the time
             step(supervisor, 100 + k, 10.0 + 0.5 * k / RATE)
-            for stream, reading in zip(supervisor._streams, row(100 + k).drives, strict=True):
+            for stream, reading in zip(supervisor.checks.streams, row(100 + k).drives, strict=True):
                 stream.begin(reading, 10.0 + 0.5 * k / RATE)
-    assert supervisor.sent[0] < 0.1
+    assert supervisor.trackers[0].sent < 0.1
 
 
 def follow(supervisor, k):
     """Send what is due at a sample, and take the sample; return the hip's set-point."""
     now = 10.0 + (k - 100) / RATE
     sent = step(supervisor, k, now)[0]
-    for stream, reading in zip(supervisor._streams, row(k).drives, strict=True):
+    for stream, reading in zip(supervisor.checks.streams, row(k).drives, strict=True):
         stream.begin(reading, now)
     return sent
 
@@ -171,13 +174,13 @@ def told(reference, velocity=np.nan, enabled=True, sequence=0):
 def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where_the_drive_is(
     supervisor, gone_on
 ):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
-    assert supervisor.missed(106, 10.0 + 6 / RATE)
+    assert supervisor.has_missed(106, 10.0 + 6 / RATE)
     supervisor.resume(0, told(before + gone_on, sequence=106), 10.0 + 6 / RATE)
     sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 220))])
     speed, plan = RATE * np.diff(sent), np.arange(106, 220) * 1.5 / RATE - 150 / RATE
@@ -195,13 +198,13 @@ def test_a_drive_that_followed_the_plan_through_a_silence_is_led_on_a_sample_lat
     supervisor, on_by
 ):
     path = np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0]
-    supervisor.take(Plan(path, 50, 100), np.zeros(2))
+    supervisor.load_plan(Plan(path, 50, 100), np.zeros(2))
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     for k in range(101, 111):
         follow(supervisor, k)
     now = 10.0 + 13 / RATE
-    assert supervisor.missed(113, now)
+    assert supervisor.has_missed(113, now)
     # At sample n the set-point is reached that was sent at the one before.
     supervisor.resume(0, told(path[113 + on_by - 102][0], velocity=1.5, sequence=113 + on_by), now)
     sent = [follow(supervisor, k) for k in range(113, 120)]
@@ -211,16 +214,16 @@ def test_a_drive_that_followed_the_plan_through_a_silence_is_led_on_a_sample_lat
 def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_is_broken_then(
     supervisor,
 ):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     follow(supervisor, 101)
     assert supervisor.left_out == 0
-    supervisor.next(105, 10.0 + 5 / RATE)
+    supervisor.advance(105, 10.0 + 5 / RATE)
     assert supervisor.left_out == 3
-    assert "set-points were missed before it" in supervisor._streams[0].after_jerk(
+    assert "set-points were missed before it" in supervisor.checks.streams[0].after_jerk(
         "too much", row(105).drives[0]
     )
 
@@ -228,28 +231,28 @@ def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_i
 def test_a_cuff_that_is_pressed_after_one_drive_was_told_nothing_is_told_so_whichever_drive_it_was(
     supervisor,
 ):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     follow(supervisor, 101)
-    supervisor._streams[1].leave_out(98, 100)
+    supervisor.checks.streams[1].leave_out(98, 100)
     pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
     with pytest.raises(
         DeviceError, match=r"thigh_front force x 401 N .*; samples or set-points were missed"
     ):
-        supervisor.judge(Answers((LOST, LOST), pressed, None), 10.0 + 1 / RATE)
+        supervisor.check_answers(Answers((LOST, LOST), pressed, None), 10.0 + 1 / RATE)
 
 
 def test_what_is_due_at_a_sample_is_due_no_more_once_the_next_one_is_there(supervisor):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
     assert not supervisor.is_late(10.0), "nothing is followed yet"
     supervisor.begin(row(100), 10.0)
-    supervisor.next(101, 10.0 + 1 / RATE)
+    supervisor.advance(101, 10.0 + 1 / RATE)
     assert not supervisor.is_late(10.0 + 1.9 / RATE)
     assert supervisor.is_late(10.0 + 2.1 / RATE)
 
@@ -261,13 +264,13 @@ def supervisor_speed_before(before, gone_on):
 
 def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_faster(supervisor):
     """For the drive both fall into one of its samples."""
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [2.0 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
-    assert supervisor.missed(111, 10.0 + 11 / RATE)
+    assert supervisor.has_missed(111, 10.0 + 11 / RATE)
     supervisor.resume(0, told(before, sequence=111), 10.0 + 11 / RATE)
     late = 10.0 + 11.8 / RATE
     first = step(supervisor, 111, late)[0]
@@ -285,23 +288,23 @@ def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_
     assert register in text
     (tmp_path / "rig.toml").write_text(text if tells else text.replace(register, ""))
     supervisor = Supervisor(load_rig(tmp_path / "rig.toml"), RATE)
-    supervisor.check()
-    supervisor.take(Plan(np.full((128, 2), [0.2, 0.0]), 50, 100), np.array([0.2, 0.0]))
+    supervisor.start_checks()
+    supervisor.load_plan(Plan(np.full((128, 2), [0.2, 0.0]), 50, 100), np.array([0.2, 0.0]))
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    supervisor.base[0] = supervisor.sent[0] = 0.1
+    supervisor.trackers[0].start_at(0.1)
     step(supervisor, 101, 10.0 + 1 / RATE)
     at = 10.0 + 4 / RATE
-    assert supervisor.is_stale(0, at)
-    assert not supervisor.is_stale(1, at), "it is held"
-    sent = supervisor.sent[0]
+    assert supervisor.trackers[0].is_stale(at)
+    assert not supervisor.trackers[1].is_stale(at), "it is held"
+    sent = supervisor.trackers[0].sent
     moved = 2.0 * (sent - 0.1)
     supervisor.resume(0, told(sent + moved, sequence=104), at)
-    assert supervisor.base[0] == pytest.approx(sent + moved)
+    assert supervisor.trackers[0].base == pytest.approx(sent + moved)
 
 
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
-    supervisor.take(
+    supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2)
     )
     enable(supervisor)
@@ -319,11 +322,12 @@ def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(
 ):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    supervisor.sent[:], supervisor.base[:], supervisor._speed = 0.2, 0.2, np.array([2.0, 0.0])
+    supervisor.trackers[0].start_at(0.2)
+    supervisor.trackers[0]._speed = 2.0
     supervisor.abort(DeviceError("silent"))
     supervisor.resume(0, told(0.4, velocity), 10.25)
     path = []
-    while due := supervisor.stop(0, 10.25 + len(path) / RATE):
+    while due := supervisor.safe_stop.set_point(0, 10.25 + len(path) / RATE):
         path.append(due[0])
     fastest = 0.8 if np.isnan(velocity) else velocity  # as fast as it went meanwhile
     assert path[0] - 0.4 == pytest.approx(max(fastest - 0.5 * 8.0 / RATE, 0.0) / RATE)
@@ -339,18 +343,18 @@ def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
     ):
         for k in range(101, 200):  # the leg hangs and trembles, the plan goes on
             step(supervisor, k, 10.0 + (k - 100) / RATE)
-            supervisor.judge(answers(row(k, 1e-4 * (k % 2))), 10.0 + (k - 100) / RATE)
-    assert supervisor.sent[0] < 0.16
+            supervisor.check_answers(answers(row(k, 1e-4 * (k % 2))), 10.0 + (k - 100) / RATE)
+    assert supervisor.trackers[0].sent < 0.16
 
 
 def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervisor):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    assert supervisor.stop(0, 10.1)
+    assert supervisor.safe_stop.set_point(0, 10.1)
     with pytest.raises(DeviceError, match="is no longer enabled"):
-        supervisor._enabled = [True, True]
-        supervisor.feel(0, told(0.0, 0.0, enabled=False))
-    assert supervisor.stop(0, 10.2) is None
+        supervisor.enable_states[0].enabled = True
+        supervisor.safe_stop.check(0, told(0.0, 0.0, enabled=False))
+    assert supervisor.safe_stop.set_point(0, 10.2) is None
 
 
 @pytest.mark.parametrize("word", [{"enabled": False}, {"enabled": True, "fault": "overheated"}])
@@ -359,11 +363,11 @@ def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_i
 ):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    supervisor.heed(0, Condition(enabled=True))
+    supervisor.update_enabled(0, Condition(enabled=True))
     with pytest.raises(DeviceError, match=r"is no longer enabled|overheated"):
-        supervisor.heed(0, Condition(**word))
-    supervisor.heed(0, Condition(enabled=True))
-    assert supervisor.stop(0, 10.2) is None
+        supervisor.update_enabled(0, Condition(**word))
+    supervisor.update_enabled(0, Condition(enabled=True))
+    assert supervisor.safe_stop.set_point(0, 10.2) is None
 
 
 @pytest.mark.parametrize(

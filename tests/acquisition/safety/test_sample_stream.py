@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipelines.acquisition.machine.drive import Reading
-from pipelines.acquisition.safety.sample_checks import Stream
-from pipelines.acquisition.safety.stuck_register import Told
+from pipelines.acquisition.safety.sample_stream import SampleStream
+from pipelines.acquisition.safety.set_point_history import SetPointHistory
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
@@ -27,16 +27,16 @@ def moved(number):
 
 @pytest.fixture
 def hip():
-    """The stream of a hip's records, 1000 a second beside 200 set-points, and what it was told
-    until now."""
-    told = Told()
+    """The stream of a hip's records, 1000 a second with 200 set-points, which it was sent until
+    now."""
+    history = SetPointHistory()
     for number in range(BEGINS, BEGINS + 2000, 5):
-        told.tell(number, moved(number).angle)
-    return Stream(load_rig(datasets() / "rigs" / "recorder.toml"), 0, CYCLE_HZ, told)
+        history.add(number, moved(number).angle)
+    return SampleStream(load_rig(datasets() / "rigs" / "recorder.toml"), 0, CYCLE_HZ, history)
 
 
 def take(stream, *samples):
-    return [stream.take(sample, 1.0) for sample in samples]
+    return [stream.check(sample, 1.0) for sample in samples]
 
 
 def swing(stream, until):
@@ -67,7 +67,7 @@ def test_a_motion_within_limits_contradicts_nothing_and_each_sample_is_new_once(
         ({"sequence": BEGINS + 400 + 2**16}, "its sample counter leapt"),
         ({"torque": 151.0}, "hip torque 151.0 N·m is above its limit"),
         ({"torque": np.nan}, "hip torque nan N·m is above its limit"),
-        ({"velocity": 2.9}, "while it told a speed of"),
+        ({"velocity": 2.9}, "but it reports a speed of"),
         ({"reference": 1.2}, "follows a set-point of 1.2000 rad, but was sent"),
     ],
 )
@@ -134,7 +134,7 @@ def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_mov
     swing(hip, BEGINS + 1250)
     held = {name: getattr(moved(BEGINS + 1250), name)}
     with pytest.raises(
-        DeviceError, match=f"tells {name} .*; its register is frozen, or the joint is blocked"
+        DeviceError, match=f"reports {name} .*; its register is frozen, or the joint is blocked"
     ):
         for number in range(BEGINS + 1250, BEGINS + 1450):
             take(hip, replace(moved(number), **held))
@@ -154,9 +154,9 @@ def test_a_joint_that_sticks_to_its_friction_is_left_to_the_following_error(hip)
 
 
 def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not(hip):
-    still = Told()
-    still.tell(BEGINS, 0.0)
-    hip._told = still
+    still = SetPointHistory()
+    still.add(BEGINS, 0.0)
+    hip._history = still
     at_rest = [
         replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
         for k in range(500)
@@ -166,10 +166,10 @@ def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not(hi
 
 def test_a_late_record_is_held_against_what_the_joint_was_told_then_and_not_since(hip):
     """The joint has moved on by then: that way is none that the record did not follow."""
-    told = Told()
+    history = SetPointHistory()
     for number in range(BEGINS, BEGINS + 1000, 5):
-        told.tell(number, 0.0 if number < BEGINS + 500 else 0.3)
-    hip._told = told
+        history.add(number, 0.0 if number < BEGINS + 500 else 0.3)
+    hip._history = history
     at_rest = [
         replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
         for k in range(490)

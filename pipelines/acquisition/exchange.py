@@ -1,0 +1,86 @@
+"""Exchanges with the drives while a run goes on: what is decided is sent, and what comes is passed
+to the supervisor."""
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from pipelines.acquisition.machine.drive import Drive, Reading
+from pipelines.acquisition.machine.machine import Machine, all_answers
+from pipelines.acquisition.machine.row import Answers
+from pipelines.acquisition.recording.latency_histogram import Latencies
+from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.errors import DeviceError
+
+Decide = Callable[[int, float], float]
+"""Decides which set-point (rad) a joint's drive is sent now, host's clock, s."""
+
+
+class Exchange:
+    """Carries out what the supervisor decides."""
+
+    def __init__(self, machine: Machine, supervisor: Supervisor, stopped_by: Sequence[str]) -> None:
+        """Exchange with a machine's drives; ``stopped_by`` names the signals that have come."""
+        self.machine, self._supervisor, self._stopped_by = machine, supervisor, stopped_by
+        self.latencies = Latencies()
+        self._cycle = 0
+
+    def refuse_signals(self) -> None:
+        """Refuse to go on where a signal asks for a stop."""
+        if self._stopped_by:
+            raise DeviceError(f"stopped by {self._stopped_by[0]}")
+
+    async def cycle(self, decide: Decide) -> Answers:
+        """Send every drive a set-point, and return the answers."""
+        self._cycle += 1
+        asked_at = time.perf_counter()
+        answers = await self.machine.cycle(self._cycle, partial(self._in_turn, decide))
+        self.latencies.add(time.perf_counter() - asked_at)
+        for joint, drive in enumerate(self.machine.drives):
+            self._supervisor.trackers[joint].mark_answered(drive.told_at)
+            self.update(joint)
+        return answers
+
+    async def _in_turn(self, decide: Decide, drive: Drive) -> Reading:
+        """Send a drive its set-point, decided when its turn has come: by then it may have gone on
+        by itself."""
+        joint = self.machine.drives.index(drive)
+        async with drive.device.turn():
+            now = time.monotonic()
+            if self.is_stale(joint, now) or self._supervisor.is_late(now):
+                await self.find(joint)
+                decide = self._supervisor.hold
+            return await drive.exchange(decide(joint, time.monotonic()))
+
+    def is_stale(self, joint: int, now: float) -> bool:
+        """Return whether a drive must be asked where it is before it is sent a set-point."""
+        return self._supervisor.trackers[joint].is_stale(now)
+
+    async def find(self, joint: int) -> tuple[Reading, float]:
+        """Ask a drive where it is, to go on from there; return the answer and its time, host's
+        clock, s."""
+        tracker = self._supervisor.trackers[joint]
+        sent_at = tracker.sent_at
+        reading, now = await self.machine.drives[joint].look(in_motion=True), time.monotonic()
+        if tracker.sent_at == sent_at:
+            self._supervisor.resume(joint, reading, now)
+        else:  # it was sent a set-point meanwhile
+            self._supervisor.update_enabled(joint, reading)
+        return reading, now
+
+    async def find_all(self) -> tuple[int, float]:
+        """Ask all drives where they are after a silence; return the first one's cycle and time."""
+        (first, now), *_ = await all_answers(
+            self.find(joint) for joint in range(len(self.machine.drives))
+        )
+        return first.sequence // self.machine.samples_per_cycle, now
+
+    def update(self, joint: int) -> None:
+        """Pass on a drive's reports that came next to what was awaited, or were asked again."""
+        conditions = self.machine.drives[joint].conditions
+        while conditions:
+            self._supervisor.update_enabled(joint, conditions.pop(0))
+
+    def sent_at(self, joint: int) -> float:
+        """Return when a drive was sent something last, or is being sent it."""
+        return max(self.machine.drives[joint].told_at, self._supervisor.trackers[joint].sent_at)

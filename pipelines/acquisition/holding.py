@@ -1,0 +1,77 @@
+"""Holds each drive while another one is awaited: it is sent set-points rather than nothing."""
+
+import asyncio
+import time
+from contextlib import suppress
+
+from pipelines.acquisition.exchange import Exchange
+from pipelines.acquisition.safety.set_point_tracker import SLACK_SAMPLES
+from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.errors import Unanswered
+
+LOOK_PAUSE = 0.25
+"""Share of a sample between two looks whether a drive is sent nothing."""
+
+
+class Holding:
+    """One task a drive, for as long as the plan is followed."""
+
+    def __init__(self, exchange: Exchange, supervisor: Supervisor) -> None:
+        """Hold the drives of an exchange."""
+        self._exchange, self._supervisor = exchange, supervisor
+        self._ended = asyncio.Event()
+        self.tasks: list[asyncio.Future] = []
+        """By joint; they end with an error where something is wrong."""
+
+    def start(self) -> None:
+        """Start the tasks."""
+        joints = range(len(self._exchange.machine.drives))
+        self.tasks = [asyncio.ensure_future(self._hold(joint)) for joint in joints]
+
+    def end(self) -> None:
+        """Let the tasks end: the plan is followed no longer."""
+        self._ended.set()
+
+    async def _hold(self, joint: int) -> None:
+        """Send a drive set-points for as long as others are awaited.
+
+        Raise as soon as something is wrong, for whoever awaits does not see it.
+        """
+        drive = self._exchange.machine.drives[joint]
+        period = 1.0 / self._supervisor.rate
+        patience, look_at = SLACK_SAMPLES * period, 0.0
+        while True:
+            sent_at = self._exchange.sent_at(joint)
+            due = max(sent_at + patience, look_at)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(due - time.monotonic()):
+                    await self._ended.wait()
+                    return
+            is_delayed = time.monotonic() - due > LOOK_PAUSE * period
+            self._exchange.refuse_signals()
+            self._supervisor.refuse_after_abort()
+            if self._exchange.sent_at(joint) != sent_at:  # no drive is awaited for long
+                patience = SLACK_SAMPLES * period
+            elif drive.device.awaited_s > period:  # it is the one that is awaited
+                look_at = time.monotonic() + LOOK_PAUSE * period
+            # This computer was late, and so with the plan: following it goes first.
+            elif is_delayed and due > look_at:
+                look_at = time.monotonic() + period
+            else:
+                await self._send(joint)
+                patience = period
+
+    async def _send(self, joint: int) -> None:
+        """Send one drive where to go, from where it is, unless it is sent something meanwhile."""
+        drive, tracker = self._exchange.machine.drives[joint], self._supervisor.trackers[joint]
+        sent_at = tracker.sent_at
+        with suppress(Unanswered):  # the exchange of the plan finds out for how long
+            async with drive.device.turn():
+                self._exchange.update(joint)
+                if tracker.sent_at != sent_at:
+                    return
+                if tracker.is_stale(time.monotonic()):
+                    await self._exchange.find(joint)
+                reading = await drive.exchange(self._supervisor.hold(joint, time.monotonic()))
+                tracker.mark_answered(time.monotonic())
+                self._supervisor.check_held(joint, reading)

@@ -1,0 +1,89 @@
+"""How far a run is: what an operator wants to see of it."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pipelines.acquisition.machine.row import Row
+from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.recording.sample_writer import SampleWriter
+from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.acquisition.states import State
+
+REPORT_S = 0.1
+"""Time between two reports."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What an operator wants to see."""
+
+    state: State = State.IDLE
+    time_s: float = 0.0
+    """Since the recording began; negative on the way there."""
+    duration_s: float = 0.0
+    row: Row | None = None
+    samples: int = 0
+    missed: int = 0
+    gaps: int = 0
+    """In how many places samples were missed."""
+    rate_hz: float = 0.0
+    """Samples a second of wall time."""
+    abort: str | None = None
+    """Why the run is being stopped early."""
+    still_enabled: bool = False
+    """Whether a drive may still move the leg though it was sent to disable."""
+
+
+Report = Callable[[Progress], None]
+
+
+class ProgressReport:
+    """Reports the progress of one run."""
+
+    def __init__(
+        self, supervisor: Supervisor, plan: Plan, writer: SampleWriter, report: Report
+    ) -> None:
+        """Report to ``report`` what supervisor and writer of a run know."""
+        self._supervisor, self._plan = supervisor, plan
+        self._writer, self._report = writer, report
+        self._began_at = self._reported_at = 0.0
+
+    def begin(self, now: float) -> None:
+        """Begin when the drives are enabled, host's clock, s."""
+        self._began_at = self._reported_at = now
+
+    def report_seldom(self, row: Row) -> None:
+        """Report, unless the last report was a moment ago."""
+        if time.monotonic() - self._reported_at >= REPORT_S:
+            self.report(row)
+
+    def report(self, row: Row | None) -> None:
+        """Report how far the run is with its last sample."""
+        self._reported_at = time.monotonic()
+        supervisor, plan = self._supervisor, self._plan
+        duration_s = (plan.stop - plan.first) / supervisor.rate
+        state, reason = supervisor.state, supervisor.why
+        enabled = supervisor.still_enabled
+        if row is None:
+            self._report(
+                Progress(state, duration_s=duration_s, abort=reason, still_enabled=enabled)
+            )
+            return
+        set_point = supervisor.progress.set_point(row)
+        samples = (set_point + 2) * row.samples_per_cycle
+        gaps = self._writer.gaps
+        self._report(
+            Progress(
+                state,
+                time_s=(set_point - plan.first) / supervisor.rate,
+                duration_s=duration_s,
+                row=row,
+                samples=self._writer.rows,
+                missed=sum(count for _, count in gaps),
+                gaps=len(gaps),
+                rate_hz=samples / (self._reported_at - self._began_at),
+                abort=reason,
+                still_enabled=enabled,
+            )
+        )

@@ -1,0 +1,75 @@
+"""From rest to enabled drives: the leg must stand where the plan begins until all have enabled."""
+
+from collections.abc import Sequence
+
+from pipelines.acquisition.machine.row import Answers, Row
+from pipelines.acquisition.safety.enable_state import EnableState, update_all
+from pipelines.acquisition.safety.sample_checks import SampleChecks
+from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
+from pipelines.errors import DeviceError, Unanswered
+from pipelines.settings.rig import RigSettings
+
+REST_RAD = 0.02
+"""How far the leg may have moved between the plan and the moment at which the drives are
+enabled."""
+
+
+class Enabling:
+    """Enables the drives of a rig where the leg stands."""
+
+    def __init__(
+        self,
+        rig: RigSettings,
+        sample_rate_hz: float,
+        trackers: Sequence[SetPointTracker],
+        enable_states: Sequence[EnableState],
+        checks: SampleChecks,
+    ) -> None:
+        """Enable the drives that are tracked."""
+        self._rig, self._rate = rig, sample_rate_hz
+        self._trackers, self._enable_states, self._checks = trackers, enable_states, checks
+        self._start: list[float] = []
+        """Where the leg stood when the plan was made, (J,) rad."""
+
+    def start_at(self, angles: Sequence[float]) -> None:
+        """Enable the drives at these angles, (J,) rad."""
+        self._start = list(angles)
+        for tracker, angle in zip(self._trackers, angles, strict=True):
+            tracker.start_at(angle)
+
+    def check_at_rest(self, row: Row) -> None:
+        """Refuse to enable drives whose leg has left the plan's start, or breaks a limit."""
+        for tracker, angle in zip(self._trackers, row.angle, strict=True):
+            drive, planned = tracker.drive, tracker.sent
+            # The drive goes from where the leg stands to its first set-point within one sample.
+            if not abs(angle - planned) <= min(REST_RAD, drive.speed_rad_s / self._rate):
+                raise DeviceError(
+                    f"the {drive.joint} moved from {planned:.3f} to {angle:.3f} rad before its"
+                    " drive was enabled; keep the leg still and start again"
+                )
+        update_all(self._enable_states, row)
+        self._checks.check_limits(row)
+
+    def set_point(self, joint: int, now: float) -> float:
+        """Return the set-point (rad) with which a drive is enabled: where the leg stands."""
+        return self._trackers[joint].follow(self._start[joint], 0.0, now)
+
+    def check(self, answers: Answers, waited_s: float) -> Row | None:
+        """Return the sample at which every drive reports that it is enabled; None until then.
+
+        Refuse to wait too long for it.
+        """
+        update_all(self._enable_states, answers)
+        silent = [answer for answer in answers.drives if isinstance(answer, Unanswered)]
+        if silent and waited_s > self._rig.safety.watchdog_s:
+            raise silent[0]
+        states = zip(self._rig.drive, self._enable_states, strict=True)
+        idle = [drive for drive, state in states if state.enabled is False]
+        if idle and waited_s > self._rig.safety.control_s:
+            raise DeviceError(
+                f"drive {idle[0].joint}: was told to enable, but its status word does not say that"
+                f" it is after {self._rig.safety.control_s:g} s; see the drive's manual, correct"
+                " enabled_mask and enabled_value in the rig file, or raise safety.control_s there"
+            )
+        self._checks.check_at(answers, self._start)
+        return None if idle else answers.row

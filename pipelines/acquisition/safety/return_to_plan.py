@@ -1,0 +1,89 @@
+"""The way back to the plan after samples were missed: one step of a set-point towards it."""
+
+from math import copysign, sqrt
+
+from pipelines.acquisition.safety.limits import clamped, refuse_leap
+from pipelines.errors import DeviceError
+from pipelines.settings.rig import DriveSettings, SafetySettings
+
+WALK = 0.8
+"""Share of its speed limit at which a joint is led back to the plan: at the whole of it a drive
+that follows well would break it by what it overshoots, and by a count."""
+NO_LAG_RAD = 1e-9
+"""What rounding leaves between a set-point and the plan."""
+
+Path = tuple[float, float, float]
+"""The plan's set-points due now, a cycle before, and two cycles before, rad."""
+
+
+def step_to_plan(
+    drive: DriveSettings,
+    safety: SafetySettings,
+    path: Path,
+    base: float,
+    speed: float,
+    took_s: float,
+    rate_hz: float,
+) -> tuple[float, float]:
+    """Return a set-point along the plan, or on the way back to it, and its speed.
+
+    The way back begins as fast as set-points move already, and goes faster and slower as gently as
+    a stop does: a drive that is sent from rest to its speed limit within a sample jerks the leg
+    with all of its torque. It is no longer than the time allows: after a late set-point the next
+    comes soon, and both may fall into one sample.
+
+    Parameters
+    ----------
+    drive, safety
+        The limits of the drive and of the rig.
+    path : Path
+        Set-points of the plan, rad.
+    base, speed : float
+        Where the set-points are, rad, and how fast they move, rad/s.
+    took_s : float
+        Time since the last set-point, at most a cycle.
+    rate_hz : float
+        Cycles a second.
+
+    Returns
+    -------
+    tuple of float
+        Set-point, rad, and its speed, rad/s.
+
+    Raises
+    ------
+    DeviceError
+        The way back is longer than the watchdog's time at the speed limit.
+    """
+    due, before, earlier = path
+    along, was, lag = (due - before) * rate_hz, (before - earlier) * rate_hz, before - base
+    if lag == 0.0 and speed == was:
+        return due, along
+    deceleration = safety.deceleration_rad_s2
+    # Half of what a stop slows down by is left for what samples make of a parabola.
+    softly = min(abs(lag) * rate_hz, sqrt(deceleration * abs(lag)))
+    change = max(deceleration, abs(along - was) * rate_hz) * took_s
+    fastest = max(abs(along), WALK * drive.speed_rad_s)
+    next_speed = clamped(along + copysign(softly, lag), speed - change, speed + change)
+    next_speed = clamped(next_speed, -fastest, fastest)
+    is_on_plan = abs(lag) < NO_LAG_RAD and next_speed == along
+    reference = base + (due - before if is_on_plan else next_speed * took_s)
+    _refuse_to_lag(drive, safety, abs(due - reference))
+    return (due if abs(reference - due) < NO_LAG_RAD else reference), next_speed
+
+
+def refuse_leap_of_plan(drive: DriveSettings, path: Path, rate_hz: float) -> None:
+    """Refuse a plan that leaps between two cycles, or leaves its limits."""
+    due, before, _ = path
+    refuse_leap(drive, before, due, 1.0 / rate_hz)
+
+
+def _refuse_to_lag(drive: DriveSettings, safety: SafetySettings, lag: float) -> None:
+    """Refuse to go on where the way back to the plan, rad, is too long."""
+    allowed = drive.speed_rad_s * safety.watchdog_s
+    if not lag <= allowed:
+        raise DeviceError(
+            f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed"
+            f" samples, allowed are {allowed:.3f} rad (speed_rad_s x watchdog_s); its answers"
+            " are lost too often, or this computer is too busy"
+        )
