@@ -17,7 +17,7 @@ SEEDS ?= tuning
 SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
+.PHONY: help all test test-slow invariants mutation check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
 .PHONY: evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
@@ -35,6 +35,9 @@ test-slow: $(INSTALLED) ## the statistical campaigns, minutes long
 
 invariants: $(INSTALLED) ## what keeps a leg safe, over 20,000 random sequences of faults; about half an hour
 	$(BIN)/pytest -m slow tests/acquisition/test_invariants.py
+
+mutation: $(VENV)/.mutation ## change numbers and limits one at a time, and see that a test fails each time; about an hour
+	$(BIN)/python tests/campaigns/mutation.py
 
 check: $(INSTALLED) ## lint, formatting, types, direction of imports
 	$(BIN)/ruff check
@@ -124,6 +127,10 @@ $(INSTALLED): pyproject.toml requirements.lock
 # What exoid is compared with is heavy, and nothing else needs it. Some of it comes as source, with a build system of its own.
 $(VENV)/.peers: $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock --editable ".[peers]"
+	@touch $@
+
+$(VENV)/.mutation: $(INSTALLED)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock --editable ".[mutation]"
 	@touch $@
 
 clean: ## remove results and caches; the environment stays
