@@ -146,6 +146,16 @@ def serve(monkeypatch):
 
 
 @pytest.fixture
+def any_rate(monkeypatch):
+    """Begin runs however busy this computer is: no claim of the test depends on its speed."""
+
+    async def accept(machine, cycle_hz):
+        pass
+
+    monkeypatch.setattr("pipelines.acquisition.acquire.refuse_unkept_rate", accept)
+
+
+@pytest.fixture
 def record(tmp_path, excitation, rig_file, serve):
     """Record a run on a rig served in this process; returns the recording."""
 

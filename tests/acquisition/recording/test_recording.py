@@ -25,6 +25,8 @@ from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 from tests.acquisition.conftest import free_port
 
+pytestmark = pytest.mark.usefixtures("any_rate")
+
 LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
 QUEUE = {
     'newest = { address = 120, type = "uint32" }\naddress = 1000\ncapacity = 2048\n': (
