@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli import completion
-from exoid_cli.aside import Aside
+from exoid_cli.background_printer import BackgroundPrinter
 from exoid_cli.confirm import YesOption, ask_before, confirm
 from exoid_cli.console import console
-from exoid_cli.operator_view import OperatorView, plain_line
-from exoid_cli.place import ConfigOption, place_of
-from exoid_cli.steps import AgainOption, only
+from exoid_cli.experiment_folder import ConfigOption, open_experiment
+from exoid_cli.stage_runner import AgainOption, run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from pipelines.settings.rig import RigSettings
 
 LINE_S = 5.0
-"""From one line of progress to the next where there is no terminal."""
+"""Time between lines of progress where there is no terminal, s."""
 
 
 def acquire(
@@ -71,28 +70,28 @@ def acquire(
       exoid acquire --run with_human_train
       exoid acquire --run with_human_train --trajectory mine.toml -o a.parquet
     """
-    place = place_of(config)
+    folder = open_experiment(config)
     if run is None:
         if trajectory or output:
             raise InputError("--run: missing; --trajectory and -o are of one run, name it")
-        told = (
+        options = (
             *(("--overwrite",) if overwrite else ()),
             *(("--reset-faults",) if reset_faults else ()),
         )
-        only(
+        run_stages(
             context,
-            place,
+            folder,
             "acquire",
             again=again,
-            before=lambda step: (*ask_before(place.experiment, step, yes=yes), *told),
+            before=lambda step: (*ask_before(folder.experiment, step, yes=yes), *options),
         )
         return
-    place.experiment.run_named(run)
+    folder.experiment.run_named(run)
     if trajectory is None or output is None:
-        step = place.step("acquire", run)
+        step = folder.step("acquire", run)
         trajectory, output = trajectory or step.inputs[0], output or step.target
     _record(
-        place.experiment,
+        folder.experiment,
         run,
         trajectory,
         output,
@@ -114,21 +113,20 @@ def _record(
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
     from pipelines.acquisition.preconditions.human_interlock import unnoticed
-    from pipelines.workflow.imported import refuse_imported
-    from pipelines.workflow.kept import refuse_recorded
+    from pipelines.workflow.imported import refuse_imported, refuse_recorded
 
     def claim() -> None:
         if not overwrite:
             refuse_recorded(output)
 
     refuse_imported(output)
-    # Before anybody is asked anything; and once more when no other run can record there any more.
+    # Before any question, and again by `record` once no other run can record there.
     claim()
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
-    watched: list[RigSettings] = []
+    rigs: list[RigSettings] = []
     reports: list[Callable[[Progress], None]] = []
-    with ExitStack() as starting, ExitStack() as shown:
+    with ExitStack() as starting, ExitStack() as view:
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
             if settings.run == "with_human" and not rig.embedded:
@@ -136,7 +134,7 @@ def _record(
                     console.warn(warning)
                 if not yes:
                     confirm(rig, settings, trajectory, motion, rate)
-            watched.append(rig)
+            rigs.append(rig)
             if rig.embedded:
                 starting.enter_context(
                     console.starting(
@@ -147,7 +145,7 @@ def _record(
         def report(progress: "Progress") -> None:
             if not reports:
                 starting.close()
-                reports.append(shown.enter_context(_watching(watched[0], run)))
+                reports.append(view.enter_context(_run_view(rigs[0], run)))
             reports[0](progress)
 
         outcome = record(
@@ -166,7 +164,8 @@ def _record(
         console.warn(
             f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps"
         )
-    if outcome.left_out > outcome.missed:  # else they are those of the samples
+    # Up to as many, they are those of the missed samples.
+    if outcome.left_out > outcome.missed:
         console.warn(
             f"{outcome.path}: {outcome.left_out} set-points were left out, since cycles took longer"
             f" than {1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower"
@@ -184,19 +183,20 @@ def _record(
 
 
 @contextmanager
-def _watching(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], None]]:
-    """Show a run as it goes on: a picture on a terminal, else a line now and then and at each
-    change of state."""
+def _run_view(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], None]]:
+    """Show a run: a picture on a terminal, else a line every 5 s and at each change of state."""
+    from exoid_cli.operator_view import OperatorView, plain_line
+
     view, last_line, last_state = OperatorView(rig, run), float("-inf"), None
 
     def report(progress: "Progress") -> None:
         nonlocal last_line, last_state
-        view.take(progress)
+        view.update(progress)
         if console.err.is_terminal or not console.speaks:
             return
         if progress.state is not last_state or time.monotonic() - last_line >= LINE_S:
             last_line, last_state = time.monotonic(), progress.state
-            lines.say(plain_line(progress))
+            printer.print(plain_line(progress))
 
-    with Aside(console.say) as lines, console.live(view):
+    with BackgroundPrinter(console.say) as printer, console.live(view):
         yield report

@@ -1,7 +1,10 @@
-"""The commands of exoid, and the one place where an error becomes a line and an exit code.
+"""The commands of exoid; here, and only here, an error becomes a line and an exit code.
 
-0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C,
-129, 131 and 143 one by SIGHUP, SIGQUIT and SIGTERM.
+0 is success, 1 a fault of exoid, 2 an input that the user must correct, 3 a device's fault, 130 a
+stop by Ctrl-C, 129, 131 and 143 a stop by SIGHUP, SIGQUIT and SIGTERM.
+
+A command's function imports the libraries that it needs, so that help and light commands start
+fast; tests/cli/test_imports.py lists the libraries that each of them may not import.
 """
 
 import errno
@@ -25,20 +28,20 @@ from exoid_cli import usage
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
+from exoid_cli.detached_terminal import tolerate_closed_terminals
 from exoid_cli.detect import detect
 from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.export import export
 from exoid_cli.figures import figures
 from exoid_cli.filter import filter_
-from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
+from exoid_cli.global_options import Command, JsonOption, QuietOption, with_global_options
 from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
-from exoid_cli.lasting import outlast_terminals
 from exoid_cli.recover import recover
 from exoid_cli.report import report
-from exoid_cli.rig_group import rig
+from exoid_cli.rig import rig
 from exoid_cli.run import run as run_
 from exoid_cli.settings import settings
 from exoid_cli.show import show
@@ -61,7 +64,7 @@ app = typer.Typer(
 
 
 def _add(name: str, function: Callable[..., None], short_help: str) -> None:
-    app.command(name, cls=Command, short_help=short_help)(heeding(function))
+    app.command(name, cls=Command, short_help=short_help)(with_global_options(function))
 
 
 # In the order of an experiment. The short help fits on the one line that the list of commands has
@@ -104,87 +107,89 @@ def options(
         ),
     ] = False,
 ) -> None:
-    """Set what every command heeds; --quiet and --json may also follow the command."""
-    console.heed(quiet=quiet, json=json)
+    """Set the global options; --quiet and --json may also follow the command."""
+    console.add_options(quiet=quiet, json=json)
 
 
 INTERRUPTED = 130
-"""What typer makes of KeyboardInterrupt."""
-UNHEARD = 128 + 13
-"""Exit code of a stop by SIGPIPE, as shells have it; Windows does not know it."""
+"""The exit code that typer makes of KeyboardInterrupt."""
+BROKEN_PIPE = 128 + 13
+"""Exit code of a stop by SIGPIPE, as in shells; Windows has no such signal."""
 
 
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
     if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
-        # Of Python's libraries, about exoid's own lines: the tests heed them.
+        # Python's warnings concern developers; the tests turn them into errors.
         warnings.simplefilter("ignore")
-        # A signal that falls into one of several requests at once is told as what ended exoid, and
-        # by asyncio as well.
+        # asyncio logs a signal during several requests, which exoid reports itself.
         logging.getLogger("asyncio").setLevel(logging.CRITICAL)
-    signals.heed()
+    signals.handle()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(encoding="utf-8")  # Windows' pipes have one that knows no N·m
-    outlast_terminals()
+            stream.reconfigure(encoding="utf-8")  # pipes on Windows cannot encode N·m otherwise
+    tolerate_closed_terminals()
     arguments = sys.argv[1:]
-    sys.exit(run(matching_files(arguments) if os.name == "nt" else arguments))
+    sys.exit(run(expand_patterns(arguments) if os.name == "nt" else arguments))
 
 
-def matching_files(arguments: Sequence[str]) -> list[str]:
-    """Return the words, patterns replaced by the files that match: Windows' shells leave that to
-    us."""
-    found = ((word, sorted(glob.glob(word)) if set("*?") & set(word) else []) for word in arguments)
-    return [name for word, files in found for name in files or [word]]
+def expand_patterns(arguments: Sequence[str]) -> list[str]:
+    """Replace each pattern by the files that match it, as shells do except on Windows."""
+    words = list[str]()
+    for word in arguments:
+        files = sorted(glob.glob(word)) if set("*?") & set(word) else []
+        words += files or [word]
+    return words
 
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code."""
-    console.configure()
+    console.reset()
     try:
         code = _command_line(arguments)
-        sys.stdout.flush()  # not at the interpreter's end, where it would fail with a traceback
+        sys.stdout.flush()  # at the interpreter's end it would fail with a traceback
         signals.ignore()
         return code
     except BrokenPipeError:
-        return _unheard()
+        return _broken_pipe()
     except ExoidError as error:
-        return _failed(str(error), error.exit_code)
+        return _fail(str(error), error.exit_code)
     except TyperException as error:
-        return _failed(usage.told(error), error.exit_code)
+        return _fail(usage.message(error), error.exit_code)
     except KeyboardInterrupt:
-        return _failed(signals.told(), signals.exit_code)
+        return _fail(signals.message(), signals.exit_code)
     except SystemExit as stop:
-        # Which click and rich make a failure of ours.
+        # click and rich turn a broken pipe into an exit of their own.
         if isinstance(stop.__context__, BrokenPipeError):
-            return _unheard()
+            return _broken_pipe()
         raise
     except OSError as error:
-        return _failed(_about_the_system(error), 2)
+        return _fail(_system_error(error), 2)
     except Exception as error:
-        if signals.came:  # whatever made that of it
-            return _failed(signals.told(), signals.exit_code)
-        return _failed(
+        if signals.last:  # a library turned the interruption into an error of its own
+            return _fail(signals.message(), signals.exit_code)
+        return _fail(
             f"exoid itself failed: {type(error).__name__}: {error}; please report it,"
             f" {_keep_traceback()}",
             1,
         )
 
 
-def _failed(text: str, code: int) -> int:
-    """Tell how exoid ends; called while the error is being handled, which keeps signals from coming
-    between."""
+def _fail(text: str, code: int) -> int:
+    """Print the error and return the exit code.
+
+    Called inside the ``except`` block, which keeps signals from interrupting it.
+    """
     console.fail(text)
     signals.ignore()
     return code
 
 
-def _unheard() -> int:
-    """Let nothing more be written to an output that nobody reads any longer, as of ``exoid effects
-    | head -1``."""
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
-    return UNHEARD
+def _broken_pipe() -> int:
+    """Discard further output, which nobody reads after ``exoid effects | head -1``."""
+    with open(os.devnull, "w") as devnull:
+        os.dup2(devnull.fileno(), sys.stdout.fileno())
+    return BROKEN_PIPE
 
 
 def _command_line(arguments: Sequence[str]) -> int:
@@ -194,7 +199,7 @@ def _command_line(arguments: Sequence[str]) -> int:
         args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False
     )
     if code == INTERRUPTED:
-        raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
+        raise KeyboardInterrupt  # typer returns the exit code only, without a message
     return code or 0
 
 
@@ -213,16 +218,17 @@ _REMEDIES = {
 }
 
 
-def _about_the_system(error: OSError) -> str:
-    place = f"{error.filename}: " if error.filename else ""
+def _system_error(error: OSError) -> str:
+    file = f"{error.filename}: " if error.filename else ""
     remedy = _REMEDIES.get(error.errno or 0)
-    # Arrow's own words are no user's.
-    what = os.strerror(error.errno or 0) if remedy else error.strerror or error
-    return f"{place}{what}" + (f"; {remedy}" if remedy else "")
+    if remedy is None:
+        return f"{file}{error.strerror or error}"
+    # The system's words: Arrow's own would mean nothing to a user.
+    return f"{file}{os.strerror(error.errno or 0)}; {remedy}"
 
 
 def _keep_traceback() -> str:
-    """Show the traceback where EXOID_DEBUG asks for it, else keep it in a file; say where it is."""
+    """Print the traceback under EXOID_DEBUG, else write it to a file; say where it is."""
     if os.environ.get("EXOID_DEBUG"):
         traceback.print_exc()
         return "with the traceback above"

@@ -1,18 +1,18 @@
-"""How wide the columns of a table are where it must be broken: between words, and in a path after a
-slash."""
+"""Widths of a table's columns where lines must be broken: between words, in paths after a slash."""
 
 import re
 from collections.abc import Sequence
 
 from rich.cells import cell_len
 
-BETWEEN = 2
-"""Spaces from one column to the next."""
+GAP = 2
+"""Spaces between columns."""
 
 
-def columns(headings: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[int | None]:
-    """Return how wide each column is to be; None where all fit, and where not even the longest
-    words do."""
+def column_widths(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> list[int | None]:
+    """Return each column's width; None for all where no line needs or allows a break."""
     table = [[heading, *cells] for heading, *cells in zip(headings, *rows, strict=True)]
     wanted = [
         max(cell_len(line) for text in column for line in text.split("\n")) for column in table
@@ -20,19 +20,18 @@ def columns(headings: Sequence[str], rows: Sequence[Sequence[str]], width: int) 
     widths = [
         max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table
     ]
-    room = width - BETWEEN * (len(table) - 1)
+    room = width - GAP * (len(table) - 1)
     if sum(wanted) <= room or sum(widths) > room:
         return [None] * len(table)
     for _ in range(room - sum(widths)):
-        # The narrowest of those that want more: what is long is long anyway.
-        _, at = min((have, k) for k, have in enumerate(widths) if have < wanted[k])
-        widths[at] += 1
+        # Widen the narrowest first: a long text needs several lines anyway.
+        growing = [k for k, present in enumerate(widths) if present < wanted[k]]
+        widths[min(growing, key=widths.__getitem__)] += 1
     return list(widths)
 
 
-def at_slashes(text: str, width: int) -> str:
-    """Return a text with every path that is longer than a line broken after the last slash that
-    fits."""
+def break_at_slashes(text: str, width: int) -> str:
+    """Break every path that is longer than a line after the last slash that fits."""
     return re.sub(r"\S+", lambda word: _broken(word[0], width), text)
 
 

@@ -1,4 +1,4 @@
-"""The questions before a leg is moved."""
+"""The questions that a person at the terminal answers before a leg is moved, and during a check."""
 
 import sys
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
+from pipelines.errors import InputError
 
 if TYPE_CHECKING:
     from pipelines.mechanics.trajectory import Trajectory
@@ -25,24 +26,20 @@ def confirm(
     motion: "Trajectory",
     sample_rate_hz: float,
 ) -> None:
-    """Show what will be moved and the limits in force, and ask; raise InputError unless the answer
-    is yes."""
+    """Show the motion and the limits in force, and ask; any answer but yes is an InputError."""
     import numpy as np
 
     from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 
-    _refuse_nobody_to_ask(
-        f"run {run.name} moves somebody, which wants to be confirmed on a terminal"
-    )
+    _require_terminal(f"run {run.name} moves a person")
     seconds = min(run.duration_s, motion.period_s or run.duration_s)
-    angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
-    # On the terminal in every mode: who answers must have seen it.
+    angles, velocities = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     lines = [
-        f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for"
+        f"Run {run.name} moves a person on the rig {rig.name} along {trajectory} for"
         f" {run.duration_s:g} s:"
     ]
     for j, drive in enumerate(rig.drive):
-        angle, speed = angles[:, j], abs(speeds[:, j]).max()
+        angle, speed = angles[:, j], abs(velocities[:, j]).max()
         low, high = drive.angle_rad
         lines.append(
             f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f}"
@@ -54,26 +51,25 @@ def confirm(
         if rig.sensor
         else "none on the cuffs"
     )
-    lines.append(
-        f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C"
-        " stops it"
-    )
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
-    lines.append(
+    lines += [
+        f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C"
+        " stops it",
         f"  a stop takes up to {stop_s:.2g} s, then the drives hold for"
-        f" {HOLD_SAMPLES / sample_rate_hz:.2g} s before their torque is taken away"
-    )
-    lines.append(
+        f" {HOLD_SAMPLES / sample_rate_hz:.2g} s before their torque is taken away",
         f"  stopped after {rig.safety.watchdog_s:g} s of silence, or"
-        f" {rig.safety.following_error_rad:g} rad from a set-point"
-    )
-    console.err.print("\n".join(lines), markup=False, soft_wrap=True)
+        f" {rig.safety.following_error_rad:g} rad from a set-point",
+    ]
+    # In every mode, --quiet included: who answers must have seen the limits.
+    _print("\n".join(lines))
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
 
 
 def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
-    """Ask before a step that would move a real rig though nobody named its run; return what its
-    command is told."""
+    """Ask before a step that moves a real rig in a run that was not named on the command line.
+
+    Returns the arguments that its command needs besides.
+    """
     from pipelines.settings.rig import load_rig
 
     if step.stage != "acquire" or step.run is None:
@@ -81,23 +77,17 @@ def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[st
     if yes:
         return ("--yes",)
     run = experiment.run_named(step.run)
-    # Before somebody is moved, the command itself asks, and tells the limits.
+    # Before a person is moved, the command itself asks, and shows the limits.
     if run.run == "exo_alone" and not load_rig(experiment.file(experiment.acquire.rig)).embedded:
-        _refuse_nobody_to_ask(
-            f"run {run.name} moves the empty machine, which wants to be confirmed on a terminal"
-        )
-        console.err.print(
-            f"Run {run.name} moves the machine for {run.duration_s:g} s.",
-            markup=False,
-            soft_wrap=True,
-        )
+        _require_terminal(f"run {run.name} moves the empty machine")
+        _print(f"Run {run.name} moves the machine for {run.duration_s:g} s.")
         _ask("Is nobody in the machine, and the emergency stop at hand?", f"run {run.name}")
     return ()
 
 
 def confirm_move() -> None:
-    """Ask whether a check may move the leg; raise InputError unless the answer is yes."""
-    _refuse_nobody_to_ask("--move moves the leg, which wants to be confirmed on a terminal")
+    """Ask whether a check may move the leg; any answer but yes is an InputError."""
+    _require_terminal("--move moves the leg")
     console.err.print(
         "\nIf all registers are right, the drives will be enabled and move both joints by 0.05 rad"
         " to and fro, the hip once in 4 s, the knee twice as fast. Keep the emergency stop in your"
@@ -107,21 +97,47 @@ def confirm_move() -> None:
     _ask("Is nobody in the machine, and everybody ready?", "--move")
 
 
-def _refuse_nobody_to_ask(why: str) -> None:
-    from pipelines.errors import InputError
+class OperatorPrompt:
+    """Prompts of a manual check; each waits for Enter."""
 
-    if not _somebody_sees_and_answers():
-        raise InputError(f"{why}; give --yes where a script starts it; nothing was moved")
+    def __init__(self) -> None:
+        if not sys.stdin.isatty():
+            raise InputError(
+                "--by-hand: standard input is no terminal, so no person can be asked; run it in a"
+                " terminal"
+            )
+
+    async def ready(self, prompt: str) -> None:
+        """Show a prompt and return once Enter is pressed; Ctrl-C still works meanwhile."""
+        import asyncio
+
+        console.err.print(f"\n{prompt}\nPress Enter when you begin.", markup=False)
+        entered, loop = asyncio.Event(), asyncio.get_running_loop()
+        loop.add_reader(sys.stdin, entered.set)
+        try:
+            await entered.wait()
+        finally:
+            loop.remove_reader(sys.stdin)
+        if not sys.stdin.readline():
+            raise InputError(
+                "standard input ended before the check did; start it again in a terminal"
+            )
 
 
-def _somebody_sees_and_answers() -> bool:
-    # Where what is asked goes to a file, a terminal's yes is no answer to it.
+def _require_terminal(why: str) -> None:
+    if not _at_a_terminal():
+        raise InputError(
+            f"{why}: confirm it on a terminal, or give --yes in a script; nothing was moved"
+        )
+
+
+def _at_a_terminal() -> bool:
+    # Both: a yes on a terminal does not answer a question that went to a file.
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def _forget_what_was_typed() -> None:
-    """Leave nothing on the terminal that was typed before the question, and so is no answer to
-    it."""
+def _discard_typed_input() -> None:
+    """Discard what was typed before the question, which is no answer to it."""
     if sys.platform == "win32":
         import msvcrt
 
@@ -133,10 +149,12 @@ def _forget_what_was_typed() -> None:
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
-def _ask(question: str, what: str) -> None:
-    from pipelines.errors import InputError
-
-    _forget_what_was_typed()
+def _ask(question: str, action: str) -> None:
+    _discard_typed_input()
     console.err.print(f"{question} [y/N] ", markup=False, end="")
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise InputError(f"{what} was not confirmed; nothing was moved")
+        raise InputError(f"{action} was not confirmed; nothing was moved")
+
+
+def _print(text: str) -> None:
+    console.err.print(text, markup=False, soft_wrap=True)

@@ -1,7 +1,8 @@
 """What the user sees: text and tables, progress, or, with ``--json``, one JSON document on stdout.
 
-A command calls ``say`` and ``table`` for people and ``emit`` for programs, without asking which of
-them listens: people's output is silent under ``--json``, and ``emit`` is silent without it.
+A command calls ``say`` and ``table`` for people and ``emit`` for programs, whoever reads: ``say``
+prints nothing under ``--json``, and ``emit`` nothing without it. rich is imported when something
+is printed, so that `exoid --help` starts fast.
 """
 
 import json
@@ -11,69 +12,64 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console as RichConsole
-from rich.console import RenderableType
-from rich.live import Live
-from rich.progress import (
-    BarColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-from rich.table import Table
-from rich.text import Text
-
-from exoid_cli.column_widths import at_slashes, columns
+if TYPE_CHECKING:
+    from rich.console import Console as RichConsole
+    from rich.console import RenderableType
+    from rich.text import Text
 
 DRAWING_S = 0.0005
-"""How long the drawing of a live picture may hold up the work that it tells of."""
+"""Longest time that drawing a live picture may delay other threads, s."""
 LATE_S = 5.0
-"""After this long somebody who sees nothing move wonders whether anything goes on."""
+"""Time after which a start that shows nothing needs a line of explanation, s."""
 
 
 class Console:
     """The terminal of one invocation; results go to stdout, progress and warnings to stderr."""
 
     def __init__(self) -> None:
-        self.configure()
+        self.reset()
 
-    def configure(self, *, quiet: bool = False, json: bool = False) -> None:
-        """Set what the global options ask for."""
-        self.quiet = quiet
-        self.json = json
+    def reset(self) -> None:
+        """Forget the options and warnings of an earlier invocation."""
+        self.quiet = self.json = False
         self._gathered: list[Any] | None = None
         self._warned = set[str]()
-        self.out = RichConsole(highlight=False)
-        self.err = RichConsole(stderr=True, highlight=False)
+        for name in ("out", "err"):
+            self.__dict__.pop(name, None)
 
-    def heed(self, *, quiet: bool, json: bool) -> None:
-        """Take notice of the global options where a command was given them; what was asked for
-        before stays."""
+    @cached_property
+    def out(self) -> "RichConsole":
+        """Standard output."""
+        return _rich_console(stderr=False)
+
+    @cached_property
+    def err(self) -> "RichConsole":
+        """Standard error."""
+        return _rich_console(stderr=True)
+
+    def add_options(self, *, quiet: bool, json: bool) -> None:
+        """Switch on the global options that are given; those given before stay on."""
         self.quiet |= quiet
         self.json |= json
 
     @property
     def speaks(self) -> bool:
-        """Whether a person reads along."""
+        """Whether text for people is printed."""
         return not (self.quiet or self.json)
 
-    def say(self, text: str | Text) -> None:
+    def say(self, text: "str | Text") -> None:
         """Print a sentence of result for a person."""
         if self.speaks:
-            # A terminal would break words; a pipe, and whoever searches in it, wants lines as they
-            # are.
-            self.out.print(
-                text if isinstance(text, Text) else Text(text), soft_wrap=not self.out.is_terminal
-            )
+            # Wrapped on a terminal only: a pipe, and a search in it, needs lines as they are.
+            self.out.print(_as_text(text), soft_wrap=not self.out.is_terminal)
 
     def note(self, text: str) -> None:
-        """Print what is to be said of the line above, set in and broken between words."""
+        """Print a remark on the line above, indented and broken between words."""
         hanging = "    " if text.startswith("- ") else "  "
         for line in wrap(
             text,
@@ -86,7 +82,7 @@ class Console:
             self.say(line)
 
     def wrote(self, folder: Path, *names: str) -> None:
-        """Print what was written into a folder, after the results."""
+        """Print the files that were written into a folder, after the results."""
         self.say("")
         self.say(f"{folder.as_posix()}/:")
         self.note(", ".join(names))
@@ -99,15 +95,19 @@ class Console:
         title: str | None = None,
         numbers: str = "",
     ) -> None:
-        """Print a table for a person; headings named in ``numbers`` (comma-separated) are set to
-        the right."""
+        """Print a table; headings named in ``numbers`` (comma-separated) are set to the right."""
         if not self.speaks:
             return
+        from rich.table import Table
+        from rich.text import Text
+
+        from exoid_cli.column_widths import break_at_slashes, column_widths
+
         right = {name.strip() for name in numbers.split(",") if name.strip()}
         if title:
             self.say(Text(title, style="bold"))
         cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
-        widths = columns(headings, cells, self.out.width)
+        widths = column_widths(headings, cells, self.out.width)
         table = Table(box=None, pad_edge=False)
         for heading, width in zip(headings, widths, strict=True):
             table.add_column(
@@ -119,28 +119,25 @@ class Console:
         for row in cells:
             table.add_row(
                 *(
-                    Text(text if width is None else at_slashes(text, width))
+                    Text(text if width is None else break_at_slashes(text, width))
                     for text, width in zip(row, widths, strict=True)
                 )
             )
         with self.out.capture() as captured:
             self.out.print(table)
-        # The last column is filled up with spaces, which nobody wants who copies from it.
+        # rich pads the last column with spaces, which would be copied with the text.
         self.out.file.write("".join(f"{line.rstrip()}\n" for line in captured.get().splitlines()))
 
     def emit(self, data: Any) -> None:
-        """Print a result for a program, where ``--json`` asked for it."""
+        """Print a result for a program, if ``--json`` is given."""
         if self._gathered is not None:
             self._gathered.append(data)
         elif self.json:
-            print(
-                json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False),
-                file=sys.stdout,
-            )
+            print(json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False))
 
     @contextmanager
     def gathering(self) -> Iterator[list[Any]]:
-        """Keep what is emitted in the block, so that several commands can make one document."""
+        """Collect what the block emits, so that several commands can print one document."""
         before, self._gathered = self._gathered, []
         try:
             yield self._gathered
@@ -148,57 +145,64 @@ class Console:
             self._gathered = before
 
     def say_command(self, words: Sequence[str], why: str) -> None:
-        """Print a command that is about to be called, as a shell would take it, and why."""
+        """Print a command that is about to run, as a shell takes it, and the reason."""
         if self.speaks:
-            # To be copied in one piece.
-            self.out.print(Text(shlex.join(words), style="bold"), soft_wrap=True)
+            # On one line, to be copied in one piece.
+            self.out.print(_as_text(shlex.join(words), "bold"), soft_wrap=True)
             if why:
                 self.note(why)
 
     def warn(self, text: str) -> None:
-        """Print a warning, in every mode; once, where several steps have the same to say."""
+        """Print a warning in every mode; the same warning only once."""
         if text in self._warned:
             return
         self._warned.add(text)
-        self.err.print(Text(f"warning: {text}", style="yellow"), soft_wrap=True)
+        self.err.print(_as_text(f"warning: {text}", "yellow"), soft_wrap=True)
 
     def fail(self, text: str) -> None:
-        """Print the one line that an error is."""
-        self.err.print(Text(f"exoid: {' '.join(text.split())}", style="red"), soft_wrap=True)
+        """Print an error as one line."""
+        self.err.print(_as_text(f"exoid: {' '.join(text.split())}", "red"), soft_wrap=True)
 
     @contextmanager
     def progress(self, what: str, total: float) -> Iterator[Callable[..., None]]:
-        """Show a bar while the block runs; yields ``report(done, note="")`` with ``done`` out of
-        ``total``."""
+        """Show a bar while the block runs; yield ``report(done, note="")``."""
+        if not self._may_move:
+            yield lambda done, note="": None
+            return
+        from rich import progress
+
         columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[note]}"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(),
+            progress.TextColumn("{task.fields[note]}"),
+            progress.TimeElapsedColumn(),
+            progress.TimeRemainingColumn(),
         )
-        with Progress(
-            *columns, console=self.err, transient=True, disable=not self._may_move
-        ) as bar:
+        with progress.Progress(*columns, console=self.err, transient=True) as bar:
             task = bar.add_task(what, total=total, note="")
             yield lambda done, note="": bar.update(task, completed=done, note=note)
 
     @contextmanager
     def working(self, what: str) -> Iterator[None]:
-        """Show that something goes on that may take a while, and for how long, where its end cannot
-        be told."""
-        columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(
-            *columns, console=self.err, transient=True, disable=not self._may_move
-        ) as line:
+        """Show a spinner and the elapsed time while the block runs."""
+        if not self._may_move:
+            yield
+            return
+        from rich import progress
+
+        columns = (
+            progress.SpinnerColumn("line"),
+            progress.TextColumn("{task.description}"),
+            progress.TimeElapsedColumn(),
+        )
+        with progress.Progress(*columns, console=self.err, transient=True) as line:
             line.add_task(what, total=None)
             yield
 
     @contextmanager
     def starting(self, what: str) -> Iterator[None]:
-        """Show what is being started; where nothing moves, a line says so as soon as it takes
-        long."""
-        late = threading.Timer(LATE_S, lambda: self.err.print(Text(what), soft_wrap=True))
+        """Show what is being started; without a terminal, print it once it takes long."""
+        late = threading.Timer(LATE_S, lambda: self.err.print(_as_text(what), soft_wrap=True))
         late.daemon = True
         if self.speaks and not self._may_move:
             late.start()
@@ -209,16 +213,17 @@ class Console:
             late.cancel()
 
     @contextmanager
-    def live(self, picture: RenderableType) -> Iterator[None]:
-        """Keep a picture on the terminal while the block runs, drawn ten times a second by a thread
-        of its own.
+    def live(self, picture: "RenderableType") -> Iterator[None]:
+        """Keep a picture on the terminal while the block runs, drawn ten times a second.
 
-        It has the screen for itself, so that it is right after the window's size has changed; how
-        it looked last stays below what was there before.
+        A thread of its own draws it on the alternate screen, so that it survives a resized window.
+        The last picture is printed below the earlier output.
         """
         if not self._may_move:
             yield
             return
+        from rich.live import Live
+
         interval = sys.getswitchinterval()
         sys.setswitchinterval(DRAWING_S)
         try:
@@ -233,13 +238,25 @@ class Console:
         return self.speaks and self.err.is_terminal
 
 
+def _rich_console(*, stderr: bool) -> "RichConsole":
+    from rich.console import Console as RichConsole
+
+    return RichConsole(stderr=stderr, highlight=False)
+
+
+def _as_text(text: "str | Text", style: str = "") -> "Text":
+    """Return a text that rich prints as it is, without markup."""
+    from rich.text import Text
+
+    return Text(text, style=style) if isinstance(text, str) else text
+
+
 def _plain(value: Any) -> Any:
-    """Return what JSON has words for; it has none for NaN and infinity, so that a number that is
-    none is null."""
+    """Return a value in JSON's types; NaN and infinity become null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(below) for key, below in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(below) for below in value]
+        return [_plain(item) for item in value]
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if value is None or isinstance(value, str | int):

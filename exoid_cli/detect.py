@@ -1,5 +1,4 @@
-"""``exoid detect``: which causes a motion would reveal, from which size on, and which it cannot
-tell apart."""
+"""``exoid detect``: the smallest size of each cause that a motion reveals, and which look alike."""
 
 import json
 from collections.abc import Sequence
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.detectability.detectability import Detectable
@@ -38,7 +37,8 @@ def detect(
         typer.Option(help="Runs that an excitation is planned for."),
     ] = "both",
     power: Annotated[
-        float, typer.Option(min=0.5, max=0.999, help="Chance to find an effect of that size.")
+        float,
+        typer.Option(min=0.5, max=0.999, help="Probability of finding an effect of that size."),
     ] = 0.9,
 ) -> None:
     """Say how large each cause must be to be seen with this motion and noise, and which causes look
@@ -53,29 +53,31 @@ def detect(
     from pipelines.contracts.atomic import open_folder, write_text
     from pipelines.diagnosis.detectability.detectability import as_json
 
-    files = files or [place_of(config, lacking="no excitation is given").step("design").target]
+    files = files or [
+        open_experiment(config, problem="no excitation is given").step("design").target
+    ]
     experiment = settings_in_force(config)
     if output:
         open_folder(output)
-    with console.progress("looking", total=1.0) as report:
+    with console.progress("searching", total=1.0) as report:
         if _is_trajectory(files):
-            found = _planned(files, experiment, rig, runs, power, report)
+            results = _planned(files, experiment, rig, runs, power, report)
         else:
-            found = _recorded(files, experiment, power, report)
-    told = {"files": [str(file) for file in files], "power": power, **as_json(found)}
+            results = _recorded(files, experiment, power, report)
+    document = {"files": [str(file) for file in files], "power": power, **as_json(results)}
     if output:
         from pipelines.diagnosis.detectability.figure import draw
 
         write_text(
-            output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1) + "\n"
+            output / "detectability.json", json.dumps(document, ensure_ascii=False, indent=1) + "\n"
         )
         draw(
-            found,
+            results,
             output / "detectability",
             f"What {', '.join(file.name for file in files)} would reveal",
         )
-    console.emit(told)
-    _show(found)
+    console.emit(document)
+    _show(results)
     if output:
         console.wrote(output, "detectability.json", "detectability.png")
 
@@ -126,7 +128,7 @@ def _planned(
 
 
 def _default_plant(experiment: Any) -> Any:
-    """Return the virtual rig's leg, of the lengths that exoid.toml says."""
+    """Return the virtual rig's leg with exoid.toml's lengths."""
     from pipelines.settings.plant import PlantSettings
 
     experiment.mechanism.refuse_all_but_the_leg("`exoid detect` of an excitation")
@@ -142,15 +144,15 @@ def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any)
     return detectability_of_recorded(motions, power, report, experiment.diagnose.known)
 
 
-def _show(found: Sequence["Detectable"]) -> None:
-    rms = f"rms {found[0].unit}"
+def _show(results: Sequence["Detectable"]) -> None:
+    rms = f"rms {results[0].unit}"
     headings = ("cause", "joint", "seen from", rms, "of torque")
-    console.table(headings, [_row(one) for one in found], numbers=f"seen from, {rms}, of torque")
+    console.table(headings, [_row(one) for one in results], numbers=f"seen from, {rms}, of torque")
     console.say("")
-    tied = [(one.effect.label, ", ".join(one.tied_with)) for one in found if one.tied_with]
+    tied = [(one.effect.label, ", ".join(one.tied_with)) for one in results if one.tied_with]
     console.table(("at that size", "could also be"), tied)
     never = sorted(
-        {tuple(sorted((one.effect.label, *one.never_apart))) for one in found if one.never_apart}
+        {tuple(sorted((one.effect.label, *one.never_apart))) for one in results if one.never_apart}
     )
     for labels in never:
         console.say(f"Of no size to be told apart with this motion: {', '.join(labels)}.")

@@ -1,4 +1,4 @@
-"""``exoid diagnose``: what the model gets wrong, its physical cause, and what naming it gains."""
+"""``exoid diagnose``: find what the model gets wrong, its physical cause, and the gain."""
 
 import json
 from pathlib import Path
@@ -7,8 +7,13 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, inputs_and_folder, place_of, settings_in_force
-from exoid_cli.steps import AgainOption, only
+from exoid_cli.experiment_folder import (
+    ConfigOption,
+    inputs_and_folder,
+    open_experiment,
+    settings_in_force,
+)
+from exoid_cli.stage_runner import AgainOption, run_stages
 from exoid_cli.verdict_view import show_verdict
 
 
@@ -65,7 +70,12 @@ def diagnose(
     from pipelines.settings.diagnose import DiagnoseSettings
 
     if not files and output is None and figures and not known:
-        only(context, place_of(config, lacking="no recording is given"), "diagnose", again=again)
+        run_stages(
+            context,
+            open_experiment(config, problem="no recording is given"),
+            "diagnose",
+            again=again,
+        )
         return
     files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)
@@ -77,55 +87,58 @@ def diagnose(
     motions = read_motions(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, motions)
     with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
-        found = find(motions, report, settings.diagnose.known)
-    said = verdict(found)
+        diagnosis = find(motions, report, settings.diagnose.known)
+    document = verdict(diagnosis)
     machine, geometry = motions[0].machine, motions[0].geometry
-    heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter", "diagnose")
-    shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
-    # Whole files are read for that.
-    hashed = zip(motions, files, strict=True) if found.each_run else ()
-    recordings = {motion.file: recording_behind(path) for motion, path in hashed}
+    used_settings = settings.sections_about(
+        machine.is_exoskeleton, "mechanism", "filter", "diagnose"
+    )
+    shared = {"joints": motions[0].joint_metadata} | describe(files, used_settings)
+    recordings = {}
+    if diagnosis.each_run:  # hashing reads whole files
+        for motion, path in zip(motions, files, strict=True):
+            recordings[motion.file] = recording_behind(path)
     model = {
-        "covariance": found.covariance.tolist(),
+        "covariance": diagnosis.covariance.tolist(),
         "mechanism": machine.mechanism.name,
         "geometry": machine.told(geometry),
-        "method": {"name": "joint fit of baseline and named causes", "status": found.status},
-        "collinear": found.collinear,
-        "unrealizable": found.unrealizable,
+        "method": {"name": "joint fit of baseline and named causes", "status": diagnosis.status},
+        "collinear": diagnosis.collinear,
+        "unrealizable": diagnosis.unrealizable,
         "each_run": {
             label: [
                 {"name": one["file"], "sha256": recordings[one["file"]], "values": one["values"]}
                 for one in of_runs
             ]
-            for label, of_runs in found.each_run.items()
+            for label, of_runs in diagnosis.each_run.items()
         },
     }
     frames = {
-        "parameters": found.parameters,
-        "residuals": found.residuals,
-        "candidates": candidates(found),
+        "parameters": diagnosis.parameters,
+        "residuals": diagnosis.residuals,
+        "candidates": candidates(diagnosis),
     }
-    visible = as_json(detectability(found.train, found.baseline, found.floor))
-    with all_or_none(output, vouching="verdict.json") as made:
+    detectable = as_json(detectability(diagnosis.train, diagnosis.baseline, diagnosis.floor))
+    with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():
             contract.write(
-                made / f"{name}.parquet",
+                folder / f"{name}.parquet",
                 frames[name],
                 shared | (model if name == "parameters" else {}),
             )
-        for name, told in (("detectability", visible), ("verdict", said)):
-            text = json.dumps(told | {"provenance": shared}, indent=1, ensure_ascii=False)
-            write_text(made / f"{name}.json", f"{text}\n")
+        for name, content in (("detectability", detectable), ("verdict", document)):
+            text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)
+            write_text(folder / f"{name}.json", f"{text}\n")
         if figures:
             from pipelines.diagnosis.verdict.figures.drawing import draw
 
-            draw(found, said, made)
-        drawn = {path.name for path in made.iterdir()}
+            draw(diagnosis, document, folder)
+        drawn = {path.name for path in folder.iterdir()}
     for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
         if old not in drawn:
             (output / old).unlink(missing_ok=True)
-    console.emit(said)
-    show_verdict(said, machine.joints)
+    console.emit(document)
+    show_verdict(document, machine.joints)
     console.wrote(
         output,
         "verdict.json",

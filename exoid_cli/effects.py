@@ -19,8 +19,7 @@ def effects(
         ),
     ] = None,
 ) -> None:
-    """List the effects a model can have, or say all about one: equation, parameters, how to confirm
-    it.
+    """List the effects a model can have, or explain one with equation and parameters.
 
     \b
     Examples:
@@ -34,12 +33,12 @@ def effects(
     if name is not None:
         _page(effect_named(name))
         return
-    told = [facts(effect) for effect in EFFECTS]
-    console.emit(told)
-    for one in told:
-        console.say(f"{one['effect']}, {one['side']}, joints: {one['joints']}")
-        console.note(one["equation"])
-        console.note(f"on exoskeletons {one['typical']}")
+    descriptions = [facts(effect) for effect in EFFECTS]
+    console.emit(descriptions)
+    for effect in descriptions:
+        console.say(f"{effect['effect']}, {effect['side']}, joints: {effect['joints']}")
+        console.note(effect["equation"])
+        console.note(f"on exoskeletons {effect['typical']}")
         console.say("")
     console.say("`exoid effects NAME` says how one looks in a plot and how to make sure of it.")
 
@@ -47,14 +46,14 @@ def effects(
 def _page(effect: type) -> None:
     from pipelines.effects.reference import facts, typical_range
 
-    told = facts(effect)
-    console.emit(told)
-    console.say(f"{told['title']} ({told['effect']})")
-    console.note(f"side: {told['side']}, joints: {told['joints']}")
+    description = facts(effect)
+    console.emit(description)
+    console.say(f"{description['title']} ({description['effect']})")
+    console.note(f"side: {description['side']}, joints: {description['joints']}")
     console.say("")
-    console.note(told["meaning"])
+    console.note(description["meaning"])
     console.say("")
-    console.note(told["equation"])
+    console.note(description["equation"])
     console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
     console.table(
@@ -68,7 +67,9 @@ def _page(effect: type) -> None:
         ("To confirm", "confirm"),
         ("Source", "source"),
     )
-    for title, key in ((title, key) for title, key in parts if told[key]):
-        text = told[key] if isinstance(told[key], str) else ", ".join(told[key])
+    for title, key in ((title, key) for title, key in parts if description[key]):
+        text = (
+            description[key] if isinstance(description[key], str) else ", ".join(description[key])
+        )
         console.say(f"\n{title}")
         console.note(text)

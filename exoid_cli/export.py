@@ -1,4 +1,4 @@
-"""``exoid export``: an identified model in the form that another tool reads."""
+"""``exoid export``: write an identified model in a format that another tool reads."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,7 +7,7 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
 
 if TYPE_CHECKING:
     from pipelines.export import Exported, Format
@@ -32,7 +32,7 @@ def export(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="The file, or a folder for it; beside the model unless given."
+            "-o", "--output", help="The file, or a folder for it; next to the model unless given."
         ),
     ] = None,
     run: Annotated[
@@ -43,8 +43,7 @@ def export(
     ] = None,
     config: ConfigOption = None,
 ) -> None:
-    """Hand an identified model to MuJoCo, pinocchio, MATLAB, a controller in C, or anything that
-    reads JSON.
+    """Export an identified model to MuJoCo, pinocchio, MATLAB, C or JSON.
 
     \b
     Examples:
@@ -62,22 +61,21 @@ def export(
     if to not in formats:
         raise SettingsError(f"--to {to}: there is no such format; {suggestion(to, list(formats))}")
     chosen = formats[to]
-    model = model or place_of(config, lacking="no model is given").step("identify").target
+    model = model or open_experiment(config, problem="no model is given").step("identify").target
     settings = settings_in_force(config)
-    made = exported(PARAMETERS.read(model), run, geometry_from(settings))
+    model_to_write = exported(PARAMETERS.read(model), run, geometry_from(settings))
     path = _path(model, output, chosen)
     with console.working("writing the model"):
-        files = _texts(made, chosen, path)
+        files = _texts(model_to_write, chosen, path)
     if any(file.resolve() == model.resolve() for file in files):
         raise SettingsError(f"-o {path}: is the model itself; choose another file")
     for file, text in files.items():
         write_text(file, text)
-    _report(made, chosen, list(files))
+    _report(model_to_write, chosen, list(files))
 
 
 def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
-    """Return the file to write: the one that was asked for, or one in that folder, or one beside
-    the model."""
+    """Return the file to write: ``output``, a file in that folder, or one next to the model."""
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS
 
@@ -86,32 +84,32 @@ def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
     path = (
         output if output.suffix and not output.is_dir() else output / f"{model.stem}{chosen.suffix}"
     )
-    meant = next(
+    other = next(
         (format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None
     )
-    if meant:
+    if other:
         raise SettingsError(
-            f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to"
+            f"-o {path}: is a file name of --to {other}, expected {chosen.suffix} with --to"
             f" {chosen.name}"
         )
     return path
 
 
-def _texts(made: "Exported", chosen: "Format", path: Path) -> dict[Path, str]:
+def _texts(exported: "Exported", chosen: "Format", path: Path) -> dict[Path, str]:
     """Return what goes into each file; the main one is ``path``, whatever its suffix."""
     files = {
-        path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()
+        path.with_suffix(suffix): text for suffix, text in chosen.write(exported, path.stem).items()
     }
     if path.suffix not in {file.suffix for file in files}:
         files[path] = files.pop(path.with_suffix(chosen.suffix))
     return files
 
 
-def _report(made: "Exported", chosen: "Format", files: list[Path]) -> None:
+def _report(exported: "Exported", chosen: "Format", files: list[Path]) -> None:
     from pipelines.export import Degree
     from pipelines.export.exported import values_in_words
 
-    holdings = made.holdings(chosen)
+    holdings = exported.holdings(chosen)
     terms = [
         {
             "term": term.effect.label,
@@ -130,9 +128,9 @@ def _report(made: "Exported", chosen: "Format", files: list[Path]) -> None:
     console.emit(
         {
             "to": chosen.name,
-            "run": made.run,
+            "run": exported.run,
             "files": written,
-            "warnings": made.driving(),
+            "warnings": exported.driving(),
             "terms": terms,
         }
     )
@@ -140,11 +138,11 @@ def _report(made: "Exported", chosen: "Format", files: list[Path]) -> None:
         ("term", "held", "how"),
         [(term.effect.label, holding.degree, holding.how) for term, holding in holdings],
     )
-    for sentence in made.driving():
+    for sentence in exported.driving():
         console.warn(sentence)
     for term, holding in holdings:
         if holding.degree is Degree.NOT:
             console.warn(
                 f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}"
             )
-    console.say(f"{', '.join(written)}: the {made.run} model")
+    console.say(f"{', '.join(written)}: the {exported.run} model")

@@ -20,7 +20,7 @@ def figures(
         typer.Option(
             "--only",
             metavar="NAME",
-            help="This figure; may be given again.",
+            help="Only this figure; repeatable.",
             autocompletion=completion.figures,
         ),
     ] = None,

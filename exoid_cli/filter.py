@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
-from exoid_cli.steps import AgainOption, only
+from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
+from exoid_cli.stage_runner import AgainOption, run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def filter_(
     config: ConfigOption = None,
     again: AgainOption = False,
     cutoff_hz: Annotated[
-        float | None, typer.Option(min=0.0, help="Cut-off; wins over exoid.toml's.")
+        float | None, typer.Option(min=0.0, help="Cut-off; overrides exoid.toml's.")
     ] = None,
 ) -> None:
     """Filter recordings' angles without delay and differentiate them; torque stays as measured.
@@ -47,33 +47,35 @@ def filter_(
       exoid filter run.parquet -o motion.parquet --cutoff-hz 9
     """
     if not files and output is None and cutoff_hz is None:
-        only(context, place_of(config, lacking="no recording is given"), "filter", again=again)
+        run_stages(
+            context, open_experiment(config, problem="no recording is given"), "filter", again=again
+        )
         return
     settings = settings_in_force(config).filter.changed(cutoff_hz=cutoff_hz)
-    made = [
+    results = [
         _filter(file, target, settings) for file, target in _targets(files or [], output, config)
     ]
-    console.emit(made[0] if len(made) == 1 else made)
+    console.emit(results[0] if len(results) == 1 else results)
 
 
 def _targets(
     files: list[Path], output: Path | None, config: Path | None
 ) -> list[tuple[Path, Path]]:
-    """Return what to read and what to write, from the experiment where they are not told."""
+    """Return inputs and outputs, from the experiment unless they are given."""
     if not files:
         files = [
             step.inputs[0]
-            for step in place_of(config, lacking="no recording is given").of_stage("filter")
+            for step in open_experiment(config, problem="no recording is given").of_stage("filter")
         ]
     if output is None:
-        output = place_of(config, lacking="-o: missing").out / "motions"
+        output = open_experiment(config, problem="-o: missing").out / "motions"
     elif len(files) == 1 and not output.is_dir():
         return [(files[0], output)]
     names = [file.name for file in files]
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                f"found two files named {name}, which would be one in {output}; filter them one"
+                f"two files are named {name}, which {output} can hold only once; filter them one"
                 " by one"
             )
     return [(file, output / file.name) for file in files]
@@ -88,21 +90,21 @@ def _filter(recording: Path, output: Path, settings: "FilterSettings") -> dict[s
         provenance = describe(
             inputs=[recording], config={"filter": settings.model_dump(mode="json")}
         )
-        found = Summary(motion)
-        MOTION.write_pieces(output, found.passing(motion.pieces()), motion.metadata | provenance)
-    gaps = "no gap" if found.segments == 1 else f"{found.segments} segments"
+        summary = Summary(motion)
+        MOTION.write_pieces(output, summary.passing(motion.pieces()), motion.metadata | provenance)
+    gaps = "no gap" if summary.segments == 1 else f"{summary.segments} segments"
     console.say(
-        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid, cut-off"
-        f" {found.cutoff_hz:.1f} Hz"
+        f"{output}: {summary.samples} samples, {gaps}, {summary.valid_share:.1%} valid, cut-off"
+        f" {summary.cutoff_hz:.1f} Hz"
     )
-    console.note(found.why)
-    difference = found.velocity_difference
+    console.note(summary.why)
+    difference = summary.velocity_difference
     return {
         "file": str(output),
-        "cutoff_hz": found.cutoff_hz,
-        "why": found.why,
-        "segments": found.segments,
-        "valid_share": found.valid_share,
-        "angle_noise_rad": found.noise.tolist(),
+        "cutoff_hz": summary.cutoff_hz,
+        "why": summary.why,
+        "segments": summary.segments,
+        "valid_share": summary.valid_share,
+        "angle_noise_rad": summary.noise.tolist(),
         "drive_velocity_difference_rad_s": None if difference is None else difference.tolist(),
     }

@@ -7,9 +7,14 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
-from exoid_cli.parameters_view import said, show_parameters
-from exoid_cli.place import ConfigOption, inputs_and_folder, place_of, settings_in_force
-from exoid_cli.steps import AgainOption, only
+from exoid_cli.experiment_folder import (
+    ConfigOption,
+    inputs_and_folder,
+    open_experiment,
+    settings_in_force,
+)
+from exoid_cli.parameters_view import format_value, show_parameters
+from exoid_cli.stage_runner import AgainOption, run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,7 +50,7 @@ def identify(
         str | None,
         typer.Option(
             help=(
-                "Estimator, also iv, wls, ols, irls or oe for short; docs/estimators.md tells of"
+                "Estimator, also iv, wls, ols, irls or oe for short; docs/estimators.md explains"
                 " each."
             ),
             show_default="[identify] method, weighted_least_squares",
@@ -55,13 +60,13 @@ def identify(
     causes: Annotated[
         Path | None,
         typer.Option(
-            help="The parameters.parquet of a diagnosis: fit what it named, too, its shapes held."
+            help="parameters.parquet of a diagnosis: fit its causes too, their shapes fixed."
         ),
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            help="What the model has besides, as rotor_inertia@knee; more than once for more.",
+            help="Further effect of the model, as rotor_inertia@knee; repeatable.",
             show_default="nothing",
         ),
     ] = None,
@@ -69,7 +74,7 @@ def identify(
         bool | None,
         typer.Option(
             "--reversals/--no-reversals",
-            help="Whether samples near reversals are fitted, too.",
+            help="Whether to fit samples near reversals, too.",
             show_default="[identify] reversals, no",
         ),
     ] = None,
@@ -90,13 +95,15 @@ def identify(
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
 
     if not files and output is None and (method, causes, effect, reversals) == (None,) * 4:
-        only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
+        run_stages(
+            context, open_experiment(config, problem="no motion is given"), "identify", again=again
+        )
         return
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"
         raise InputError(
-            f"{option}: no folder is given; name one with -o, for identified/ is of the model"
-            " without"
+            f"{option}: no folder is given, and identified/ is for the model without; name one with"
+            " -o"
         )
     if output and (output / "verdict.json").exists():
         raise InputError(
@@ -112,125 +119,117 @@ def identify(
         contract.refuse_place(output / f"{name}.parquet")
     settings = settings_in_force(config)
     estimator = estimator_named(settings.identify.method if method is None else method)
-    asked = settings.identify.changed(method=estimator.name, reversals=reversals)
+    options = settings.identify.changed(method=estimator.name, reversals=reversals)
     runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
-        found = fit(
+        model = fit(
             runs,
             estimator,
             _extension(effect or [], causes, runs, files),
-            reversals=asked.reversals,
+            reversals=options.reversals,
         )
-    heeded = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
-    config_used = heeded | {"identify": asked.model_dump(mode="json")}
+    used_settings = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
+    config_used = used_settings | {"identify": options.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
-    besides = {"effects": effect} if effect else {}
-    besides |= {"causes": shared["inputs"][-1]} if causes else {}
-    figures = _write(
-        found, output, shared | {"method": found.method | besides}, figures=asked.figures
-    )
-    _report(found, runs[0].machine)
+    method_used = dict(model.method)
+    if effect:
+        method_used["effects"] = effect
+    if causes:
+        method_used["causes"] = shared["inputs"][-1]
+    figures = _write(model, output, shared | {"method": method_used}, figures=options.figures)
+    _report(model, runs[0].machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
 
 def _extension(
     labels: "Sequence[str]", causes: Path | None, runs: "Sequence[Run]", files: "Sequence[Path]"
 ) -> "Extension":
-    """Return what the model has beside rigid body and friction."""
+    """Return the effects of the model in addition to rigid body and friction."""
     from pipelines.contracts import PARAMETERS
     from pipelines.identification.extension import Extension, chosen, named
 
-    beside = chosen(labels, runs[0].machine)
+    by_label = chosen(labels, runs[0].machine)
     of_diagnosis = named(PARAMETERS.read(causes), runs, files) if causes else Extension()
     if causes and not of_diagnosis.terms:
-        console.say(f"{causes}: names nothing beside rigid body and friction.")
-    return of_diagnosis.with_terms(beside)
+        console.say(f"{causes}: names nothing in addition to rigid body and friction.")
+    return of_diagnosis.with_terms(by_label)
 
 
 def _write(
-    found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool
+    model: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool
 ) -> list[str]:
-    """Write parameters, residuals and, if asked, figures into a folder; return the figures'
-    names."""
+    """Write parameters, residuals and figures into a folder; return the figures' names."""
     from pipelines.contracts import PARAMETERS, RESIDUALS
     from pipelines.identification.validation import residuals
 
-    run = found.runs[0]
+    run = model.runs[0]
     described = {
-        "covariance": found.covariance.tolist(),
+        "covariance": model.covariance.tolist(),
         "mechanism": run.machine.mechanism.name,
         "geometry": run.machine.told(run.geometry),
-        "one_step": found.one_step.tolist(),
-        "validation": found.validation.as_json(),
-        "collinear": found.collinear,
-        "unrealizable": found.unrealizable,
-        "remarks": found.remarks,
-        "angle_noise": found.angle_noise,
+        "one_step": model.one_step.tolist(),
+        "validation": model.validation.as_json(),
+        "collinear": model.collinear,
+        "unrealizable": model.unrealizable,
+        "remarks": model.remarks,
+        "angle_noise": model.angle_noise,
     }
-    if found.each_run:
-        described["each_run"] = found.each_run
-    PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
-    left = output / "residuals.parquet"
+    if model.each_run:
+        described["each_run"] = model.each_run
+    PARAMETERS.write(output / "parameters.parquet", model.parameters, shared | described)
+    residuals_file = output / "residuals.parquet"
     with console.working("predicting every run"):
-        model = "extended" if found.extension.terms else "baseline"
-        RESIDUALS.write_pieces(
-            left, residuals(found.runs, found.model_of, model, found.training.cutoff_hz), shared
-        )
+        name = "extended" if model.extension.terms else "baseline"
+        rows = residuals(model.runs, model.model_of, name, model.training.cutoff_hz)
+        RESIDUALS.write_pieces(residuals_file, rows, shared)
     if not figures:
         return []
     from pipelines.identification.figures import draw
 
     with console.working("drawing"):
-        draw(RESIDUALS.scan(left), output)
+        draw(RESIDUALS.scan(residuals_file), output)
     return sorted(path.name for path in output.glob("*.png"))
 
 
-def _report(found: "Identified", machine: "Machine") -> None:
+def _report(model: "Identified", machine: "Machine") -> None:
     from pipelines.contracts.joints import either
 
-    rows, unit = (
-        found.parameters.to_dict("records"),
-        either(joint.unit("torque") for joint in machine.joints),
-    )
+    rows = model.parameters.to_dict("records")
+    unit = either(joint.unit("torque") for joint in machine.joints)
     console.emit(
         {
             "parameters": rows,
-            "validation": found.validation.as_json(),
-            "collinear": found.collinear,
-            "unrealizable": found.unrealizable,
-            "method": found.method,
-            "remarks": found.remarks,
-            "angle_noise": found.angle_noise,
+            "validation": model.validation.as_json(),
+            "collinear": model.collinear,
+            "unrealizable": model.unrealizable,
+            "method": model.method,
+            "remarks": model.remarks,
+            "angle_noise": model.angle_noise,
         }
     )
-    show_parameters(rows, machine.joints, found.one_step.tolist())
+    show_parameters(rows, machine.joints, model.one_step.tolist())
     console.say("")
-    scores = {**found.validation.by_run, "all": found.validation.pooled}
+    scores = {**model.validation.by_run, "all": model.validation.pooled}
     console.table(
         ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}"),
         [
             (
                 run,
                 joint,
-                said(score.rmse[j], machine.joints, 3),
-                said(score.rmse_unmasked[j], machine.joints, 3),
-                said(score.torque_rms[j], machine.joints, 2),
+                format_value(score.rmse[j], machine.joints, 3),
+                format_value(score.rmse_unmasked[j], machine.joints, 3),
+                format_value(score.torque_rms[j], machine.joints, 2),
             )
             for run, score in scores.items()
-            for j, joint in enumerate(found.validation.joints)
+            for j, joint in enumerate(model.validation.joints)
         ],
         numbers=f"RMSE {unit}, with reversals, torque rms {unit}",
     )
-    for sentence in found.remarks:
+    for sentence in model.remarks:
         console.say(f"{sentence}.")
-    for sentence in [
-        *found.angle_noise,
-        *found.collinear,
-        *(
-            f"not a real {'leg' if machine.is_exoskeleton else 'machine'}: {s}"
-            for s in found.unrealizable
-        ),
-    ]:
+    kind = "leg" if machine.is_exoskeleton else "machine"
+    unrealizable = [f"not a real {kind}: {reason}" for reason in model.unrealizable]
+    for sentence in [*model.angle_noise, *model.collinear, *unrealizable]:
         console.warn(sentence)

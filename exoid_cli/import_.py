@@ -1,4 +1,4 @@
-"""``exoid import``: recordings out of logs from elsewhere."""
+"""``exoid import``: make recordings of logs from other tools."""
 
 import re
 from dataclasses import asdict
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import NAME
+from exoid_cli.experiment_folder import NAME
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pipelines.settings.import_map import ImportMap
 
 FEW = 3
-"""Logs of which each is told with all that was seen in it."""
+"""Most logs whose findings are all printed."""
 
 
 def import_(
@@ -35,12 +35,10 @@ def import_(
     ] = Path("recordings"),
     guess: Annotated[
         bool,
-        typer.Option(
-            "--guess", help="Propose a map instead; into the file that --map names, if any."
-        ),
+        typer.Option("--guess", help="Propose a map instead; written to --map, if given."),
     ] = False,
 ) -> None:
-    """Make recordings of logs from elsewhere; a map says what their columns are.
+    """Make recordings of logs from other tools; a map says what their columns are.
 
     \b
     Examples:
@@ -57,24 +55,25 @@ def import_(
         _import(files, map_, output)
 
 
-def _propose(files: list[Path], place: Path | None) -> None:
+def _propose(files: list[Path], map_file: Path | None) -> None:
     from pipelines.contracts.atomic import write_text
     from pipelines.importing.guess.guess import propose
 
-    if place is not None and place.exists():
+    if map_file is not None and map_file.exists():
         raise InputError(
-            f"{place}: exists already, not overwritten with a guess; choose another name"
+            f"{map_file}: exists already, not overwritten with a guess; choose another name"
         )
-    with console.working("looking"):
+    with console.working("guessing a map"):
         proposal = propose(files)
     doubts = [asdict(doubt) for doubt in proposal.doubts]
     console.emit({"map": proposal.text, "doubts": doubts})
-    if place is None:
+    if map_file is None:
         console.say(proposal.text.rstrip())
         return
-    write_text(place, proposal.text)
+    write_text(map_file, proposal.text)
     console.say(
-        f"{place}: proposed; look at what is doubtful in it, then `exoid import ... --map {place}`"
+        f"{map_file}: proposed; check the doubtful entries, then"
+        f" `exoid import ... --map {map_file}`"
     )
     for doubt in proposal.doubts:
         console.note(f"- {'fill in' if doubt.blocks else 'unsure'}: {doubt.key}: {doubt.why}")
@@ -85,144 +84,142 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.importing.sanity.leftover_recordings import unused
     from pipelines.settings.import_map import load_map
 
-    _refuse_the_name_of_a_recording(output)
+    _refuse_file_name(output)
     settings = load_map(map_)
-    for left in leftovers(output) if output.is_dir() else []:
+    for leftover in leftovers(output) if output.is_dir() else []:
         console.warn(
-            f"{left}: left by an import that was killed, or of one that goes on; remove it once"
-            " none does"
+            f"{leftover}: temporary file of an import that was killed or still runs; remove it"
+            " if none runs"
         )
     with folder_to_fill(output):
-        told = _made(files, settings, map_, output)
+        logs = _recordings(files, settings, map_, output)
     for recording in unused(settings, files):
         console.warn(f"{map_}: {recording}")
-    if len(told) > FEW:
-        _say_in_short(told)
+    if len(logs) > FEW:
+        _say_in_short(logs)
     else:
-        for one in told:
-            _say(one)
-    console.emit(told)
-    _say_what_follows(
-        output, [made["path"].stem for one in told for made in one["recordings"]], map_
-    )
+        for log in logs:
+            _say(log)
+    console.emit(logs)
+    names = [recording["path"].stem for log in logs for recording in log["recordings"]]
+    _say_next_step(output, names, map_)
 
 
-def _refuse_the_name_of_a_recording(output: Path) -> None:
+def _refuse_file_name(output: Path) -> None:
     if output.suffix == ".parquet":
         raise InputError(
-            f"-o {output}: ends as a recording's file does, expected the folder for all of them,"
-            " such as "
-            f'-o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
+            f"-o {output}: is a file name, expected the folder of all recordings, such as"
+            f' -o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
         )
 
 
-def _made(
+def _recordings(
     files: list[Path], settings: "ImportMap", map_: Path, output: Path
 ) -> list[dict[str, Any]]:
-    """Write the recordings of all files, or none of them; return what is told of each file."""
+    """Write the recordings of all files, or none of them; describe each file."""
     from pipelines.contracts.atomic import all_or_none
     from pipelines.importing.quantities.turn_offset import Beginnings
     from pipelines.importing.recordings import recordings, refuse_to_overwrite
 
     sources: dict[Path, Path] = {}
     before = Beginnings()
-    told: list[dict[str, Any]] = []
+    logs: list[dict[str, Any]] = []
     with all_or_none(output) as folder:
         for file in files:
-            made: list[dict[str, Any]] = []
+            written: list[dict[str, Any]] = []
             with console.working(f"reading {file.name}"):
                 for recording in recordings(file, settings, map_, before):
                     path = output / recording.file
                     if path in sources:
-                        raise InputError(_twice(path, sources[path], file))
+                        raise InputError(_same_name(path, sources[path], file))
                     refuse_to_overwrite(path)
                     recording.write(folder)
                     sources[path] = file
-                    made.append(_as_json(path, recording))
-            told.append({"file": file, "recordings": made})
-    return told
+                    written.append(_as_json(path, recording))
+            logs.append({"file": file, "recordings": written})
+    return logs
 
 
-def _twice(path: Path, first: Path, second: Path) -> str:
-    """Say that two recordings have one name, and which names would differ."""
+def _same_name(path: Path, first: Path, second: Path) -> str:
+    """Say that two recordings have the same name, and which names differ."""
     if first.absolute() == second.absolute():
-        what = "give the file once, or [[recording]] in the map names that differ"
+        remedy = "give the file once, or [[recording]] in the map names that differ"
     elif first.stem == second.stem:
-        what = (
+        remedy = (
             "give [[recording]] in the map a name with {folder} in it, such as"
             ' "{folder}_{file}_{purpose}", or each file one of its own, files ='
             f' "{"/".join(second.absolute().parts[-2:])}"'
         )
     else:
-        what = "give [[recording]] in the map names that differ, with {file} in them"
-    return f"{second}: its recording {path} would replace that of {first}; {what}"
+        remedy = "give [[recording]] in the map names that differ, with {file} in them"
+    return f"{second}: its recording {path} would replace that of {first}; {remedy}"
 
 
-def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
+def _say_next_step(output: Path, names: list[str], map_: Path) -> None:
     from pipelines.importing.sanity.leftover_recordings import lacks, no_longer_made
     from pipelines.workflow.imported import imported_in
 
-    found = imported_in(output)
-    for name in no_longer_made(found, made):
+    imported = imported_in(output)
+    for name in no_longer_made(imported, names):
         console.warn(
-            f"{output / name}: of these logs too, by an earlier map; this one makes it no more,"
+            f"{output / name}: made of these logs with an earlier map, but not with this one;"
             " remove it"
         )
-    lacking = list(lacks(found, made, map_))
-    for one in lacking:
-        console.say(one)
+    problems = list(lacks(imported, names, map_))
+    for problem in problems:
+        console.say(problem)
     settings_file = output.parent / NAME
-    if not lacking and not settings_file.exists():
+    if not problems and not settings_file.exists():
         console.say(
-            f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest"
+            f"with an empty {settings_file.as_posix()} next to them, `exoid run` does the rest"
         )
 
 
-def _say_in_short(told: list[dict[str, Any]]) -> None:
-    """Say of many logs a line each, and then once what was seen in several, but for its numbers."""
+def _say_in_short(logs: list[dict[str, Any]]) -> None:
+    """Print a line for each log, then each kind of finding once, with its first numbers."""
     seen: dict[tuple[str, str], list[tuple[Finding, str]]] = {}
-    for one in told:
-        for made in one["recordings"]:
-            _say_what_was_made(made)
-        for finding in _findings(one):
-            # As in "2 rows left out": of another file the numbers are others.
+    for log in logs:
+        for recording in log["recordings"]:
+            _say_recording(recording)
+        for finding in _findings(log):
+            # Findings of one kind differ in their numbers only, as in "2 rows left out".
             kind = (
                 finding.where,
                 re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where)),
             )
-            seen.setdefault(kind, []).append((finding, one["file"].name))
+            seen.setdefault(kind, []).append((finding, log["file"].name))
     if seen:
-        console.say("\nSeen, with the numbers of the first file; `exoid show` tells those of each:")
-    for found in seen.values():
-        finding, first = found[0]
-        files = len({name for _, name in found})
+        console.say("\nSeen, with the numbers of the first file; `exoid show` has those of each:")
+    for of_kind in seen.values():
+        finding, first = of_kind[0]
+        files = len({name for _, name in of_kind})
         more = f" and {files - 1} more" if files > 1 else ""
         console.note(f"- {finding} ({first}{more})")
     console.say("")
 
 
-def _say(told: dict[str, Any]) -> None:
-    for made in told["recordings"]:
-        _say_what_was_made(made)
-        console.note(f"{made['span_s'][0]:.3f} to {made['span_s'][1]:.3f} s of {told['file'].name}")
-    for finding in _findings(told):
+def _say(log: dict[str, Any]) -> None:
+    for recording in log["recordings"]:
+        _say_recording(recording)
+        begin, end = recording["span_s"]
+        console.note(f"{begin:.3f} to {end:.3f} s of {log['file'].name}")
+    for finding in _findings(log):
         console.note(f"- {finding}")
 
 
-def _say_what_was_made(made: dict[str, Any]) -> None:
+def _say_recording(recording: dict[str, Any]) -> None:
     console.say(
-        f"{made['path']}: {made['purpose']}, {made['samples']} samples,"
-        f" {made['sample_rate_hz']:.6g} Hz"
+        f"{recording['path']}: {recording['purpose']}, {recording['samples']} samples,"
+        f" {recording['sample_rate_hz']:.6g} Hz"
     )
 
 
-def _findings(told: dict[str, Any]) -> "list[Finding]":
-    """Return what was seen in a log, once where it is of all its recordings."""
+def _findings(log: dict[str, Any]) -> "list[Finding]":
+    """Return the findings in a log, each once."""
     from pipelines.importing.finding import Finding
 
-    return list(
-        dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"])
-    )
+    entries = (entry for recording in log["recordings"] for entry in recording["findings"])
+    return list(dict.fromkeys(Finding(**entry) for entry in entries))
 
 
 def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:

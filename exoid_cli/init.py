@@ -13,7 +13,7 @@ from exoid_cli.console import console
 def init(
     folder: Annotated[
         Path,
-        typer.Argument(metavar="DIR", help="Where the experiment shall live; made if need be."),
+        typer.Argument(metavar="DIR", help="Folder of the experiment; created if need be."),
     ],
 ) -> None:
     """Start a new experiment: a commented exoid.toml, rigs, and a Makefile.

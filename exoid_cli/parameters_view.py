@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from pipelines.contracts import Joint
 
 
-def said(value: float, joints: "Sequence[Joint]", decimals: int = 4) -> str:
+def format_value(value: float, joints: "Sequence[Joint]", decimals: int = 4) -> str:
     """Return a number as it is printed for a machine of these joints."""
     from pipelines.contracts import HIP_AND_KNEE
 
-    # So many decimals do for a leg; a servo's inertia would be nought by them.
+    # Fixed decimals suit a leg; the inertia of a small servo would be printed as zero.
     return f"{value:.{decimals}f}" if tuple(joints) == HIP_AND_KNEE else f"{value:.5g}"
 
 
@@ -23,18 +23,24 @@ def show_parameters(
     joints: "Sequence[Joint]",
     one_step: Sequence[float] | None = None,
 ) -> None:
-    """Print the rows of a parameters/1 table, with the values of a fit in one step where there are
-    any."""
-    beside = [] if one_step is None else [[said(one, joints)] for one in one_step]
+    """Print the rows of a parameters/1 table, and the values of a one-step fit if given."""
+    one_step_cells = [[format_value(value, joints)] for value in one_step or ()]
     console.table(
-        ("parameter", "value", "95 % interval", "unit", *(["one step"] if beside else []), "step"),
+        (
+            "parameter",
+            "value",
+            "95 % interval",
+            "unit",
+            *(["one step"] if one_step_cells else []),
+            "step",
+        ),
         [
             (
-                _named(row),
-                said(row["value"], joints),
+                _name(row),
+                format_value(row["value"], joints),
                 _interval(row, joints),
                 row["unit"],
-                *(beside[k] if beside else []),
+                *(one_step_cells[k] if one_step_cells else []),
                 row["step"],
             )
             for k, row in enumerate(rows)
@@ -45,9 +51,13 @@ def show_parameters(
 
 def _interval(row: Mapping[Any, Any], joints: "Sequence[Joint]") -> str:
     ends = [row[key] for key in ("ci95_low", "ci95_high")]
-    return " … ".join(said(end, joints) for end in ends) if all(map(isfinite, ends)) else "held"
+    return (
+        " … ".join(format_value(end, joints) for end in ends)
+        if all(map(isfinite, ends))
+        else "held"
+    )
 
 
-def _named(row: Mapping[Any, Any]) -> str:
+def _name(row: Mapping[Any, Any]) -> str:
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     return " ".join(filter(None, (joint, row["symbol"], run)))

@@ -1,4 +1,4 @@
-"""``exoid recover``: a whole recording of what a killed run left."""
+"""``exoid recover``: make a whole recording of a killed run's journal."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import place_of
+from exoid_cli.experiment_folder import open_experiment
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ def recover(
         list[Path] | None,
         typer.Argument(
             metavar="JOURNAL",
-            help="Journals that killed runs left, or folders of them.",
+            help="Journals of killed runs, or folders of them.",
             show_default="recordings/",
         ),
     ] = None,
@@ -26,49 +26,47 @@ def recover(
         Path | None, typer.Option("--output", "-o", help="The recording to write, of one.")
     ] = None,
 ) -> None:
-    """Make a whole recording of what a killed run left, and say what is missing.
+    """Make a recording of a killed run's journal, and say what is missing.
 
-    The journal goes once the recording is written. A file that is there is never overwritten.
+    The journal is removed once the recording is written. No file is overwritten.
 
     \b
     Examples:
       exoid recover
       exoid recover recordings/with_human_train.parquet.journal
     """
-    from pipelines.acquisition.recording.recover import journals_in
+    from pipelines.acquisition.recording.recover import Recovered, journals_in
     from pipelines.acquisition.recording.recover import recover as make_recording
 
-    recordings = (
-        []
-        if journals
-        else [place_of(None, lacking="no journal is given", look_only=True).out / "recordings"]
-    )
-    places = journals or [folder for folder in recordings if folder.exists()]
-    found = [journal for place in places for journal in journals_in(place)]
-    if not found:
+    if not journals:
+        folder = open_experiment(None, problem="no journal is given", allow_damaged=True).out
+        journals = [path for path in [folder / "recordings"] if path.exists()]
+    files = [file for path in journals for file in journals_in(path)]
+    if not files:
         console.say("no killed run left a journal; nothing to recover")
-    if output and len(found) > 1:
+    if output and len(files) > 1:
         raise InputError(
-            f"-o: names one recording, but there are {len(found)} journals; leave it out"
+            f"-o: names one recording, but there are {len(files)} journals; leave it out"
         )
-    made, refused = [], list[InputError]()
-    for journal in found:
+    recovered, refused = list[Recovered](), list[InputError]()
+    for file in files:
         try:
-            with console.working(f"recovering {journal.name}"):
-                made.append(make_recording(journal, output))
-            console.say(_told(made[-1]))
-        # One that is of no use must not keep the others from being recovered.
+            with console.working(f"recovering {file.name}"):
+                recovered.append(make_recording(file, output))
+            console.say(_in_words(recovered[-1]))
+        # A useless journal must not keep the others from being recovered.
         except InputError as error:
             refused.append(error)
-    console.emit([_as_json(one) for one in made])
+    console.emit([_as_json(recording) for recording in recovered])
     for refusal in refused[:-1]:
         console.fail(str(refusal))
     if refused:
         raise refused[-1]
 
 
-def _told(one: "Recovered") -> str:
-    account, text = one.account, f"{one.path}: {one.account.samples} samples"
+def _in_words(recording: "Recovered") -> str:
+    account = recording.account
+    text = f"{recording.path}: {account.samples} samples"
     if account.cut_off:
         seconds = account.cut_off / account.rate_hz
         text += f"; {account.cut_off} more ({seconds:.3f} s) were planned"
@@ -84,10 +82,10 @@ def _told(one: "Recovered") -> str:
     return f"{text}; {account.abort or 'the run had ended, only its recording was not written'}"
 
 
-def _as_json(one: "Recovered") -> dict:
-    account = one.account
+def _as_json(recording: "Recovered") -> dict:
+    account = recording.account
     return {
-        "path": one.path,
+        "path": recording.path,
         "samples": account.samples,
         "planned": account.planned,
         "cut_off": account.cut_off,

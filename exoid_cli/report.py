@@ -1,4 +1,4 @@
-"""``exoid report``: everything that was found, on one page that opens offline."""
+"""``exoid report``: all results on one page that opens offline."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,7 +26,7 @@ def report(
     config: Annotated[
         Path | None,
         typer.Option(
-            "--config", help="exoid.toml, to be named in the command lines that repeat it."
+            "--config", help="exoid.toml, named in the command lines that repeat the work."
         ),
     ] = None,
     compare: Annotated[
@@ -38,7 +38,7 @@ def report(
         typer.Option("--title", help="The page's title; the folder's name unless given."),
     ] = None,
 ) -> None:
-    """Write one self-contained page: the verdict, the figures, the model, and how to repeat it all.
+    """Write one self-contained page: verdict, figures, model, and how to repeat the work.
 
     \b
     Examples:
@@ -75,9 +75,9 @@ def report(
 
 
 def warn_of_unreadable(session: "Session") -> None:
-    """Name each file that looks like exoid's and cannot be read."""
-    for trouble in session.unreadable.values():
-        console.warn(trouble)
+    """Warn of each exoid file that cannot be read."""
+    for warning in session.unreadable.values():
+        console.warn(warning)
 
 
 def _compare(folders: tuple[Path, Path], output: Path) -> None:
@@ -90,14 +90,16 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
         warn_of_unreadable(session)
     page = compare(first, second, titles_of(first, second))
     write_text(output, page.text)
-    apart = [{"name": one.name, "first": one.first, "second": one.second} for one in page.settings]
+    differing = [
+        {"name": one.name, "first": one.first, "second": one.second} for one in page.settings
+    ]
     console.emit(
         {
             "path": str(output),
             "changed": page.changed,
             "judged": page.judged,
             "headline": page.headline,
-            "settings": apart,
+            "settings": differing,
         }
     )
     console.say(f"{page.headline}{' (95 %)' if page.judged else ''}.")

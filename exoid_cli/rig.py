@@ -1,115 +1,46 @@
-"""``exoid rig serve``: a virtual rig on this machine, to be recorded like a real one."""
+"""``exoid rig``: the commands for a rig file; a file without a command is served."""
 
-import socket
-from contextlib import ExitStack
-from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from exoid_cli.console import console
-from pipelines.errors import SettingsError
+from exoid_cli.global_options import Command, JsonOption, QuietOption, with_global_options
+from exoid_cli.rig_check import check
+from exoid_cli.rig_serve import serve
+from pipelines.validation.suggestion import closest
 
-LOOPBACK = "127.0.0.1"
+
+class _RigGroup(TyperGroup):
+    """A group in which ``exoid rig FILE`` means ``exoid rig serve FILE``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        words = [word for word in args if word not in ("--json", "--quiet", "-q")]
+        mistyped = words and not Path(words[0]).exists() and closest(words[0], list(self.commands))
+        if words and words[0] not in (*self.commands, "--help") and not mistyped:
+            args = ["serve", *args]
+        return super().parse_args(ctx, args)
 
 
-def rig(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="The rig's description, with a [plant].")
-    ],
-    run: Annotated[
-        Literal["exo_alone", "with_human"], typer.Option(help="Nobody in the machine, or somebody.")
-    ] = "with_human",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's."
-        ),
-    ] = None,
-    sample_rate_hz: Annotated[
-        float | None,
-        typer.Option(
-            "--rate-hz",
-            "--sample-rate-hz",
-            min=1.0,
-            max=1e5,
-            help="Samples a second; else the plant's.",
-        ),
-    ] = None,
-    bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
-    anyone: Annotated[
-        bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")
-    ] = False,
-    until_input_ends: Annotated[
-        bool, typer.Option(hidden=True, help="Stop when standard input is closed.")
-    ] = False,
-) -> None:
-    """Serve the drives and force sensors of a virtual rig over Modbus, until Ctrl-C.
+rig = typer.Typer(cls=_RigGroup, rich_markup_mode=None)
+
+
+@rig.callback()
+def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
+    """Check a rig, or serve a virtual one. `exoid rig FILE` serves.
 
     \b
     Example:
-      exoid rig serve rigs/real_time.toml --run exo_alone --port 5020
+      exoid rig serve rigs/real_time.toml --port 5020
     """
-    bind = _address(bind, anyone)
-    told, starting = False, ExitStack()
-
-    def announce(place: str, line: str | None) -> None:
-        nonlocal told
-        starting.close()
-        if not told and not until_input_ends:
-            console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
-            told = True
-        # Not through the console: whoever started the rig waits for this line.
-        print(f"{line} {place}" if line else place, flush=True)
-
-    with starting:
-        if not until_input_ends:
-            starting.enter_context(
-                console.starting(f"starting {file.name}; the first start compiles, up to a minute")
-            )
-        from pipelines.rig.server import serve_file  # compiles already
-
-        serve_file(
-            file,
-            run,
-            seed,
-            port,
-            sample_rate_hz,
-            announce,
-            until_input_ends=until_input_ends,
-            bind=bind,
-        )
+    console.add_options(quiet=quiet, json=json)
 
 
-def _address(bind: str, anyone: bool) -> str:
-    """Return the address to listen on; refuse one that other computers can reach, unless that is
-    wanted; then warn."""
-    found = _addresses(bind)
-    if found and all(ip_address(address).is_loopback for address in found):
-        return found[0]  # not the name, which may lead elsewhere the next time
-    if not anyone:
-        raise SettingsError(
-            f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}:"
-            " Modbus has no authentication, whoever reaches the rig can move it; add --anyone if"
-            " that is wanted"
-        )
-    console.warn(
-        f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can"
-        " move it"
-    )
-    return bind
-
-
-def _addresses(bind: str) -> list[str]:
-    """Return where a name or an address leads, those of IPv4 first as in rig files; empty where
-    nobody knows it."""
-    try:
-        found = socket.getaddrinfo(bind, None, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError):
-        return []
-    return [
-        str(place[0])
-        for family, *_, place in sorted(found, key=lambda one: one[0] != socket.AF_INET)
-    ]
+rig.command("serve", cls=Command, short_help="Serve a virtual rig over Modbus TCP.")(
+    with_global_options(serve)
+)
+rig.command("check", cls=Command, short_help="Say whether a rig is what its file says.")(
+    with_global_options(check)
+)

@@ -1,14 +1,18 @@
-"""``exoid rig check``: is the rig what its file says."""
+"""``exoid rig check``: compare a rig with its file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from exoid_cli.confirm import confirm_move
+from exoid_cli.confirm import OperatorPrompt, confirm_move
 from exoid_cli.console import console
-from exoid_cli.operator import Terminal
-from exoid_cli.place import ConfigOption, is_experiment, place_of, settings_in_force
+from exoid_cli.experiment_folder import (
+    ConfigOption,
+    in_experiment_folder,
+    open_experiment,
+    settings_in_force,
+)
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
@@ -39,25 +43,21 @@ def check(
     ] = None,
     run: Annotated[
         Literal["exo_alone", "with_human"],
-        typer.Option(
-            help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."
-        ),
+        typer.Option(help="Whether a person is in the machine; sensors' zeros need an empty one."),
     ] = "exo_alone",
     by_hand: Annotated[
         bool,
-        typer.Option(
-            "--by-hand", help="Then disable the drives and say what to move and press by hand."
-        ),
+        typer.Option("--by-hand", help="Guide a manual test with the drives disabled."),
     ] = False,
     move: Annotated[
         bool,
         typer.Option(
-            "--move", help="Then, if nothing is wrong, let the drives move 0.05 rad to and fro."
+            "--move", help="Then, if nothing is wrong, move each joint by 0.05 rad to and fro."
         ),
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Move without asking, for scripts.")] = False,
 ) -> None:
-    """Ask every device of a rig and say what is wrong; nothing moves unless told to.
+    """Ask every device of a rig and say what is wrong; nothing moves without --move.
 
     \b
     Examples:
@@ -69,16 +69,18 @@ def check(
     from pipelines.errors import DeviceError
 
     if file is None:
-        experiment = place_of(config, lacking="no rig file is given", look_only=True).experiment
+        experiment = open_experiment(
+            config, problem="no rig file is given", allow_damaged=True
+        ).experiment
         file = experiment.file(experiment.acquire.rig)
-    if rate_hz is None and (config or is_experiment()):
+    if rate_hz is None and (config or in_experiment_folder()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":
         refuse_to_move_somebody(by_hand=by_hand, move=move)
     console.say(f"{file}: asking every device")
     if move and not yes:
         confirm_move()
-    report = check_rig(file, rate_hz, run, Terminal() if by_hand else None, move=move)
+    report = check_rig(file, rate_hz, run, OperatorPrompt() if by_hand else None, move=move)
     console.emit(report.as_json())
     _show(report)
     if report.findings:
@@ -123,8 +125,7 @@ def _show(report: "RigReport") -> None:
         headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
         console.note(
-            "The scale of the torque shows in no movement: hold a known weight, see"
-            " docs/rig-check.md."
+            "No movement shows the scale of the torque. Hold a known weight, see docs/rig-check.md."
         )
     for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
         if rate:
@@ -172,8 +173,8 @@ def _clock(device: "DeviceReport") -> tuple[str, str]:
     if clock is None:
         return "", ""
     rates = (clock.counter_hz, ".1f"), (clock.clock_rate, ".4f")
-    told = [format(rate, form) if rate is not None else "" for rate, form in rates]
-    return told[0], told[1]
+    samples, clock_rate = (format(rate, form) if rate is not None else "" for rate, form in rates)
+    return samples, clock_rate
 
 
 def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:

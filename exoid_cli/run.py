@@ -1,4 +1,4 @@
-"""``exoid run``: an experiment brought up to date, without make."""
+"""``exoid run``: bring an experiment up to date, without make."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,8 +9,14 @@ import typer
 from exoid_cli import completion
 from exoid_cli.confirm import YesOption, ask_before
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, OutOption, Place, place_of, why_absent
-from exoid_cli.steps import LeftOut, bring_up_to_date
+from exoid_cli.experiment_folder import (
+    ConfigOption,
+    ExperimentFolder,
+    OutOption,
+    open_experiment,
+    why_no_step,
+)
+from exoid_cli.stage_runner import SkippedStep, bring_up_to_date
 
 
 def run(
@@ -40,56 +46,53 @@ def run(
     from pipelines.workflow.graph import needed_for
     from pipelines.workflow.split import split
 
-    place = place_of(config, out)
-    wanted = needed_for(
-        place.of_stage(*_known(stages or [], place)) if stages else place.steps, place.steps
-    )
+    folder = open_experiment(config, out)
+    _refuse_unknown(stages or [], folder)
+    wanted = needed_for(folder.of_stage(*stages) if stages else folder.steps, folder.steps)
     if any(step.stage == "acquire" for step in wanted):
-        place.experiment.refuse_what_cannot_run()
-    judged = [one for one in Judge(place.out).all(place.steps) if one.step in wanted]
-    # What was left out is tried again where it is asked for by name.
+        folder.experiment.refuse_what_cannot_run()
+    judged = [one for one in Judge(folder.out).all(folder.steps) if one.step in wanted]
+    # A step that was left out is tried again if its stage is named.
     if all(one.state is Freshness.DONE if stages else one.done for one in judged):
         console.emit([])
         console.say("Everything is up to date.")
         return
-    # So that make, called next, finds nothing to do.
-    split(place.experiment, place.out / ".settings")
-    done, left_out = bring_up_to_date(
-        context, place, wanted, before=partial(ask_before, place.experiment, yes=yes)
+    # So that make, called next, has nothing to do.
+    split(folder.experiment, folder.out / ".settings")
+    results, skipped = bring_up_to_date(
+        context, folder, wanted, before=partial(ask_before, folder.experiment, yes=yes)
     )
-    console.emit([one.as_json() for one in done])
-    kept = len(wanted) - len(done) - len(left_out)
-    up_to_date = f"; {kept} {'was' if kept == 1 else 'were'} up to date" if kept else ""
+    console.emit([result.as_json() for result in results])
+    fresh = len(wanted) - len(results) - len(skipped)
+    up_to_date = f"; {fresh} {'was' if fresh == 1 else 'were'} up to date" if fresh else ""
     console.say(
-        f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f}"
-        f" s{up_to_date}"
+        f"\n{len(results)} of {len(wanted)} steps done in"
+        f" {sum(result.seconds for result in results):.0f} s{up_to_date}"
     )
-    _say_what_is_left_out(left_out)
+    _say_skipped(skipped)
 
 
-def _say_what_is_left_out(left_out: Sequence[LeftOut]) -> None:
-    """Say once more at the end, where it is read, which steps could not be done, those of one
-    reason together."""
-    for why in dict.fromkeys(one.why for one in left_out):
-        targets = [one.step.target.as_posix() for one in left_out if one.why == why]
+def _say_skipped(skipped: Sequence[SkippedStep]) -> None:
+    """Repeat at the end which steps could not be done, those of one reason together."""
+    for reason in dict.fromkeys(step.reason for step in skipped):
+        targets = [skip.step.target.as_posix() for skip in skipped if skip.reason == reason]
         are = "is" if len(targets) == 1 else "are"
         console.say(
-            f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {why}"
+            f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {reason}"
         )
 
 
-def _known(stages: list[str], place: Place) -> list[str]:
+def _refuse_unknown(stages: Sequence[str], folder: ExperimentFolder) -> None:
     from pipelines.errors import InputError
     from pipelines.validation.suggestion import suggestion
     from pipelines.workflow.graph import STAGES
 
-    known = list(dict.fromkeys(step.stage for step in place.steps))
+    known = list(dict.fromkeys(step.stage for step in folder.steps))
     for stage in stages:
         if stage in known:
             continue
         if stage in STAGES:
-            raise InputError(f"{stage}: {why_absent(stage)}; leave it out")
+            raise InputError(f"{stage}: {why_no_step(stage)}; leave it out")
         raise InputError(
             f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}"
         )
-    return stages

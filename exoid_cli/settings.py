@@ -1,4 +1,4 @@
-"""``exoid settings``: an experiment's settings for make."""
+"""``exoid settings``: check an experiment's settings, or write them for make."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
-from exoid_cli.place import place_of
+from exoid_cli.experiment_folder import open_experiment
+from exoid_cli.global_options import Command, JsonOption, QuietOption, with_global_options
 
 settings = typer.Typer(rich_markup_mode=None)
 
@@ -20,11 +20,11 @@ def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
     Example:
       exoid settings check exoid.toml
     """
-    console.heed(quiet=quiet, json=json)
+    console.add_options(quiet=quiet, json=json)
 
 
 @settings.command("check", cls=Command, short_help="Say whether an experiment's file can be used.")
-@heeding
+@with_global_options
 def check(
     config: Annotated[
         Path, typer.Argument(metavar="FILE", help="The experiment's settings.")
@@ -37,15 +37,15 @@ def check(
       exoid settings check
       exoid settings check my_experiment/exoid.toml --json
     """
-    place = place_of(config, look_only=True)
-    if place.of_stage("acquire"):
-        place.experiment.refuse_what_cannot_run()
-    console.emit(place.experiment.model_dump(mode="json"))
-    console.say(f"{config}: {len(place.experiment.run)} runs, all settings are valid")
+    folder = open_experiment(config, allow_damaged=True)
+    if folder.of_stage("acquire"):
+        folder.experiment.refuse_what_cannot_run()
+    console.emit(folder.experiment.model_dump(mode="json"))
+    console.say(f"{config}: {len(folder.experiment.run)} runs, all settings are valid")
 
 
 @settings.command("split", cls=Command, short_help="Write one file a section, for make.")
-@heeding
+@with_global_options
 def split(
     config: Annotated[Path, typer.Argument(metavar="FILE", help="The experiment's exoid.toml.")],
     out: Annotated[

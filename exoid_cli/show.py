@@ -1,4 +1,4 @@
-"""``exoid show``: what a file is, where it came from, and what is in it."""
+"""``exoid show``: describe a file by its contract, its origin and its content."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pipelines.contracts.inspection import Inspection
 
 HASH = 12
-"""Characters of a hash that are shown: enough to tell two files apart."""
+"""Characters of a hash that are shown, enough to distinguish files."""
 FIRST = 10
 """Candidates that are shown."""
 COLUMNS = 8
@@ -30,8 +30,8 @@ def show(
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
 
-    Of a model it shows the parameters, of a verdict what it says, of
-    candidates why each was named or not.
+    A model is shown by its parameters, a verdict by its findings, candidates
+    by the reasons for and against each.
 
     \b
     Examples:
@@ -41,50 +41,51 @@ def show(
     """
     from pipelines.contracts.inspection import inspect
 
-    found = inspect(file)
-    console.emit(found.as_json())
-    console.say(f"{file}: {found.contract}, {found.purpose}")
-    whole = _show_whole(found)
-    if found.columns and not whole:
+    inspection = inspect(file)
+    console.emit(inspection.as_json())
+    console.say(f"{file}: {inspection.contract}, {inspection.purpose}")
+    complete = _show_content(inspection)
+    if inspection.columns and not complete:
         headings = ("column", "unit", "type", "min", "max", "nulls")
-        rows = [[column[heading] for heading in headings] for column in found.columns]
-        console.say(f"\n{found.rows} rows")
+        rows = [[column[heading] for heading in headings] for column in inspection.columns]
+        console.say(f"\n{inspection.rows} rows")
         console.table(headings, [_shortened(row) for row in rows], numbers="min, max, nulls")
-    _show_facts("Where it came from", _folded(found.origin))
-    if not (whole and found.contract.startswith("verdict/")):
-        _show_facts("Metadata", found.metadata)
-    if found.fault:
-        raise found.fault
+    _show_facts("Where it came from", _folded(inspection.origin))
+    if not (complete and inspection.contract.startswith("verdict/")):
+        _show_facts("Metadata", inspection.metadata)
+    if inspection.fault:
+        raise inspection.fault
 
 
-def _show_whole(found: "Inspection") -> bool:
-    """Show what is short and meant for people as such; return whether it was that."""
+def _show_content(inspection: "Inspection") -> bool:
+    """Show a model, candidates or a verdict as text; return whether the file is one of these."""
     from pipelines.contracts import CANDIDATES, PARAMETERS, joints_of
 
-    if found.fault:
+    if inspection.fault:
         return False
-    if found.contract == PARAMETERS.label:
+    if inspection.contract == PARAMETERS.label:
         from exoid_cli.parameters_view import show_parameters
 
         console.say("")
         show_parameters(
-            PARAMETERS.read(Path(found.file)).frame.to_dict("records"), joints_of(found.metadata)
+            PARAMETERS.read(Path(inspection.file)).frame.to_dict("records"),
+            joints_of(inspection.metadata),
         )
         return True
-    if found.contract == CANDIDATES.label:
-        _show_candidates(CANDIDATES.read(Path(found.file)).frame.to_dict("records"))
+    if inspection.contract == CANDIDATES.label:
+        _show_candidates(CANDIDATES.read(Path(inspection.file)).frame.to_dict("records"))
         return True
-    if found.contract.startswith("verdict/") and "causes" in found.metadata:
+    if inspection.contract.startswith("verdict/") and "causes" in inspection.metadata:
         from exoid_cli.verdict_view import show_verdict
 
         console.say("")
-        show_verdict(found.metadata, joints_of(found.metadata))
+        show_verdict(inspection.metadata, joints_of(inspection.metadata))
         return True
     return False
 
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
-    """Say of the first candidates what became of each, and why."""
+    """Print the decision on each of the first candidates, and its reason."""
     from pipelines.report.sections.error_budget import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
@@ -99,8 +100,7 @@ def _show_candidates(rows: list[dict[Any, Any]]) -> None:
 
 
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:
-    """Say of the settings only that they are there, for they are a screenful; of a hash its
-    beginning."""
+    """Shorten the origin: the number of settings, and the first characters of each hash."""
     folded = dict(origin)
     if "config" in origin:
         folded["config"] = (

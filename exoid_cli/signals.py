@@ -1,5 +1,4 @@
-"""Signals that ask exoid to end: the first one ends it, and none keeps from the user what is being
-told already."""
+"""Signals that ask exoid to end: the first ends it, and none cuts an error message short."""
 
 import signal
 import sys
@@ -13,58 +12,56 @@ from pipelines.process.termination import ENDING, known, not_ignored
 class Interrupted(KeyboardInterrupt):
     """A signal asked exoid to end.
 
-    Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers and dataclasses use
-    it, and under ``python -m`` dies of SIGINT in the end, whatever the exit code was to be.
+    A subclass, because Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers
+    and dataclasses use it. Under ``python -m`` it then dies of SIGINT, whatever the exit code.
     """
 
 
 class Signals:
-    """The signals of one process, whatever they come in the midst of."""
+    """The signals of one process."""
 
     def __init__(self) -> None:
-        self.came: signal.Signals | None = None
-        """The last one that asked exoid to end; compilers and imports take KeyboardInterrupt for
-        their own failure."""
-        self._heeded = list[signal.Signals]()
+        self.last: signal.Signals | None = None
+        """The last signal; compilers and imports take KeyboardInterrupt for their own failure."""
+        self._handled = list[signal.Signals]()
 
-    def heed(self) -> None:
-        """Raise KeyboardInterrupt at each from now on, so that what is half written is cleared
-        away."""
-        self._heeded = not_ignored(known(ENDING))
-        for number in self._heeded:
+    def handle(self) -> None:
+        """Raise KeyboardInterrupt at each signal from now on, so that partial files are removed."""
+        self._handled = not_ignored(known(ENDING))
+        for number in self._handled:
             signal.signal(number, self._interrupt)
-        sys.unraisablehook = _unraisable
+        sys.unraisablehook = _report_unraisable
 
     def ignore(self) -> None:
-        """Let no signal change how exoid ends: all is told, its exit code is known."""
-        # By the system: Python's own handlers are gone before its process is.
-        for number in self._heeded:
+        """Ignore all signals: the exit code is decided and the message printed."""
+        # SIG_IGN, because Python's own handlers are removed before its process ends.
+        for number in self._handled:
             signal.signal(number, signal.SIG_IGN)
 
-    def told(self) -> str:
-        """Return in words what ended exoid."""
-        return f"stopped by {ENDING[(self.came or signal.SIGINT).name]}"
+    def message(self) -> str:
+        """Return the message that names the signal."""
+        return f"stopped by {ENDING[(self.last or signal.SIGINT).name]}"
 
     @property
     def exit_code(self) -> int:
-        """As shells have it."""
-        return 128 + (self.came or signal.SIGINT)
+        """128 and the signal's number, as in shells."""
+        return 128 + (self.last or signal.SIGINT)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        if not any(isinstance(error, ExoidError | KeyboardInterrupt) for error in _on_their_way()):
-            self.came = signal.Signals(number)
+        # An error on its way to the user must not be replaced by an interruption.
+        if not any(isinstance(error, ExoidError | KeyboardInterrupt) for error in _handled_now()):
+            self.last = signal.Signals(number)
             raise Interrupted
 
 
-def _unraisable(told: "sys.UnraisableHookArgs") -> None:
-    """Say nothing of an interruption that fell into a callback of compiled code, such as the
-    compiler's."""
-    if not issubclass(told.exc_type, KeyboardInterrupt):
-        sys.__unraisablehook__(told)
+def _report_unraisable(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Report nothing of an interruption inside a callback of compiled code, as LLVM's."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
 
 
-def _on_their_way() -> Iterator[BaseException]:
-    """Yield the exceptions in whose wake something is being cleared away or told just now."""
+def _handled_now() -> Iterator[BaseException]:
+    """Yield the exceptions that are being handled, the innermost first."""
     error = sys.exception()
     while error:
         yield error

@@ -1,4 +1,4 @@
-"""``exoid simulate``: the identified leg under the adaptive controller, or beside a recording."""
+"""``exoid simulate``: the identified leg under the adaptive controller, or a recording's replay."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
-from exoid_cli.steps import AgainOption, only
+from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
+from exoid_cli.stage_runner import AgainOption, run_stages
 
 if TYPE_CHECKING:
     from pipelines.contracts import Joint, Table
@@ -52,7 +52,7 @@ def simulate(
     replay: Annotated[
         Path | None,
         typer.Option(
-            "--replay", help="A recording/1 or motion/1 to simulate again; its run counts."
+            "--replay", help="A recording/1 or motion/1 to simulate again, with its own run."
         ),
     ] = None,
 ) -> None:
@@ -77,29 +77,31 @@ def simulate(
             "--reference and --replay exclude each other: a replay follows its recording; drop one"
         )
     if parameters is output is run is reference is replay is None:
-        only(
+        run_stages(
             context,
-            place_of(config, lacking="no parameters are given"),
+            open_experiment(config, problem="no parameters are given"),
             "simulate",
             "replay",
             again=again,
         )
         return
     if parameters is None:
-        parameters = place_of(config, lacking="no parameters are given").step("identify").target
+        parameters = (
+            open_experiment(config, problem="no parameters are given").step("identify").target
+        )
     if output is None:
-        folder = place_of(config, lacking="-o: missing").out / "simulated"
+        folder = open_experiment(config, problem="-o: missing").out / "simulated"
         output = folder / f"replay-{replay.stem}.parquet" if replay else folder
     settings = settings_in_force(config)
     table = PARAMETERS.read(parameters)
     if replay:
         _replay(table, replay, settings, output)
     else:
-        _track(table, run or _whose(table), reference, settings, output)
+        _track(table, run or _default_run(table), reference, settings, output)
 
 
-def _whose(table: "Table") -> str:
-    """Return the kind of run that a model is of: with somebody in it, where it is of both."""
+def _default_run(table: "Table") -> str:
+    """Return the model's kind of run; with_human if it has both."""
     kinds = set(table.frame["run"])
     return "exo_alone" if "exo_alone" in kinds and "with_human" not in kinds else "with_human"
 
@@ -216,41 +218,43 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     names = [joint.name for joint in plant.joints]
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
-    lacks = recorded.why_no_closed_loop(motion)
-    beside = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
-    told = {
+    no_closed_loop = recorded.why_no_closed_loop(motion)
+    closed_loop_file = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
+    about_replay = {
         "simulation_rmse_rad": rmse,
         "windows": len(replayed.first),
-        "beside": [] if lacks else [beside.name],
+        "beside": [] if no_closed_loop else [closed_loop_file.name],
     }
-    SIMULATION.write(output, open_loop, shared | told)
-    if not lacks:
+    SIMULATION.write(output, open_loop, shared | about_replay)
+    if not no_closed_loop:
         with console.working("following the references"):
-            made = recorded.follow_references(plant, motion)
-        closed_loop = recorded.closed_loop_frame(made, motion, plant.joints)
-        result["closed_loop_rmse_rad"] = dict(zip(names, made.angle_rmse.tolist(), strict=True))
-        result["closed_loop_rmse_nm"] = dict(zip(names, made.torque_rmse.tolist(), strict=True))
+            loop = recorded.follow_references(plant, motion)
+        closed_loop = recorded.closed_loop_frame(loop, motion, plant.joints)
+        result["closed_loop_rmse_rad"] = dict(zip(names, loop.angle_rmse.tolist(), strict=True))
+        result["closed_loop_rmse_nm"] = dict(zip(names, loop.torque_rmse.tolist(), strict=True))
         scores = {key: value for key, value in result.items() if key.startswith("closed")}
         controller = motion.metadata["controller"]
-        SIMULATION.write(beside, closed_loop, shared | scores | {"controller": controller})
+        SIMULATION.write(
+            closed_loop_file, closed_loop, shared | scores | {"controller": controller}
+        )
     if settings.simulate.figures:
         from pipelines.simulation.figures import draw_replay
 
         with console.working("drawing"):
             title = f"{recording.stem}, simulated again"
             draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), title)
-    console.emit(result | ({"no_closed_loop": lacks} if lacks else {}))
+    console.emit(result | ({"no_closed_loop": no_closed_loop} if no_closed_loop else {}))
     _report_replay(result, plant.joints)
-    if lacks:
-        console.warn(f"no closed loop for {recording}: {lacks}")
+    if no_closed_loop:
+        console.warn(f"no closed loop for {recording}: {no_closed_loop}")
     console.wrote(
         output.parent,
         output.name,
-        *([] if lacks else [beside.name]),
+        *([] if no_closed_loop else [closed_loop_file.name]),
         *([output.with_suffix(".png").name] if settings.simulate.figures else []),
     )
     for guess in plant.guesses:
-        console.warn(f"{guess}, and as much as they differ the errors are not the model's")
+        console.warn(f"{guess}. The errors contain the difference")
 
 
 def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:

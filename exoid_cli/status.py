@@ -1,4 +1,4 @@
-"""``exoid status``: how far an experiment is, a line for each stage."""
+"""``exoid status``: the state of an experiment, a line for each stage."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, OutOption, place_of
+from exoid_cli.experiment_folder import ConfigOption, OutOption, open_experiment
 
 if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
 
-DO = "import it again, or remove it"
-"""With a recording that cannot be read."""
+REMEDY = "import it again, or remove it"
+"""What to do about a recording that cannot be read."""
 
 
 def status(config: ConfigOption = None, out: OutOption = None) -> None:
     """Say of each stage of an experiment whether it is done, stale and why, or missing.
 
-    A result is stale where an input or a setting is another one than it was made of. An imported
-    recording that cannot be read any more has a line of its own, and makes the exit code 2.
+    A result is stale where an input or a setting has changed since it was made. An imported
+    recording that cannot be read has a line of its own, and makes the exit code 2.
 
     \b
     Examples:
@@ -31,21 +31,22 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     from pipelines.workflow.freshness import Judge
     from pipelines.workflow.imported import damage
 
-    place = place_of(config, out, look_only=True)
-    judged = Judge(place.out).all(place.steps)
+    folder = open_experiment(config, out, allow_damaged=True)
+    judged = Judge(folder.out).all(folder.steps)
     console.emit(
-        [*(_damaged_as_json(file) for file in place.damaged), *(_as_json(one) for one in judged)]
+        [*(_damaged_as_json(file) for file in folder.damaged), *(_as_json(one) for one in judged)]
     )
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
     damaged = [
-        ("import", "damaged", file.relative_to(place.out).as_posix(), DO) for file in place.damaged
+        ("import", "damaged", file.relative_to(folder.out).as_posix(), REMEDY)
+        for file in folder.damaged
     ]
     console.table(
         ("stage", "state", "result", "why"),
-        [*damaged, *(_line(stage, place.out) for stage in stages)],
+        [*damaged, *(_line(stage, folder.out) for stage in stages)],
     )
-    if place.damaged:
-        raise InputError(damage(place.damaged))
+    if folder.damaged:
+        raise InputError(damage(folder.damaged))
     todo = sum(not one.done for one in judged)
     to_do = (
         f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what"
@@ -74,7 +75,7 @@ def _result(targets: Sequence[Path], counted: int) -> str:
 
 
 def _damaged_as_json(file: Path) -> dict[str, Any]:
-    return {"stage": "import", "target": file, "state": "damaged", "why": [DO], "command": None}
+    return {"stage": "import", "target": file, "state": "damaged", "why": [REMEDY], "command": None}
 
 
 def _as_json(one: "Judged") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A verdict as a person reads it: what is missing and how sure that is, the errors, each cause."""
+"""A verdict as text: what is missing, its probability, the torque errors, and each cause."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
@@ -30,31 +30,31 @@ FAULTS = 5
 """Faults of acquisition that are listed."""
 
 
-def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
+def show_verdict(verdict: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     """Print a verdict/1 document about a machine of these joints."""
     from pipelines.contracts.joints import HIP_AND_KNEE
 
-    console.say(said["summary"])
-    _show_findings(said)
-    _show_faults(said)
-    for caveat in said["caveats"]:
+    console.say(verdict["summary"])
+    _show_findings(verdict)
+    _show_faults(verdict)
+    for caveat in verdict["caveats"]:
         console.say(f"\nBut {caveat}.")
-    _show_router(said)
-    _show_errors(said, joints)
-    for known in said.get("known", ()):
+    _show_router(verdict)
+    _show_errors(verdict, joints)
+    for known in verdict.get("known", ()):
         _show_known(known)
-    for cause in said["causes"]:
+    for cause in verdict["causes"]:
         _show_cause(cause)
     # The gait that would be followed is a leg's.
-    if said["causes"] and tuple(joints) == HIP_AND_KNEE:
-        _show_control(said["control"])
+    if verdict["causes"] and tuple(joints) == HIP_AND_KNEE:
+        _show_control(verdict["control"])
 
 
-def _show_faults(said: Mapping[str, Any]) -> None:
-    """List faults of acquisition where the summary has room for the first one only."""
-    faults = said["data_faults"]
-    if said.get("acquisition_at_fault"):
-        console.say("\nNo cause was looked for. Mend acquisition, and record again.")
+def _show_faults(verdict: Mapping[str, Any]) -> None:
+    """List the faults of acquisition; the summary names only the first."""
+    faults = verdict["data_faults"]
+    if verdict.get("acquisition_at_fault"):
+        console.say("\nNo cause was sought. Correct the acquisition, and record again.")
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")
@@ -64,11 +64,11 @@ def _show_faults(said: Mapping[str, Any]) -> None:
         console.note(f"- {len(faults) - FAULTS} more, in data_faults of verdict.json")
 
 
-def _show_findings(said: Mapping[str, Any]) -> None:
-    """Print how probable it is that something is missing, and the path to what it is."""
+def _show_findings(verdict: Mapping[str, Any]) -> None:
+    """Print the probability that something is missing, and the path to what it is."""
     from pipelines.wording.findings import outcomes, rows
 
-    cases, tree = outcomes(said), rows(said)
+    cases, tree = outcomes(verdict), rows(verdict)
     if not cases:
         return
     shown = [_broken(row.words, row.depth) for row in tree]
@@ -89,18 +89,18 @@ def _show_findings(said: Mapping[str, Any]) -> None:
 
 
 def _broken(words: str, depth: int) -> list[str]:
-    """Return words as lines that leave room for the probability, set in by their depth."""
+    """Return indented lines that leave room for the probability."""
     indent = "  " * depth
     room = console.out.width - len("  probability")
     return wrap(words, room, initial_indent=indent, subsequent_indent=f"{indent}    ")
 
 
-def _show_router(said: Mapping[str, Any]) -> None:
-    """Print what the residual of each joint is made of, and what it depends on."""
+def _show_router(verdict: Mapping[str, Any]) -> None:
+    """Print the parts of each joint's residual, and the variables it depends on."""
     from pipelines.wording.findings import searched_runs, shares
 
-    joints = shares(said)
-    if not joints or said.get("acquisition_at_fault"):
+    joints = shares(verdict)
+    if not joints or verdict.get("acquisition_at_fault"):
         return
     parts = {part: words for part, words in ROUTER.items() if any(j.parts[part] for j in joints)}
     variables = list(joints[0].predicted)
@@ -120,8 +120,8 @@ def _show_router(said: Mapping[str, Any]) -> None:
         numbers=", ".join(headings[1:]),
     )
     console.note(
-        f"{_listed(parts.values())}: parts of the mean square, {searched_runs(said)}. "
-        f"{_listed(variables)}: what a curve of it alone predicts, validation runs."
+        f"{_listed(parts.values())}: parts of the mean square, {searched_runs(verdict)}. "
+        f"{_listed(variables)}: share that a curve of it alone predicts, validation runs."
     )
 
 
@@ -130,22 +130,22 @@ def _listed(words: Iterable[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _show_errors(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
+def _show_errors(verdict: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     from pipelines.contracts.joints import HIP_AND_KNEE, either
 
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
-    told = {key: words for key, words in ERRORS.items() if key in said}  # of older files one lacks
-    if not said["causes"]:
-        del told["extended_rmse_nm"]
-    headings = ("joint", *told.values(), *["excess left"] * bool(said["causes"]))
+    errors = {key: words for key, words in ERRORS.items() if key in verdict}  # older files lack one
+    if not verdict["causes"]:
+        del errors["extended_rmse_nm"]
+    headings = ("joint", *errors.values(), *["excess left"] * bool(verdict["causes"]))
     console.say("")
     console.table(
         headings,
         [
             (
                 joint.name,
-                *(f"{said[key][joint.name]:{digits}}" for key in told),
-                *[_excess_left(said, joint.name)] * bool(said["causes"]),
+                *(f"{verdict[key][joint.name]:{digits}}" for key in errors),
+                *[_excess_left(verdict, joint.name)] * bool(verdict["causes"]),
             )
             for joint in joints
         ],
@@ -155,9 +155,9 @@ def _show_errors(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     )
 
 
-def _excess_left(said: Mapping[str, Any], joint: str) -> str:
-    """Return the share of a joint's error beyond noise that is left."""
-    share = said["unexplained"][joint]
+def _excess_left(verdict: Mapping[str, Any], joint: str) -> str:
+    """Return the remaining share of a joint's error beyond noise."""
+    share = verdict["unexplained"][joint]
     return "at the floor" if share is None else f"{share:.0%}"
 
 
@@ -187,20 +187,20 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:
-    """Return a parameter with its interval; what was assumed, or chosen among a few, has none."""
+    """Return a parameter with its interval; an assumed or chosen value has none."""
     low, high = parameter["ci95"]
     unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    sure = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
-    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({sure})"
+    interval = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
+    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({interval})"
 
 
-def _show_control(said: Mapping[str, Any]) -> None:
+def _show_control(verdict: Mapping[str, Any]) -> None:
     """Print tracking error and peak torque under adaptive control, without and with the causes."""
     console.say("")
-    if said["reason"]:
-        console.say(f"Under adaptive control: not compared, {said['reason']}.")
+    if verdict["reason"]:
+        console.say(f"Under adaptive control: not compared, {verdict['reason']}.")
         return
-    before, after = said["without"], said["with"]
+    before, after = verdict["without"], verdict["with"]
     headings = ("joint", "error mrad", "error with", "peak N·m", "peak with")
     console.table(
         headings,

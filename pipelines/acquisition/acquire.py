@@ -36,8 +36,8 @@ from pipelines.acquisition.states import State
 from pipelines.acquisition.uninterrupted import run_to_its_end
 from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
-from pipelines.contracts.beside import journal_of
 from pipelines.contracts.provenance import describe
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.process.termination import ENDING, heard, known

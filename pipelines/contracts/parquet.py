@@ -11,8 +11,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipelines.contracts.atomic import refuse_what_is_no_file, whole_file
-from pipelines.contracts.sameness import KEY, MAGIC
+from pipelines.contracts.atomic import refuse_special, whole_file
+from pipelines.contracts.equality import KEY, MAGIC
 from pipelines.errors import ContractError
 from pipelines.validation.suggestion import similar_file
 
@@ -99,7 +99,7 @@ def refuse_place(path: Path, contract: str) -> None:
     """
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
-    refuse_what_is_no_file(path)
+    refuse_special(path)
     if path.suffix != ".parquet":
         raise ContractError(
             f"{path}: expected a name that ends in .parquet, which is what is written; name another"

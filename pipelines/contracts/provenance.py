@@ -89,7 +89,7 @@ def provenance_of(path: Path) -> dict[str, Any]:
         raise ContractError(f"{path}: does not say where it came from; make it again") from error
 
 
-def told_by(path: Path) -> dict[str, Any]:
+def metadata_of(path: Path) -> dict[str, Any]:
     """Return what a file tells of where it came from; nothing where there is none, or one that does
     not tell.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.provenance import sha256, told_by
+from pipelines.contracts.provenance import metadata_of, sha256
 from pipelines.errors import ContractError, InputError, SettingsError, about
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
@@ -371,7 +371,7 @@ def refuse_to_overwrite(path: Path) -> None:
     """Refuse to put a recording where something else stands: another file, or a recording that was
     not imported."""
     RECORDING.refuse_place(path)
-    told = told_by(path)
+    told = metadata_of(path)
     if told.get("contract") == RECORDING.label and "imported" not in told:
         raise ContractError(
             f"{path}: holds a recording that was not imported, not overwritten; choose another"

@@ -1,15 +1,16 @@
 """A pydantic complaint as one line a person can act on."""
 
 from collections.abc import Callable
-from typing import Any
-
-from pydantic import ValidationError
+from typing import TYPE_CHECKING, Any
 
 from pipelines.validation.suggestion import suggestion
 
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
 
 def explain(
-    error: ValidationError, data: Any, known_keys: Callable[[str], list[str]] = lambda path: []
+    error: "ValidationError", data: Any, known_keys: Callable[[str], list[str]] = lambda path: []
 ) -> str:
     """Say which key is wrong, what was found there and what was expected.
 
@@ -37,7 +38,7 @@ def explain(
     return _sentence(path, about, known_keys) + more
 
 
-def _own(error: ValidationError) -> list[Any]:
+def _own(error: "ValidationError") -> list[Any]:
     """Return the faults without those that are others' shadows: a list lacks the tables that have a
     fault."""
     found = error.errors(include_url=False)

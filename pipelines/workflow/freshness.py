@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.contracts import parquet
-from pipelines.contracts.beside import aborted_of, journal_of
 from pipelines.contracts.provenance import provenance_of, sha256
+from pipelines.contracts.run_paths import aborted_of, journal_of
 from pipelines.errors import ContractError
 from pipelines.workflow.graph import Step
 

@@ -1,5 +1,4 @@
-"""Runs whose recordings came from elsewhere: no command of an experiment makes these, or could make
-them again."""
+"""Recordings that no command of an experiment makes again, and runs whose recordings these are."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -8,7 +7,7 @@ from typing import Any
 
 from pipelines.contracts import parquet
 from pipelines.contracts.joints import HIP_AND_KNEE, joints_of
-from pipelines.contracts.provenance import told_by
+from pipelines.contracts.provenance import metadata_of
 from pipelines.errors import InputError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
@@ -16,18 +15,16 @@ from pipelines.settings.experiment import Experiment
 
 @dataclass(frozen=True)
 class ImportedRuns:
-    """What a graph must know of them."""
+    """The runs of an experiment whose recordings were imported."""
 
     names: frozenset[str] = frozenset()
     of_a_leg: bool = True
     """Whether they are of hip and knee, whose gait the adaptive loop follows."""
     damaged: tuple[Path, ...] = ()
-    """Files among them that can no longer be read: of which run they are, and for what, nobody
-    knows."""
+    """Imported recordings that cannot be read, so that their run and purpose are unknown."""
 
     def refuse_damaged(self) -> None:
-        """Refuse to go on without a recording that was there: the results would be of the others
-        alone."""
+        """Refuse to compute results without a recording that is damaged."""
         if self.damaged:
             raise InputError(damage(self.damaged))
 
@@ -48,34 +45,32 @@ DAMAGED = "damaged or truncated"
 def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, ImportedRuns]:
     """Return the experiment with its runs, and those whose recordings were imported.
 
-    Where exoid.toml names no run, the imported recordings in the folder of the results are the
-    runs: each says itself which kind of run it is, and for which purpose.
+    Without a run in exoid.toml, the imported recordings in the folder of the results are the runs;
+    their metadata hold the kind of run and the purpose.
     """
     files = sorted((out / "recordings").glob("*.parquet"))
-    found = dict(_imported(files))
-    damaged = tuple(_damaged(experiment, bool(found), files))
-    if found and "run" not in experiment.model_fields_set:
-        # Not validated: a recording may be called what no [[run]] is.
+    imported = dict(_imported(files))
+    damaged = tuple(_damaged(experiment, bool(imported), files))
+    if imported and "run" not in experiment.model_fields_set:
+        # Not validated: a recording's name need not be a valid name of a [[run]].
         runs = [
-            RunSettings.model_construct(name=name, run=told["run"], purpose=told["purpose"])
-            for name, told in found.items()
+            RunSettings.model_construct(name=name, run=metadata["run"], purpose=metadata["purpose"])
+            for name, metadata in imported.items()
         ]
         experiment = experiment.model_copy(update={"run": tuple(runs)})
-    names = frozenset(run.name for run in experiment.run if run.name in found)
-    return experiment, ImportedRuns(
-        names, all(joints_of(found[name]) == HIP_AND_KNEE for name in names), damaged
-    )
+    names = frozenset(run.name for run in experiment.run if run.name in imported)
+    of_a_leg = all(joints_of(imported[name]) == HIP_AND_KNEE for name in names)
+    return experiment, ImportedRuns(names, of_a_leg, damaged)
 
 
 def _damaged(experiment: Experiment, imported: bool, files: Iterable[Path]) -> Iterator[Path]:
-    """Yield the damaged files that were imported, as far as others tell: they themselves tell
-    nothing any more."""
-    named = {run.name for run in experiment.run}
+    """Yield the damaged files that were probably imported; their own metadata are unreadable."""
+    names = {run.name for run in experiment.run}
     if "run" in experiment.model_fields_set:
-        counted = named if imported else set[str]()  # else the rig's, which can be recorded anew
-        files = [file for file in files if file.stem in counted]
+        # Without an imported recording, they are the rig's, which can be recorded again.
+        files = [file for file in files if imported and file.stem in names]
     elif not imported:
-        files = [file for file in files if file.stem not in named]
+        files = [file for file in files if file.stem not in names]
     yield from (file for file in files if file.is_file() and not parquet.is_whole(file))
 
 
@@ -85,16 +80,25 @@ def imported_in(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def refuse_imported(path: Path) -> None:
-    """Refuse to record where an imported recording is: make may not know yet that it is none of
-    ours to make."""
+    """Refuse to overwrite an imported recording; make's rules may be older than the import."""
     if dict(_imported([path])):
         raise InputError(
             f"{path}: was imported, not overwritten; name another file with -o, or move it away"
         )
 
 
+def refuse_recorded(path: Path) -> None:
+    """Refuse to overwrite a real rig's recording; a virtual leg's can be recorded again."""
+    rig = metadata_of(path).get("config", {}).get("rig", {})
+    if rig and not rig["embedded"]:
+        raise InputError(
+            f"{path}: is a recording of the rig {rig['name']}, not overwritten; --overwrite"
+            " replaces it, -o writes another file"
+        )
+
+
 def _imported(paths: Iterable[Path]) -> Iterator[tuple[str, dict[str, Any]]]:
     for path in paths:
-        told = told_by(path)
-        if "imported" in told:
-            yield path.stem, told
+        metadata = metadata_of(path)
+        if "imported" in metadata:
+            yield path.stem, metadata

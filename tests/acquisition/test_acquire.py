@@ -11,7 +11,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.recording.journal import Journal, refuse_leftover
 from pipelines.acquisition.recording.recording import write_recording
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import InputError
 from pipelines.mechanics.mechanisms.leg import cuff_torque
 from pipelines.mechanics.motion import CUFFS, geometry_of

@@ -15,7 +15,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.settings import datasets
 from tests.acquisition.conftest import free_port
 from tests.acquisition.journals import read_journal

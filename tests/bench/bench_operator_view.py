@@ -31,7 +31,7 @@ def rows() -> Iterator[Row]:
         without.append(cycles_a_second(lambda progress: None))
         view = OperatorView(load_rig(RIG), "bench")
         with on_a_terminal(view) as screen:
-            with_view.append(cycles_a_second(view.take))
+            with_view.append(cycles_a_second(view.update))
             drawing = milliseconds(screen, view)
     share = 100 * median(a / b for a, b in zip(with_view, without, strict=True))
     yield Row(

@@ -1,4 +1,4 @@
-"""A leg with somebody in it is moved only after somebody has said yes."""
+"""A leg with a person in it is moved only after a person has said yes."""
 
 import io
 import os
@@ -48,12 +48,12 @@ def experiment(tmp_path):
 
 @pytest.fixture
 def answer(monkeypatch):
-    """Let somebody sit at the terminal who answers."""
+    """Let a person at the terminal answer."""
 
     def sit(text):
         monkeypatch.setattr("sys.stdin", io.StringIO(text))
-        monkeypatch.setattr("exoid_cli.confirm._somebody_sees_and_answers", lambda: True)
-        monkeypatch.setattr("exoid_cli.confirm._forget_what_was_typed", lambda: None)
+        monkeypatch.setattr("exoid_cli.confirm._at_a_terminal", lambda: True)
+        monkeypatch.setattr("exoid_cli.confirm._discard_typed_input", lambda: None)
 
     return sit
 
@@ -103,13 +103,13 @@ def test_a_question_that_nobody_sees_is_not_asked(typed_ahead, tmp_path):
     with open(tmp_path / "err", "w") as err:
         process, _ = typed_ahead(err)
         assert process.wait() == 2
-    assert "which wants to be confirmed on a terminal; give --yes" in (tmp_path / "err").read_text()
+    assert "confirm it on a terminal, or give --yes" in (tmp_path / "err").read_text()
 
 
 WENT_ON = "drive hip (127.0.0.1:1, unit 1): refuses the connection"
 
 
-def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(
+def test_without_a_terminal_a_run_with_a_person_is_refused_in_one_line(
     exoid, experiment, monkeypatch
 ):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
@@ -117,8 +117,8 @@ def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(
     assert (outcome.code, outcome.out) == (2, "")
     assert (
         outcome.err
-        == "exoid: run one moves somebody, which wants to be confirmed on a terminal; give --yes"
-        " where a script starts it; nothing was moved\n"
+        == "exoid: run one moves a person: confirm it on a terminal, or give --yes in a script;"
+        " nothing was moved\n"
     )
 
 
@@ -138,7 +138,7 @@ def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_questio
     assert outcome.code == 3 and WENT_ON in outcome.err
     shown = outcome.err.partition(" [y/N] ")[0]
     for words in (
-        "Run one moves somebody on the rig real_time along",
+        "Run one moves a person on the rig real_time along",
         "trajectory.toml for 10 s",
         "limits -0.35 to +1.75 rad, 2.2 rad/s, 100 N·m",
         "limits -2.1 to +0.35 rad, 2.2 rad/s, 60 N·m",
@@ -155,7 +155,7 @@ def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_questio
         assert words in shown
 
 
-def test_a_motion_beyond_the_limits_with_somebody_is_refused_before_the_question(
+def test_a_motion_beyond_the_limits_with_a_person_is_refused_before_the_question(
     exoid, experiment, answer, tmp_path
 ):
     answer("y\n")
@@ -175,7 +175,9 @@ def test_scripts_and_runs_with_nobody_are_not_asked(exoid, experiment, run, more
     assert outcome.err.startswith(f"exoid: {WENT_ON}")
 
 
-def test_who_says_yes_beforehand_is_told_that_nobody_watches_the_cuffs(exoid, experiment, tmp_path):
+def test_with_yes_given_beforehand_a_warning_says_that_nobody_watches_the_cuffs(
+    exoid, experiment, tmp_path
+):
     arguments = experiment()
     text = (tmp_path / "rig.toml").read_text()
     without = re.sub(r"\[\[sensor\]\][^\[]*", "", text)
@@ -197,7 +199,7 @@ def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch)
 
 
 @pytest.mark.parametrize("option", ["--move", "--by-hand"])
-def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_somebody_in_it(exoid, option):
+def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_a_person_in_it(exoid, option):
     outcome = exoid(
         "rig", "check", datasets() / "rigs" / "plain.toml", "--run", "with_human", option, "--yes"
     )
@@ -225,8 +227,8 @@ def test_what_was_shown_is_what_runs_though_the_file_is_changed_meanwhile(
 def with_excitation(experiment, tmp_path, monkeypatch):
     """Make an experiment whose run has its excitation, and go to its folder."""
 
-    def make(**told):
-        experiment(**told)
+    def make(**settings):
+        experiment(**settings)
         config = tmp_path / "exoid.toml"
         excitation = datasets() / "paper" / "trajectory.toml"
         config.write_text(config.read_text() + f'trajectory = "{excitation.as_posix()}"\n')
@@ -243,9 +245,7 @@ def test_a_run_that_nobody_named_is_asked_about_before_it_moves_even_an_empty_ma
     with_excitation(run="exo_alone")
     outcome = exoid(*words)
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert (
-        "run one moves the empty machine, which wants to be confirmed on a terminal" in outcome.err
-    )
+    assert "run one moves the empty machine: confirm it on a terminal" in outcome.err
 
 
 def test_a_no_to_it_moves_nothing_and_a_yes_goes_on_to_the_drives(exoid, with_excitation, answer):
@@ -296,7 +296,7 @@ def test_a_recording_of_a_real_rig_is_replaced_only_where_that_is_said(exoid, ex
     assert path.read_bytes() == before
 
 
-def test_a_recording_of_a_virtual_leg_is_made_anew(exoid, experiment, recorded):
+def test_a_recording_of_a_virtual_leg_is_made_again(exoid, experiment, recorded):
     recorded(embedded=True)
     assert WENT_ON in exoid(*experiment("exo_alone")).err
 

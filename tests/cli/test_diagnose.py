@@ -13,7 +13,7 @@ from tests.report.sessions import decision_of, verdict_of
 @pytest.fixture(autouse=True)
 def a_person_reads_along():
     """Whatever options a command of another test was given."""
-    console.configure()
+    console.reset()
 
 
 ROW = re.compile(r"^( *)(\w.*?) +([01]\.\d\d)$", flags=re.MULTILINE)
@@ -183,7 +183,7 @@ def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_ever
     printed = shown(
         capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **told
     )
-    assert "No cause was looked for. Mend acquisition, and record again." in printed
+    assert "No cause was sought. Correct the acquisition, and record again." in printed
     assert "- run_2.parquet, hip_angle_rad: the hip's angle is stuck" in printed
     assert "is anything missing?" not in printed
 

@@ -81,11 +81,11 @@ def test_show_knows_the_json_document(exoid, model, tmp_path):
         (("--to", "c", "-o", "my leg.c"), "my leg.c: its functions are called as the file is"),
         (
             ("--to", "c", "-o", "x.xml"),
-            "-o x.xml: ends as --to mjcf writes it, expected .c with --to c",
+            "-o x.xml: is a file name of --to mjcf, expected .c with --to c",
         ),
         (
             ("--to", "urdf", "-o", "leg.xml"),
-            "-o leg.xml: ends as --to mjcf writes it, expected .urdf with --to urdf",
+            "-o leg.xml: is a file name of --to mjcf, expected .urdf with --to urdf",
         ),
         (
             ("--to", "json", "-o", "parameters.parquet"),

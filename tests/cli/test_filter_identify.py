@@ -258,7 +258,7 @@ def test_several_recordings_are_filtered_into_a_folder(exoid, recordings, tmp_pa
     ]
     twice = exoid("filter", files[0], files[0], "-o", tmp_path / "motions")
     assert (twice.code, twice.err.count("\n")) == (2, 1)
-    assert "found two files named exo_alone_train.parquet" in twice.err
+    assert "two files are named exo_alone_train.parquet" in twice.err
 
 
 def test_settings_that_are_not_there_end_in_one_line(exoid, recordings, tmp_path):

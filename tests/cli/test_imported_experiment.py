@@ -126,7 +126,7 @@ def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoi
     outcome = exoid("filter")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert (
-        "with an empty exoid.toml beside recordings/, `exoid run` does all with what was imported"
+        "put an empty exoid.toml next to recordings/, then `exoid run` uses what was imported"
         in outcome.err
     )
 

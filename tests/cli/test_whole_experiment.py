@@ -152,7 +152,7 @@ def test_a_command_alone_leaves_what_is_up_to_date(exoid, experiment):
         ("diagnose", "diagnosed/verdict.json"),
     ):
         assert exoid(command).out.splitlines() == [
-            f"{result}: up to date; --again makes it anew" for result in results
+            f"{result}: up to date; --again makes it again" for result in results
         ]
 
 

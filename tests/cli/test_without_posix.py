@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from exoid_cli.app import matching_files
+from exoid_cli.app import expand_patterns
 from pipelines.contracts import PARAMETERS
 
 LIKE_WINDOWS = """
@@ -111,7 +111,7 @@ def test_patterns_are_replaced_by_the_files_that_match(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("b.csv", "a.csv"):
         (tmp_path / name).touch()
-    assert matching_files(["import", "*.csv", "--map", "m?.toml"]) == [
+    assert expand_patterns(["import", "*.csv", "--map", "m?.toml"]) == [
         "import",
         "a.csv",
         "b.csv",

@@ -68,7 +68,7 @@ def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_mad
     tmp_path, monkeypatch
 ):
     def make(**texts):
-        with all_or_none(tmp_path, vouching="a") as made:
+        with all_or_none(tmp_path, last="a") as made:
             for name, text in texts.items():
                 write_text(made / name, text)
 
@@ -158,6 +158,6 @@ def test_what_is_left_of_a_table_is_replaced(tmp_path):
 
 def test_a_dash_is_no_name_of_a_file(tmp_path):
     for write in (lambda path: write_text(path, "x"), open_folder):
-        with pytest.raises(InputError, match=r"^-: stands for no standard output here"):
+        with pytest.raises(InputError, match=r"^-: standard output is not supported"):
             write(tmp_path / "-")
     assert list(tmp_path.iterdir()) == []

@@ -42,7 +42,7 @@ def test_two_logs_become_a_report(exoid, monkeypatch, tmp_path):
         if program == "touch":
             before = exoid("run")
             assert (before.code, before.out) == (2, "")
-            assert "an empty exoid.toml beside recordings/" in before.err
+            assert "an empty exoid.toml next to recordings/" in before.err
             Path(*arguments).touch()
             continue
         outcome = exoid(*arguments)

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from tests.faults.faults import Case, cases
 from tests.faults.process import fill_the_disk, send, strike
 from tests.faults.proxy import Frame, RtuFrame, TcpFrame

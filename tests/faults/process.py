@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.acquisition.recording.journal import JournalFile
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import ContractError
 from tests.faults.faults import nothing
 from tests.faults.proxy import Proxy

@@ -8,7 +8,7 @@ import pytest
 
 from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from tests.faults.process import fill_the_disk, send, strike
 from tests.faults.runs import wrong_rows
 

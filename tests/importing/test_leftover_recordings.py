@@ -12,7 +12,7 @@ from tests.importing.conftest import MAP
 
 BOTH = MAP.partition("[[recording]]")[0]
 """Without a word on recordings a map makes one to train and one to validate."""
-EMPTY_TOML = "beside them, `exoid run` does the rest"
+EMPTY_TOML = "next to them, `exoid run` does the rest"
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def test_a_recording_that_a_changed_map_no_longer_makes_is_named_and_kept(
     imported(path)
     outcome = imported(path, map_text=MAP.replace("whole", "all"))
     assert (
-        "whole.parquet: of these logs too, by an earlier map; this one makes it no more, remove it"
+        "whole.parquet: made of these logs with an earlier map, but not with this one; remove it"
         in outcome.err
     )
     assert sorted(one.name for one in outcome.folder.iterdir()) == ["all.parquet", "whole.parquet"]
@@ -130,7 +130,7 @@ def test_what_a_killed_import_left_is_named(imported, pendulum, write_csv, tmp_p
     left = tmp_path / "recordings" / ".abc.tmp"
     left.mkdir(parents=True)
     outcome = imported(write_csv(pendulum.columns()))
-    assert (outcome.code, f"{left}: left by an import that was killed" in outcome.err) == (0, True)
+    assert (outcome.code, f"{left}: temporary file of an import that was killed" in outcome.err) == (0, True)
 
 
 def test_a_file_that_grows_too_large_is_named_with_what_to_do(pendulum, write_csv, tmp_path):

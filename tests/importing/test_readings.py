@@ -444,7 +444,7 @@ def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(
     several = MAP.replace('name = "whole"', 'name = "{file}"')
     lines = imported(*paths, map_text=several).out.splitlines()
     assert [line.split(":")[1].split(",")[0] for line in lines[:4]] == [" train"] * 4
-    assert lines[5] == "Seen, with the numbers of the first file; `exoid show` tells those of each:"
+    assert lines[5] == "Seen, with the numbers of the first file; `exoid show` has those of each:"
     seen = [line for line in lines if "no value in" in line]
     assert seen == ["  - pivot_torque_nm: no value in 20 rows; rows left out (log1.csv and 2 more)"]
     told = json.loads(imported(*paths, map_text=several, options=("--json",)).out)

@@ -233,8 +233,7 @@ def test_a_folder_that_is_called_as_a_recordings_file_is_refused_with_what_is_me
     assert run(["import", str(write_csv(pendulum.columns())), *where]) == 2
     err = capsys.readouterr().err
     assert (
-        "x.parquet: ends as a recording's file does, expected the folder for all of them, such"
-        " as -o" in err
+        "x.parquet: is a file name, expected the folder of all recordings, such as -o" in err
     )
     assert 'name = "x" at [[recording]] in the map' in err and len(err.splitlines()) == 1
     assert not (tmp_path / "made").exists()

@@ -248,8 +248,8 @@ def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_value
     assert (
         err
         == f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none"
-        f" of {recording}; taken is that of recording.parquet, the first run it tells of, and as"
-        " much as they differ the errors are not the model's"
+        f" of {recording}; taken is that of recording.parquet, the first run it tells of. The"
+        " errors contain the difference"
     )
 
 

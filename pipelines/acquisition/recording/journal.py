@@ -22,9 +22,9 @@ import pyarrow as pa
 from pipelines.acquisition.modbus.file_lock import locked, take
 from pipelines.acquisition.recording import checksum
 from pipelines.acquisition.recording.header_copy import COPY, copy_of, ends_of, head_in
-from pipelines.contracts.beside import JOURNAL
+from pipelines.contracts.equality import KEY, MAGIC
 from pipelines.contracts.parquet import to_json
-from pipelines.contracts.sameness import KEY, MAGIC
+from pipelines.contracts.run_paths import JOURNAL
 from pipelines.errors import ContractError, InputError
 
 FLUSH_S = 0.2

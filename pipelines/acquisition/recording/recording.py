@@ -19,7 +19,7 @@ from pipelines.acquisition.recording.journal import (
 )
 from pipelines.acquisition.recording.valid_rows import sound_batches
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import aborted_of
+from pipelines.contracts.run_paths import aborted_of
 from pipelines.errors import ContractError
 
 PIECE_ROWS = 32768

@@ -12,7 +12,7 @@ from pipelines.acquisition.recording.recording import (
     write_recording,
 )
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import JOURNAL
+from pipelines.contracts.run_paths import JOURNAL
 from pipelines.errors import InputError
 from pipelines.validation.suggestion import similar_file
 

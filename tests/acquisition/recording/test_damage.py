@@ -10,7 +10,7 @@ from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse
 from pipelines.acquisition.recording.recording import place_for
 from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, InputError
 from tests.acquisition.recording.test_recover import COLUMNS, METADATA
 

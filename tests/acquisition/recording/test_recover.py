@@ -11,7 +11,7 @@ import pytest
 from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
 from pipelines.acquisition.recording.recover import journals_in, recover
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import InputError
 from tests.conftest import Outcome
 
@@ -284,7 +284,7 @@ MEASURE = """\
 import re, sys
 from pathlib import Path
 from pipelines.acquisition.recording.journal import Journal
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.acquisition.recording.recover import recover
 from tests.acquisition.recording.test_recover import COLUMNS, METADATA, row
 

@@ -17,7 +17,7 @@ from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.preconditions.set_point_scale import refuse_misplaced_set_points
 from pipelines.acquisition.safety.limits import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.contracts import RECORDING
-from pipelines.contracts.beside import journal_of
+from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.rig.servo import Servo

@@ -1,0 +1,43 @@
+"""Printing from a thread of its own: a slow or closed terminal must not delay a moving leg."""
+
+import queue
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+
+QUEUE_SIZE = 100
+"""Lines that may wait; further lines are dropped."""
+CLOSING_S = 1.0
+"""Longest time to wait for the last lines, s."""
+
+
+class BackgroundPrinter:
+    """Print lines in order while the block runs, for as long as the output can be written."""
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        self._write = write
+        self._queue = queue.Queue[str | None](QUEUE_SIZE)
+        self._thread = threading.Thread(target=self._run, name="printer", daemon=True)
+
+    def __enter__(self) -> "BackgroundPrinter":
+        """Start the thread."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._put(None)
+        self._thread.join(CLOSING_S)
+
+    def print(self, text: str) -> None:
+        """Queue a line, or drop it if the queue is full; never wait, never fail."""
+        self._put(text)
+
+    def _put(self, text: str | None) -> None:
+        with suppress(queue.Full):
+            self._queue.put_nowait(text)
+
+    def _run(self) -> None:
+        # The output was closed; rich raises SystemExit for a broken pipe.
+        with suppress(OSError, SystemExit):
+            for text in iter(self._queue.get, None):
+                self._write(text)
