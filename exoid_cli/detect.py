@@ -129,7 +129,7 @@ def _planned(
 
 def _default_plant(experiment: Any) -> Any:
     """Return the virtual rig's leg with exoid.toml's lengths."""
-    from pipelines.settings.plant import PlantSettings
+    from pipelines.settings.rig.plant import PlantSettings
 
     experiment.mechanism.refuse_all_but_the_leg("`exoid detect` of an excitation")
     return PlantSettings(**experiment.mechanism.geometry)

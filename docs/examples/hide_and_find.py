@@ -13,7 +13,7 @@ from pipelines.model import effect_named, term_from
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 # Angles in rad: a mean, and sines and cosines of three harmonics for hip and knee; the period is 5
 # s.

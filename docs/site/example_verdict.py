@@ -21,7 +21,7 @@ from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.model import effect_named, term_from
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 DOCS = Path(__file__).parents[1]
 PAGES = (DOCS.parent / "README.md", DOCS / "verdict.md")

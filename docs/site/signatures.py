@@ -26,7 +26,7 @@ from pipelines.plotting.style import BLUE, GREY, ORANGE, STYLE, save
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings, TemperatureSettings
+from pipelines.settings.rig.plant import PlantSettings, TemperatureSettings
 from tests.effects.catalogue import places, sized
 
 EXCITATION = FourierTrajectory(

@@ -11,7 +11,8 @@ from pipelines.acquisition.set_points import SetPoints
 from pipelines.errors import InputError
 from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
-from pipelines.settings.rig import LONGEST_RAMP_S, RigSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.safety import LONGEST_RAMP_S
 
 RAMP_GROWTH = 1.2
 TOO_FAST = 1.05

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 
 def cuff_forces(human_torque: NDArray, q: NDArray, plant: PlantSettings) -> NDArray:

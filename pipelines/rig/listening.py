@@ -15,7 +15,7 @@ from pymodbus.simulator import SimDevice
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.guard import guarded
 from pipelines.rig.null_modem import null_modem
-from pipelines.settings.line import (
+from pipelines.settings.rig.line import (
     LineSettings,
     NetworkLine,
     RtuLine,

@@ -19,7 +19,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term, effect_named, term_from
 from pipelines.rig.cuffs import cuff_forces
-from pipelines.settings.plant import PlantEffect, PlantSettings
+from pipelines.settings.rig.plant import PlantEffect, PlantSettings
 
 JOINTS = ("hip", "knee")
 

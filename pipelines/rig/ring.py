@@ -9,7 +9,8 @@ from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueRequest, ReadFifoQueueResponse
 
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import MOST_QUEUED, RingSettings, registers_of
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.ring import MOST_QUEUED, RingSettings
 
 QUEUE_RECORDS = 4096
 """What a queue holds; the oldest record makes room."""

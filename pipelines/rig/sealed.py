@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from pipelines.model import Term
 from pipelines.rig.plant import term_of
 from pipelines.settings.base import Settings, load_toml
-from pipelines.settings.plant import PlantEffect
+from pipelines.settings.rig.plant import PlantEffect
 
 
 class Possibility(Settings):

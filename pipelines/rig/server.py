@@ -36,17 +36,11 @@ from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.ring import Ring, fifo_request
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
-from pipelines.settings.line import LineSettings, RtuLine, TcpLine
-from pipelines.settings.rig import (
-    DriveMap,
-    DriveSettings,
-    Identity,
-    RigSettings,
-    SensorMap,
-    SensorSettings,
-    load_rig,
-    registers_of,
-)
+from pipelines.settings.rig import RigSettings, load_rig
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.devices import DriveSettings, SensorSettings
+from pipelines.settings.rig.line import LineSettings, RtuLine, TcpLine
+from pipelines.settings.rig.register_map import DriveMap, Identity, SensorMap
 
 Announce = Callable[[str, str | None], None]
 """Told a place and whose it is: the name of a line, None for devices that are on none."""

@@ -3,7 +3,7 @@ where to."""
 
 from math import ceil, floor, isfinite
 
-from pipelines.settings.rig import DriveMap
+from pipelines.settings.rig.register_map import DriveMap
 
 EXTRAPOLATED = 5
 """Cycles over which a drive goes on at its set-points' speed when none comes; then it slows

@@ -14,7 +14,7 @@ from pipelines.contracts.joints import Joint, Kind
 from pipelines.errors import SettingsError
 from pipelines.settings import transmission
 from pipelines.settings.base import Settings, load_toml
-from pipelines.settings.rig import GeometrySettings
+from pipelines.settings.rig.geometry import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
 from pipelines.validation.suggestion import closest, similar_file
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, Kind, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
-from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
+from pipelines.settings.physical_bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 from pipelines.validation.suggestion import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}

@@ -24,7 +24,7 @@ from pipelines.acquisition.states import State
 from pipelines.acquisition.uninterrupted import run_to_its_end
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import registers_of
+from pipelines.settings.rig.block import registers_of
 
 RATE = 50.0
 LATENCY_S = 0.0003

@@ -7,7 +7,9 @@ import time
 from pymodbus.client import AsyncModbusTcpClient
 
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import DeviceSettings, RigSettings, registers_of
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.devices import DeviceSettings
 
 CYCLES = 1500
 

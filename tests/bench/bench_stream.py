@@ -16,7 +16,7 @@ from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings import datasets
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from tests.bench.report import Row, show
 
 SAMPLES = 10_000_000

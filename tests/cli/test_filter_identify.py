@@ -13,7 +13,7 @@ from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.identify import Method
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 RICH = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),

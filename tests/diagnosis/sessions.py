@@ -12,7 +12,7 @@ from pipelines.model import effect_named, term_from
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 RICH = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),

@@ -18,7 +18,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from tests.diagnosis.naming import missing, naming
 from tests.diagnosis.sessions import session
 

@@ -14,7 +14,7 @@ from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import NoiseSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 NOISE = NoiseSettings(duration_s=60.0)
 FLOOR = Floor(np.array([0.4, 0.4, np.nan, np.nan]), np.full(4, 0.2), from_periods=True)

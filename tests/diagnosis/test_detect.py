@@ -26,7 +26,7 @@ from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings.datasets import datasets
 from pipelines.settings.design import NoiseSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from pipelines.signals.blocks import BlockAverage
 
 NOISE = NoiseSettings(duration_s=40.0)

@@ -20,7 +20,7 @@ from pipelines.mechanics.read import read_motions
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from tests.blind.cases import case
 from tests.blind.examine import Folders, neutral_name, prepare
 from tests.effects.catalogue import TERMS

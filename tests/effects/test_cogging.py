@@ -14,7 +14,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term, model_from_parameters, term_from
 from pipelines.rig.plant import Plant, term_of
-from pipelines.settings.plant import PlantEffect, PlantSettings
+from pipelines.settings.rig.plant import PlantEffect, PlantSettings
 from tests.effects.test_parameters_file import rows
 from tests.export.machines import LEG, machine
 

@@ -21,7 +21,7 @@ from pipelines.model import Model, Term
 from pipelines.rig.plant import JOINTS, Plant
 from pipelines.rig.record import LEAD_S, record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import CuffSettings, PlantSettings, TemperatureSettings
+from pipelines.settings.rig.plant import CuffSettings, PlantSettings, TemperatureSettings
 from tests.effects.catalogue import TERMS
 from tests.effects.conftest import RICH
 

@@ -10,7 +10,7 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 # Torque is recorded without its noise: each test adds noise of its own colour.
 PLANT = PlantSettings(ripple_nm=(0.0, 0.0))

@@ -32,7 +32,7 @@ from pipelines.model import Model, Term, baseline, model_from_parameters
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import CuffSettings, PlantEffect, PlantSettings
+from pipelines.settings.rig.plant import CuffSettings, PlantEffect, PlantSettings
 from tests.effects.catalogue import TERMS
 from tests.estimation import pendulum
 from tests.identification.conftest import RICH

@@ -15,7 +15,7 @@ from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.design import DesignSettings, NoiseSettings
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 NOISE = NoiseSettings()
 SESSIONS = 200

@@ -16,7 +16,7 @@ from pipelines.mechanics.read import read_motions, read_runs
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from tests.identification.conftest import RICH
 
 

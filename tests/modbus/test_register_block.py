@@ -6,7 +6,9 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import REGISTERS, Register, SensorMap
+from pipelines.settings.rig import Register
+from pipelines.settings.rig.register import REGISTERS
+from pipelines.settings.rig.register_map import SensorMap
 
 patient = settings(deadline=None)  # a busy computer is no fault of a block's
 INTEGERS = [name for name in REGISTERS if not name.startswith("float")]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.settings.plant import CuffSettings, PlantSettings
+from pipelines.settings.rig.plant import CuffSettings, PlantSettings
 
 
 @pytest.fixture

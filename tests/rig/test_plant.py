@@ -8,7 +8,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
-from pipelines.settings.plant import PlantEffect, PlantSettings
+from pipelines.settings.rig.plant import PlantEffect, PlantSettings
 
 RATE = 200.0
 ENABLED = np.ones(2, dtype=bool)

@@ -12,11 +12,11 @@ def test_every_shipped_rig_can_be_used(path):
     assert load_rig(path).name == path.stem
 
 
-def test_what_a_rig_tells_of_itself_does_not_hold_its_plant():
-    told = str(load_rig(RIGS / "default.toml").public())
-    assert "servo" in told
+def test_the_public_part_of_a_rig_does_not_hold_its_plant():
+    public = str(load_rig(RIGS / "default.toml").public())
+    assert "servo" in public
     for secret in ("plant", "sealed", "inertial", "coulomb"):
-        assert secret not in told
+        assert secret not in public
 
 
 def test_a_virtual_rig_knows_its_geometry_and_its_loops():
@@ -40,7 +40,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "drive[0].gear_rato: unknown key; did you mean gear_ratio? (and 1 more)",
         ),
         ("unit = 2", "unit = 400", "drive[1].unit: found 400, expected less than or equal to 247"),
-        ("unit = 2", "unit = 1", "unit: 127.0.0.1:502 unit 1 stands for two devices; correct one"),
+        ("unit = 2", "unit = 1", "unit: two devices have 127.0.0.1:502 unit 1; correct one"),
         (
             'map = "servo"',
             'map = "servos"',
@@ -72,16 +72,15 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "address = 400",
             (
                 "map.drive.servo: read: spans 301 registers (100 to 400), expected at most "
-                "125, which is what one Modbus exchange carries"
+                "125, the most that one Modbus exchange carries"
             ),
         ),
         (
             "control = { address = 202",
             "control = { address = 204",
             (
-                "map.drive.servo: write: names nothing at register 202 between 200 and 204,"
-                " expected a block without gaps, which is written as a whole; map the drive's"
-                " registers side by side"
+                "map.drive.servo: write: register 202 between 200 and 204 has no name,"
+                " expected a block without gaps, as it is written as a whole"
             ),
         ),
         (
@@ -123,8 +122,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             'control = { address = 202, type = "int16"',
             (
                 "map.drive.servo: write.control: found int16 with scale 1 and offset 0, expected"
-                " uint16, uint32 or uint64 as it is: its bits have meanings of their own;"
-                " correct it"
+                " uint16, uint32 or uint64 without scale or offset, as its bits are flags"
             ),
         ),
         (
@@ -154,7 +152,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             'sequence = { address = 100, type = "float32"',
             (
                 "map.drive.servo: read.sequence: found float32 with scale 1 and offset 0, expected"
-                " uint16, uint32 or uint64 as it is: it is a count; correct it"
+                " uint16, uint32 or uint64 without scale or offset, as it is a count"
             ),
         ),
         (
@@ -162,7 +160,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             'sequence = { address = 100, type = "uint32", scale = 0.5',
             (
                 "map.drive.servo: read.sequence: found uint32 with scale 0.5 and offset 0, expected"
-                " uint16, uint32 or uint64 as it is: it is a count; correct it"
+                " uint16, uint32 or uint64 without scale or offset, as it is a count"
             ),
         ),
         (
@@ -173,7 +171,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             ),
             (
                 "map.drive.servo: write.heartbeat: found uint16 with scale 1e-06 and offset 0,"
-                " expected uint16, uint32 or uint64 as it is: it is a count; correct it"
+                " expected uint16, uint32 or uint64 without scale or offset, as it is a count"
             ),
         ),
         (
@@ -197,7 +195,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "[controller.knee]\nlimit_nm = 110.0\n[plant]\n",
             (
                 "torque_nm: found 110 of the knee, expected less than its controller.limit_nm"
-                " (110), which the drive never goes beyond; lower it"
+                " (110), at which the drive saturates; lower it"
             ),
         ),
         (
@@ -205,7 +203,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "following_error_rad = 0.2\n",
             (
                 "safety: with_human.following_error_rad: found 0.2, expected at most"
-                " following_error_rad (0.15); with somebody in the machine a limit may only be"
+                " following_error_rad (0.15); with a wearer a limit may only be"
                 " tighter"
             ),
         ),
@@ -230,7 +228,10 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
         (
             "unit = 2\n",
             "unit = 2\nline = 'leg'\nport = 502\n",
-            "drive[1]: port: found beside line = 'leg', which says where the device is; remove one",
+            (
+                "drive[1]: port: found together with line = 'leg', which has its own address;"
+                " remove one"
+            ),
         ),
         (
             "[map.drive.servo]\n",
@@ -250,7 +251,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "speed_rad_s = 3.2",
             (
                 "drive[0]: with_human.speed_rad_s: found 3.2, expected at most "
-                "speed_rad_s (3); with somebody in the machine a limit may only be tighter"
+                "speed_rad_s (3); with a wearer a limit may only be tighter"
             ),
         ),
         (
@@ -258,7 +259,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "[drive.with_human]\nangle_rad = [-0.4, 1.0]",
             (
                 "drive[0]: with_human.angle_rad: found [-0.4, 1], expected within angle_rad [-0.35,"
-                " 1.75]; with somebody in the machine a limit may only be tighter"
+                " 1.75]; with a wearer a limit may only be tighter"
             ),
         ),
         (
@@ -266,7 +267,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "cuff_force_n = 500.0",
             (
                 "safety: with_human.cuff_force_n: found 500, expected at most "
-                "cuff_force_n (400); with somebody in the machine a limit may only be tighter"
+                "cuff_force_n (400); with a wearer a limit may only be tighter"
             ),
         ),
         (
@@ -294,17 +295,16 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "enabled_value = 0x0001",
             "#",
             (
-                "map.drive.servo: enabled_value: missing beside enabled_mask 0x0001, expected "
-                "what these bits are while the drive is enabled, see its manual; give it"
+                "map.drive.servo: enabled_value: missing with enabled_mask 0x0001; add the "
+                "value of these bits while the drive is enabled, from its manual"
             ),
         ),
         (
             "fault_mask = 0x0008",
             "fault_mask = 0x0009",
             (
-                "map.drive.servo: fault_mask: found 0x0009, of which 0x0001 is in enabled_value"
-                " 0x0001 too, expected other bits: an enabled drive has no fault; correct one of"
-                " them"
+                "map.drive.servo: fault_mask: found 0x0009, but 0x0001 of it is in enabled_value"
+                " 0x0001. An enabled drive has no fault; correct one of them"
             ),
         ),
         (
@@ -314,9 +314,8 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             ),
             "enabled_mask = 0x0008\nenabled_value = 0x0000",
             (
-                "map.drive.servo: enabled_mask: found 0x0008, all of it in fault_mask 0x0008,"
-                " expected a bit that tells an enabled drive from a disabled one; correct one of"
-                " them"
+                "map.drive.servo: enabled_mask: found 0x0008, all of it in fault_mask 0x0008"
+                ". Expected a bit that is set only in an enabled, or only in a disabled drive"
             ),
         ),
         (
@@ -324,7 +323,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "angle_margin_rad = 1.05",
             (
                 "safety.angle_margin_rad: found 1.05, expected less "
-                "than 1.05, half of the hip's angle_rad, or no set-point keeps it; lower it"
+                "than 1.05, half of the hip's angle_rad; lower it"
             ),
         ),
         (
@@ -349,18 +348,18 @@ def test_a_bad_rig_file_is_refused_in_one_line_with_the_keys_path(tmp_path, old,
     assert str(caught.value) == f"{path}: {message}"
 
 
-def test_fault_bits_are_told_by_their_names_and_those_without_by_their_number():
+def test_active_faults_are_named_and_those_without_a_name_numbered():
     servo = (
         load_rig(RIGS / "lab.toml")
         .map.drive["servo"]
         .model_copy(update={"fault_mask": 0x00A8, "faults": {3: "over-current", 7: "too hot"}})
     )
-    assert servo.told_faults(0x0107) == ""
-    assert servo.told_faults(0xFFFF) == "0x00A8: over-current, bit 5, too hot"
-    assert servo.model_copy(update={"faults": {}}).told_faults(0x0008) == "0x0008"
+    assert servo.active_faults(0x0107) == ""
+    assert servo.active_faults(0xFFFF) == "0x00A8: over-current, bit 5, too hot"
+    assert servo.model_copy(update={"faults": {}}).active_faults(0x0008) == "0x0008"
 
 
-def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
+def test_a_recording_does_not_hold_the_paths_of_keys(tmp_path):
     line = "[line.leg]\ntransport = 'tls'\nca = 'secret/ca.pem'\n"
     text = (RIGS / "plain.toml").read_text().replace('map = "servo"', 'map = "servo"\nline = "leg"')
     (tmp_path / "rig.toml").write_text(
@@ -372,7 +371,7 @@ def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
     assert "secret" not in str(rig.public())
 
 
-def test_with_somebody_in_the_machine_the_tighter_limits_are_in_force():
+def test_the_tighter_limits_are_in_force_with_a_wearer():
     rig = load_rig(RIGS / "plain.toml")
     alone, human = rig.in_force("exo_alone"), rig.in_force("with_human")
     assert [drive.speed_rad_s for drive in alone.drive] == [3.0, 3.5]

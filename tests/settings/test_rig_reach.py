@@ -1,4 +1,4 @@
-"""A limit beyond what a register can tell would never be seen broken."""
+"""A value beyond a limit must be within the range of its register."""
 
 import pytest
 
@@ -13,37 +13,37 @@ FORCE = 'force_y = { address = 104, type = "float32", unit = "N" }'
 
 
 @pytest.mark.parametrize(
-    ("register", "old", "new", "tells"),
+    ("register", "old", "new", "message"),
     [
         (
             FORCE,
             'type = "float32"',
             'type = "int16", scale = 0.001',
-            "force_y: an int16 of this scale tells -32.77 to",
+            "force_y: this int16 can represent -32.77 to",
         ),
         (
             FORCE,
             'type = "float32"',
             'type = "uint16", scale = 0.1',
-            "force_y: an uint16 of this scale tells 0 to 6554",
+            "force_y: this uint16 can represent 0 to 6554",
         ),
         (
             ANGLE,
             'type = "int32", scale = 1e-6',
             'type = "int16", scale = 1e-5',
-            "angle: an int16 of this scale tells",
+            "angle: this int16 can represent",
         ),
-        (ANGLE, "int32", "uint32", "read.angle: an uint32 of this scale tells 0 to 4295"),
-        (CURRENT, 'type = "int32"', 'type = "int16"', "expected more than -12.5 to 12.5"),
+        (ANGLE, "int32", "uint32", "read.angle: this uint32 can represent 0 to 4295"),
+        (CURRENT, 'type = "int32"', 'type = "int16"', "the hip's limits are -12.5 to 12.5 A"),
         (
             VELOCITY,
             'type = "int32"',
             'type = "int16"',
-            "velocity: an int16 of this scale tells -0.3277 to 0.3277",
+            "velocity: this int16 can represent -0.3277 to 0.3277 rad/s",
         ),
     ],
 )
-def test_a_register_that_ends_before_a_limit_is_refused(tmp_path, register, old, new, tells):
+def test_a_register_that_ends_before_a_limit_is_refused(tmp_path, register, old, new, message):
     text = (datasets() / "rigs" / "plain.toml").read_text()
     assert register in text
     path = tmp_path / "rig.toml"
@@ -52,4 +52,4 @@ def test_a_register_that_ends_before_a_limit_is_refused(tmp_path, register, old,
         SettingsError, match="correct its type or scale, or lower the limits"
     ) as refused:
         load_rig(path)
-    assert tells in str(refused.value)
+    assert message in str(refused.value)

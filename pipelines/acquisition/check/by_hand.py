@@ -14,7 +14,8 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import AXES
 from pipelines.acquisition.machine.drive import Drive
-from pipelines.settings.rig import DIMENSION, UNITS, RigSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.register import DIMENSION, UNITS
 
 PATIENCE_S = 20.0
 """Longest wait for each movement."""

@@ -11,7 +11,7 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
-from pipelines.settings.rig import DIMENSION, UNITS
+from pipelines.settings.rig.register import DIMENSION, UNITS
 
 RATES_HZ = (0.5, 1e5)
 """Sample rates that a device may have, where none is known."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.check.probe import Series
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import DIMENSION, REGISTERS, Register, RegisterType
+from pipelines.settings.rig import Register
+from pipelines.settings.rig.register import DIMENSION, REGISTERS, RegisterType
 
 MOST_NAMED = 2
 _COST = {"word_order": 1, "type": 2}

@@ -10,7 +10,8 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.machine.drive import Drive
-from pipelines.settings.rig import DriveSettings, RigSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import DriveSettings
 
 TEMPERATURE_C = (-20.0, 150.0)
 TORQUE_AT_REST = 0.1
@@ -154,7 +155,7 @@ def _faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
     if "status" not in series.block.registers:
         return
     status = int(series.of("status")[-1])
-    if bits := drive.map.told_faults(status):
+    if bits := drive.map.active_faults(status):
         yield Finding(
             probe.name,
             f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual"

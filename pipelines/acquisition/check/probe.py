@@ -10,7 +10,8 @@ from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.modbus.wraparound import Counter
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import Register, registers_of
+from pipelines.settings.rig import Register
+from pipelines.settings.rig.block import registers_of
 
 
 @dataclass(frozen=True)

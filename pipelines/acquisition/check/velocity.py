@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.check.finding import Finding
-from pipelines.settings.rig import DIMENSION, UNITS, Register
+from pipelines.settings.rig import Register
+from pipelines.settings.rig.register import DIMENSION, UNITS
 
 MOVED_RAD = 0.02
 """Travel from which on the two can be compared."""

@@ -16,7 +16,9 @@ from pipelines.acquisition.modbus.ring_buffer import Queue, Ring
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, Counter, keeps_time
 from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import DriveSettings, RigSettings, registers_of
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.devices import DriveSettings
 
 WATCH_PAUSE_S = 0.05
 """From one look at a drive that may be driven to the next."""
@@ -396,7 +398,7 @@ class Drive:
 
     def _fault(self, status: int) -> str | None:
         """Return in words the fault that a status word tells; None where it tells none."""
-        if not (bits := self.map.told_faults(status)):
+        if not (bits := self.map.active_faults(status)):
             return None
         reset = (
             ""

@@ -12,8 +12,8 @@ from typing import IO, Any
 
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.line import TcpLine
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.line import TcpLine
 
 START_S = 180.0
 """Longest start; the very first one compiles the plant."""

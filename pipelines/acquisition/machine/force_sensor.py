@@ -9,7 +9,9 @@ from pipelines.acquisition.modbus.wraparound import Counter
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import RigSettings, SensorSettings, registers_of
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.devices import SensorSettings
 
 SETTLED_S = 0.5
 """Time after which it is known how fast a sensor counts."""
@@ -57,7 +59,7 @@ class Sensor:
         except Unanswered as error:
             if self._watchdog.has_expired(time.monotonic()):
                 raise DeviceError(str(error)) from error
-            self._owes = not self.device.line.tells_replies_apart
+            self._owes = not self.device.line.has_transaction_ids
             return None
         now = time.monotonic()
         self._watchdog.reset(now)

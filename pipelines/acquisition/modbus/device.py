@@ -12,7 +12,8 @@ from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.reply import NoReply
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import Identity, SafetySettings
+from pipelines.settings.rig.register_map import Identity
+from pipelines.settings.rig.safety import SafetySettings
 
 MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",

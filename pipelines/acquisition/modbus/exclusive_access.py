@@ -12,8 +12,8 @@ from typing import IO
 
 from pipelines.acquisition.modbus.file_lock import take
 from pipelines.errors import DeviceError
-from pipelines.settings.line import LineSettings, RtuLine
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.line import LineSettings, RtuLine
 
 
 @contextmanager

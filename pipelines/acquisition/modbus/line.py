@@ -21,7 +21,9 @@ from serial.tools import list_ports
 
 from pipelines.acquisition.modbus.reply import NoReply, check_replies
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.settings.line import (
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import DeviceSettings
+from pipelines.settings.rig.line import (
     LineSettings,
     NetworkLine,
     RtuLine,
@@ -29,7 +31,6 @@ from pipelines.settings.line import (
     TlsLine,
     refuse_passphrase,
 )
-from pipelines.settings.rig import DeviceSettings, RigSettings
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
 """What a serial port that cannot be set up as told is refused with."""
@@ -91,9 +92,9 @@ class Line:
         self._quiet_since = 0.0
 
     @property
-    def tells_replies_apart(self) -> bool:
+    def has_transaction_ids(self) -> bool:
         """Whether a reply names the request that it answers."""
-        return self._settings.tells_replies_apart
+        return self._settings.has_transaction_ids
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return what errors call it."""
@@ -210,7 +211,7 @@ class Line:
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
-                if unit in self._asked and (len(self.devices) > 1 or not self.tells_replies_apart):
+                if unit in self._asked and (len(self.devices) > 1 or not self.has_transaction_ids):
                     self._owed[unit] = Owed(within_s)
             self._asking = False
 

@@ -8,8 +8,10 @@ from math import floor
 from pipelines.acquisition.pacing import SLOW
 from pipelines.errors import SettingsError
 from pipelines.modbus.register_block import Block
-from pipelines.settings.line import LineSettings
-from pipelines.settings.rig import DriveMap, RigSettings, SensorMap, registers_of
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.line import LineSettings
+from pipelines.settings.rig.register_map import DriveMap, SensorMap
 
 
 def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:

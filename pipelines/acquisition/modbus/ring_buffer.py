@@ -14,7 +14,8 @@ from math import ceil
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.wraparound import carried
 from pipelines.modbus.register_block import Block
-from pipelines.settings.rig import RingSettings, registers_of
+from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.ring import RingSettings
 
 FEWEST_READS = 4
 """Reads that a drain may take, however few bring what a cycle does."""

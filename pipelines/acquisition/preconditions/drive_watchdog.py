@@ -2,7 +2,8 @@
 for one."""
 
 from pipelines.errors import SettingsError
-from pipelines.settings.rig import DriveSettings, RigSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import DriveSettings
 
 
 def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
@@ -41,4 +42,4 @@ def replies_waited_for(rig: RigSettings, drive: DriveSettings, *, with_sensors: 
         if other.line == drive.line
     ]
     shared = drive.line is not None and len(on_line) > 1
-    return 2 if shared or not rig.line_of(drive).tells_replies_apart else 1
+    return 2 if shared or not rig.line_of(drive).has_transaction_ids else 1

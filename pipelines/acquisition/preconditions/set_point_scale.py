@@ -4,7 +4,8 @@ leg stands."""
 from collections.abc import Iterator
 
 from pipelines.errors import SettingsError
-from pipelines.settings.rig import DriveMap, Register, RigSettings
+from pipelines.settings.rig import Register, RigSettings
+from pipelines.settings.rig.register_map import DriveMap
 
 SAME_SCALE = 1e-3
 """Up to which share two scales are one, written with more or fewer digits."""

@@ -9,7 +9,8 @@ from pipelines.acquisition.machine.drive import Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
-from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import DriveSettings, SensorSettings
 
 ROUNDING_RAD = 1e-9
 HOLD_SAMPLES = 20

@@ -4,7 +4,8 @@ from math import copysign, sqrt
 
 from pipelines.acquisition.safety.limits import clamped, refuse_leap
 from pipelines.errors import DeviceError
-from pipelines.settings.rig import DriveSettings, SafetySettings
+from pipelines.settings.rig.devices import DriveSettings
+from pipelines.settings.rig.safety import SafetySettings
 
 WALK = 0.8
 """Share of its speed limit at which a joint is led back to the plan: at the whole of it a drive

@@ -9,7 +9,7 @@ from pipelines.acquisition.safety.enable_state import EnableState, refuse_any
 from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 from pipelines.acquisition.safety.sample_checks import SampleChecks
 from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
-from pipelines.settings.rig import SafetySettings
+from pipelines.settings.rig.safety import SafetySettings
 
 
 class SafeStop:

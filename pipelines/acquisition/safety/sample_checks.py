@@ -16,7 +16,8 @@ from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
 from pipelines.acquisition.safety.stuck_register import ANSWER_CYCLES
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
-from pipelines.settings.rig import RigSettings, SensorSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import SensorSettings
 
 
 class SampleChecks:

@@ -20,7 +20,8 @@ from pipelines.acquisition.safety.stuck_register import (
 )
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
-from pipelines.settings.rig import MOST_REGISTERS, RigSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.block import MOST_REGISTERS
 
 SETTLED_CYCLES = 50
 """Cycles after which a clock's rate is looked at; a step of it can then be told from a wrong

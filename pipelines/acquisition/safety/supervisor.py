@@ -20,7 +20,8 @@ from pipelines.acquisition.safety.set_point_tracker import SLACK_SAMPLES, SetPoi
 from pipelines.acquisition.safety.stop_reason import StopReason
 from pipelines.acquisition.states import FOLLOWING, TRANSITIONS, State
 from pipelines.errors import DeviceError
-from pipelines.settings.rig import RigSettings, SensorSettings
+from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.devices import SensorSettings
 
 LONGEST_RETURN_S = 5.0
 """How long set-points may take to the end of their path once it is due."""

@@ -10,7 +10,7 @@ from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import NoiseSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 from pipelines.signals.blocks import BlockAverage
 
 

@@ -20,7 +20,7 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.rig.clocks import OwnClock
 from pipelines.rig.plant import Plant
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.rig.plant import PlantSettings
 
 
 class Clock:

@@ -14,8 +14,8 @@ from pipelines.errors import DeviceError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.line import RtuLine, TcpLine
 from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.line import RtuLine, TcpLine
 from tests.acquisition.conftest import free_port
 
 HOLD = """

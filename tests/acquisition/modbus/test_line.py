@@ -23,8 +23,9 @@ from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.rig.listening import _tls_context
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.line import RtuLine, RtuOverTcpLine
-from pipelines.settings.rig import SafetySettings, load_rig
+from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.line import RtuLine, RtuOverTcpLine
+from pipelines.settings.rig.safety import SafetySettings
 from tests.acquisition.conftest import free_port
 
 TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")

@@ -11,7 +11,8 @@ from pipelines.acquisition.modbus.wraparound import Counter
 from pipelines.errors import SettingsError
 from pipelines.modbus.register_block import Block
 from pipelines.rig import ring as virtual
-from pipelines.settings.rig import RingSettings, load_rig
+from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.ring import RingSettings
 
 CAPACITY = 64
 RECORD = {

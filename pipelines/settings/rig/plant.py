@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipelines.settings.base import Settings
-from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
+from pipelines.settings.physical_bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 
 Pair = tuple[float, float]
 Four = tuple[float, float, float, float]

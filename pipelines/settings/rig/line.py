@@ -18,7 +18,7 @@ FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
 class Line(Settings):
     """What lines of every kind have."""
 
-    tells_replies_apart: ClassVar[bool] = True
+    has_transaction_ids: ClassVar[bool] = True
     """Whether a reply names the request that it answers; among RTU frames none does."""
 
     @property
@@ -74,7 +74,7 @@ class TcpLine(NetworkLine):
 class RtuOverTcpLine(NetworkLine):
     """RTU frames through a TCP connection, as a serial device server passes them on."""
 
-    tells_replies_apart = False
+    has_transaction_ids = False
     transport: Literal["rtu_over_tcp"]
 
 
@@ -126,7 +126,7 @@ def refuse_passphrase(key: Path | None) -> Callable[[], str]:
 class RtuLine(Line):
     """Modbus RTU on a serial port."""
 
-    tells_replies_apart = False
+    has_transaction_ids = False
     transport: Literal["rtu"]
     serial_port: str = Field(
         min_length=1, description="Path of the port, best one below /dev/serial/by-id."

@@ -1,0 +1,145 @@
+"""A register: where a value lies in a device, and how its bits are read."""
+
+from math import inf
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipelines.settings.base import Settings
+
+RegisterType = Literal[
+    "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
+]
+REGISTERS = {
+    "int16": 1,
+    "uint16": 1,
+    "int32": 2,
+    "uint32": 2,
+    "int64": 4,
+    "uint64": 4,
+    "float32": 2,
+    "float64": 4,
+}
+"""Registers of 16 bits that a value takes."""
+
+UNITS = {
+    "1": 1.0,
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": 0.017453292519943295,
+    "rad/s": 1.0,
+    "deg/s": 0.017453292519943295,
+    "rpm": 0.10471975511965977,
+    "A": 1.0,
+    "mA": 1e-3,
+    "N": 1.0,
+    "kN": 1e3,
+    "°C": 1.0,
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+}
+"""SI value of one of each unit that a register can hold."""
+
+Unit = Literal[
+    "1", "rad", "mrad", "deg", "rad/s", "deg/s", "rpm", "A", "mA", "N", "kN", "°C", "s", "ms", "us"
+]
+
+DIMENSION = {
+    "sequence": ("1",),
+    "status": ("1",),
+    "control": ("1",),
+    "heartbeat": ("1",),
+    "time": ("s", "ms", "us"),
+    "angle": ("rad", "mrad", "deg"),
+    "reference": ("rad", "mrad", "deg"),
+    "velocity": ("rad/s", "deg/s", "rpm"),
+    "current": ("A", "mA"),
+    "temperature": ("°C",),
+    "force_x": ("N", "kN"),
+    "force_y": ("N", "kN"),
+    "force_z": ("N", "kN"),
+}
+"""Units that a register of each quantity may have, the SI unit first."""
+
+
+class Register(Settings):
+    """Where a value lies and what its bits mean: value = raw x scale + offset, in ``unit``."""
+
+    address: int = Field(
+        ge=0, le=65535, description="Address of its first register, counted from 0."
+    )
+    type: RegisterType = Field(description="How the bits are to be read.")
+    word_order: Literal["big", "little"] = Field(
+        "big", description="Which half of a long value comes first."
+    )
+    byte_order: Literal["big", "little"] = Field(
+        "big", description="Which half of each register comes first."
+    )
+    scale: float = Field(1.0, description="Units per count; negative turns the sign.")
+    offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
+    unit: Unit = Field("1", description="Unit of the scaled value.")
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if self.scale == 0.0:
+            raise ValueError(
+                "scale: found 0, expected units per count; every value would be the offset"
+            )
+        if self.address + self.registers > 65536:
+            raise ValueError(
+                f"address: found {self.address}, but a {self.type} there ends beyond address 65535"
+            )
+        return self
+
+    @property
+    def registers(self) -> int:
+        """How many registers of 16 bits it takes."""
+        return REGISTERS[self.type]
+
+    @property
+    def si(self) -> tuple[float, float]:
+        """SI units per count, and the SI value at a raw 0."""
+        return self.scale * UNITS[self.unit], self.offset * UNITS[self.unit]
+
+    @property
+    def step(self) -> float:
+        """Distance between the SI values of neighbouring counts; 0 for a float."""
+        return 0.0 if self.is_float else abs(self.si[0])
+
+    @property
+    def is_float(self) -> bool:
+        """Whether the bits are those of a floating-point number."""
+        return self.type.startswith("float")
+
+    @property
+    def is_plain_count(self) -> bool:
+        """Whether it is an unsigned integer without scale and offset."""
+        return self.type.startswith("u") and (self.scale, self.offset) == (1.0, 0.0)
+
+    @property
+    def counts(self) -> tuple[int, int] | None:
+        """The least and the greatest count of an integer; None for a float."""
+        if self.is_float:
+            return None
+        bits = 16 * self.registers
+        if self.type.startswith("u"):
+            return 0, 2**bits - 1
+        return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the greatest SI value that it can represent; infinite for a float."""
+        if self.counts is None:
+            return -inf, inf
+        scale, offset = self.si
+        low, high = sorted(count * scale + offset for count in self.counts)
+        return low, high
+
+    def holds(self, low: float, high: float) -> bool:
+        """Return whether it can represent every SI value from ``low`` to ``high``."""
+        if self.counts is None:
+            return True
+        scale, offset = self.si
+        least, greatest = self.counts
+        return all(least <= round((value - offset) / scale) <= greatest for value in (low, high))

@@ -1,0 +1,229 @@
+"""``[map]`` of a rig file: which registers the drives and force sensors of a make have."""
+
+from collections import Counter
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from pipelines.settings.base import Settings
+from pipelines.settings.rig.block import check_block, check_no_gap
+from pipelines.settings.rig.register import Register
+from pipelines.settings.rig.ring import RingSettings
+
+
+class Identity(Settings):
+    """A register that identifies a device, and its value there."""
+
+    address: int = Field(ge=0, le=65535, description="Address of the register.")
+    value: int = Field(ge=0, le=65535, description="What it holds on the right device.")
+
+
+class DriveRead(Settings):
+    """Values of a drive, all latched at one instant; read in one block."""
+
+    sequence: Register = Field(description="Sample counter.")
+    time: Register = Field(description="The device's clock at the sample.")
+    angle: Register = Field(description="Joint angle.")
+    current: Register = Field(
+        description="Motor current, positive where it pushes the angle upward."
+    )
+    velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
+    temperature: Register | None = Field(None, description="Drive or motor temperature.")
+    status: Register | None = Field(None, description="Status word.")
+    reference: Register | None = Field(
+        None, description="Set-point that was in force; else what exoid sent is kept."
+    )
+
+
+class DriveWrite(Settings):
+    """Values sent to a drive, in one block."""
+
+    reference: Register = Field(description="Set-point angle, to be reached within one sample.")
+    control: Register = Field(description="Control word.")
+    heartbeat: Register | None = Field(
+        None, description="Counts up with every write: the host lives."
+    )
+
+
+class SensorRead(Settings):
+    """Values of a 3-axis force sensor, read in one block.
+
+    Axes are those of the segment, see docs/contracts.md.
+    """
+
+    sequence: Register = Field(description="Sample counter.")
+    force_x: Register = Field(description="Force along the segment (distal).")
+    force_y: Register = Field(description="Force forward.")
+    force_z: Register = Field(description="Lateral force.")
+
+
+class DriveMap(Settings):
+    """Register map of a make of drives."""
+
+    identity: tuple[Identity, ...] = Field(
+        (), description="Registers that identify the right device."
+    )
+    read: DriveRead = Field(description="Block that is read.")
+    write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
+    own_scale: bool = Field(
+        False,
+        description=(
+            "Set-points mean the same place as angles though their type, order, scale or offset is"
+            " another; else that is taken for a slip, and refused."
+        ),
+    )
+    enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
+    disable: int = Field(0, description="Control word that takes the torque away.")
+    halt: int | None = Field(
+        None, description="Control word that holds the leg where a stop has led it; else enable."
+    )
+    fault_reset: int | None = Field(
+        None, description="Control word that clears a fault, for --reset-faults."
+    )
+    fault_mask: int = Field(
+        0, ge=0, description="Bits of the status word that mean a fault; 0 for none."
+    )
+    faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
+        default_factory=dict,
+        description="What a fault bit means, by its number; bit 0 is the lowest.",
+    )
+    enabled_mask: int = Field(
+        0, ge=0, description="Bits of the status word that show whether it is enabled; 0: none."
+    )
+    enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
+    ring: RingSettings | None = Field(
+        None, description="The drive's own record of its latest samples, if it has one."
+    )
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        check_block(self.read, "read")
+        check_block(self.write, "write")
+        check_no_gap(self.write, "write")
+        self._check_faults()
+        self._check_enabled_bits()
+        self._check_ring_counters()
+        self._check_control_words()
+        self._check_word_sizes()
+        return self
+
+    @property
+    def _control_words(self) -> dict[str, int]:
+        words = {name: getattr(self, name) for name in ("enable", "disable", "halt", "fault_reset")}
+        return {name: word for name, word in words.items() if word is not None}
+
+    @property
+    def _masks(self) -> dict[str, int]:
+        return {"fault_mask": self.fault_mask, "enabled_mask": self.enabled_mask}
+
+    def _check_faults(self) -> None:
+        for name, mask in self._masks.items():
+            if mask and self.read.status is None:
+                raise ValueError(
+                    f"{name}: needs a status register; add read.status or leave the mask out"
+                )
+        for bit in self.faults:
+            if not self.fault_mask >> bit & 1:
+                raise ValueError(
+                    f"faults: bit {bit} is not one of fault_mask 0x{self.fault_mask:04X}; add"
+                    f" 0x{1 << bit:04X} to the mask, or leave the name out"
+                )
+
+    def _check_enabled_bits(self) -> None:
+        """Refuse bits that do not distinguish an enabled drive from a disabled or faulty one."""
+        if self.enabled_value & ~self.enabled_mask:
+            raise ValueError(
+                f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
+                f"0x{self.enabled_mask:04X} only; correct one of them"
+            )
+        if self.enabled_mask and "enabled_value" not in self.model_fields_set:
+            raise ValueError(
+                f"enabled_value: missing with enabled_mask 0x{self.enabled_mask:04X}; add the value"
+                " of these bits while the drive is enabled, from its manual"
+            )
+        both = self.enabled_value & self.fault_mask
+        if both:
+            raise ValueError(
+                f"fault_mask: found 0x{self.fault_mask:04X}, but 0x{both:04X} of it is in"
+                f" enabled_value 0x{self.enabled_value:04X}. An enabled drive has no fault; correct"
+                " one of them"
+            )
+        if self.enabled_mask and not self.enabled_mask & ~self.fault_mask:
+            raise ValueError(
+                f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask"
+                f" 0x{self.fault_mask:04X}. Expected a bit that is set only in an enabled, or only"
+                " in a disabled drive"
+            )
+
+    def _check_ring_counters(self) -> None:
+        if self.ring is None:
+            return
+        counters = {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence}
+        for name, counter in counters.items():
+            if counter and counter.type != self.read.sequence.type:
+                raise ValueError(
+                    f"ring.{name}.type: found {counter.type}, expected {self.read.sequence.type} as"
+                    " in read.sequence: it is the same counter"
+                )
+
+    def _check_control_words(self) -> None:
+        words = self._control_words
+        for word, times in Counter(words.values()).items():
+            if times > 1:
+                same = " and ".join(name for name, value in words.items() if value == word)
+                raise ValueError(
+                    f"{same}: both are 0x{word:04X}, expected different control words; correct one"
+                )
+
+    def _check_word_sizes(self) -> None:
+        """Refuse words and masks that do not fit into their registers."""
+        for name, register, values in (
+            ("write.control", self.write.control, self._control_words),
+            ("read.status", self.read.status, self._masks),
+        ):
+            if register is None:
+                continue
+            if not register.is_plain_count:
+                raise ValueError(
+                    f"{name}: found {register.type} with scale {register.scale:g} and offset"
+                    f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or"
+                    " offset, as its bits are flags"
+                )
+            for key, value in values.items():
+                if not register.holds(value, value):
+                    raise ValueError(
+                        f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of"
+                        " them"
+                    )
+
+    def active_faults(self, status: int) -> str:
+        """Return the fault bits of a status word with their names; empty without a fault."""
+        active = status & self.fault_mask
+        if not active:
+            return ""
+        if not self.faults:
+            return f"0x{active:04X}"
+        bits = [bit for bit in range(active.bit_length()) if active >> bit & 1]
+        names = ", ".join(self.faults.get(bit, f"bit {bit}") for bit in bits)
+        return f"0x{active:04X}: {names}"
+
+
+class SensorMap(Settings):
+    """Register map of a make of force sensors."""
+
+    identity: tuple[Identity, ...] = Field(
+        (), description="Registers that identify the right device."
+    )
+    read: SensorRead = Field(description="Block that is read.")
+
+    @model_validator(mode="after")
+    def _block_is_possible(self) -> Self:
+        check_block(self.read, "read")
+        return self
+
+
+class Maps(Settings):
+    """Register maps by name."""
+
+    drive: dict[str, DriveMap] = Field(description="Maps of drives.")
+    sensor: dict[str, SensorMap] = Field(default_factory=dict, description="Maps of force sensors.")

@@ -1,0 +1,106 @@
+"""The ring or queue in which a drive keeps its latest samples."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from pipelines.settings.base import Settings
+from pipelines.settings.rig.block import MOST_REGISTERS, check_block, check_counter, registers_of
+from pipelines.settings.rig.register import Register
+
+MOST_QUEUED = 31
+"""Registers that one FC24 answer carries."""
+
+
+class RingRecord(Settings):
+    """One record of a ring; addresses count from the record's own beginning."""
+
+    sequence: Register = Field(description="Sample counter, which counts as read.sequence does.")
+    time: Register = Field(description="The device's clock at the sample.")
+    angle: Register = Field(description="Joint angle.")
+    current: Register = Field(
+        description="Motor current, positive where it pushes the angle upward."
+    )
+    velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
+    reference: Register | None = Field(
+        None, description="Set-point in force; left out, recordings hold none."
+    )
+
+
+class RingSettings(Settings):
+    """A ring of registers read by FC03, or a queue read by FC24."""
+
+    newest: Register | None = Field(
+        None, description="Of a ring: sequence number of the newest whole record."
+    )
+    address: int | None = Field(
+        None, ge=0, le=65535, description="Of a ring: where the record with number 0 begins."
+    )
+    capacity: int | None = Field(
+        None, ge=2, description="Of a ring: records in it; record n is the (n mod it)-th."
+    )
+    fifo: int | None = Field(
+        None, ge=0, le=65535, description="Of a queue: the address that FC24 asks for."
+    )
+    words: int = Field(
+        ge=1,
+        le=MOST_REGISTERS["read"],
+        description="Registers of 16 bits from one record to the next.",
+    )
+    record: RingRecord = Field(description="What a record holds.")
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        check_block(self.record, "record")
+        self._check_kind()
+        length = max(r.address + r.registers for r in registers_of(self.record).values())
+        if length > self.words:
+            raise ValueError(
+                f"words: found {self.words}, but the record's registers take {length}; correct one"
+            )
+        if self.fifo is not None and self.words > MOST_QUEUED:
+            raise ValueError(
+                f"words: found {self.words}, expected at most {MOST_QUEUED}, the most that an FC24"
+                " answer carries"
+            )
+        if self.newest is not None:
+            check_counter(self.newest, "newest")
+            self._check_ring(self.newest)
+        return self
+
+    @property
+    def records_per_read(self) -> int:
+        """Greatest number of records that one read returns."""
+        return (MOST_REGISTERS["read"] if self.fifo is None else MOST_QUEUED) // self.words
+
+    def _check_kind(self) -> None:
+        """Refuse all but the keys of a ring, or of a queue."""
+        names = ("address", "capacity", "fifo", "newest")
+        given = [name for name in names if getattr(self, name) is not None]
+        if given not in (["address", "capacity", "newest"], ["fifo"]):
+            raise ValueError(
+                f"ring: found {', '.join(given) or 'neither'}, expected newest, address and"
+                " capacity (a ring that FC03 reads), or fifo (a queue that FC24 reads)"
+            )
+
+    def _check_ring(self, newest: Register) -> None:
+        assert self.address is not None and self.capacity is not None  # a ring has all three
+        end = self.address + self.capacity * self.words
+        if end > 65536:
+            raise ValueError(
+                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535;"
+                " lower it"
+            )
+        if self.address <= newest.address < end:
+            raise ValueError(
+                f"newest: register {newest.address} is part of the ring itself; correct one address"
+            )
+        for name, register in (("newest", newest), ("record.sequence", self.record.sequence)):
+            span = 2 ** (16 * register.registers)
+            # A record must keep its place in the ring when the counter wraps around.
+            if not register.type.startswith("u") or span % self.capacity:
+                raise ValueError(
+                    f"{name}.type: found {register.type} with a capacity of {self.capacity},"
+                    " expected an unsigned counter whose range is a multiple of the capacity, such"
+                    " as a power of 2"
+                )

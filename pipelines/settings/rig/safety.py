@@ -1,0 +1,92 @@
+"""``[safety]`` of a rig file: what stops a run, and how."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from pipelines.settings.base import Settings
+from pipelines.settings.rig.with_human import check_tighter, limits_in_force
+
+LONGEST_RAMP_S = 60.0
+"""Longest ramp from rest into a motion, s."""
+
+
+class HumanSafetySettings(Settings):
+    """What stops a run with a wearer; what is left out is as without."""
+
+    cuff_force_n: float | None = Field(
+        None, gt=0.0, description="Highest force on any axis of any cuff sensor."
+    )
+    following_error_rad: float | None = Field(
+        None, gt=0.0, description="Farthest an angle may be from its set-point."
+    )
+
+
+class SafetySettings(Settings):
+    """What stops a run, and how."""
+
+    angle_margin_rad: float = Field(
+        0.02, ge=0.0, description="Set-points keep this far from each angle limit."
+    )
+    cuff_force_n: float = Field(
+        400.0, gt=0.0, description="Highest force on any axis of any cuff sensor."
+    )
+    following_error_rad: float = Field(
+        0.15, gt=0.0, description="Farthest an angle may be from its set-point."
+    )
+    watchdog_s: float = Field(
+        0.1, gt=0.0, description="Longest a cycle or a device's next sample may take."
+    )
+    reply_s: float | None = Field(
+        None,
+        gt=0.0,
+        description=(
+            "Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
+        ),
+    )
+    heartbeat_s: float | None = Field(
+        None,
+        gt=0.0,
+        description=(
+            "Time-out of the drives' own watchdogs, as it is set in them; else it is not known."
+        ),
+    )
+    connect_s: float = Field(
+        5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply."
+    )
+    control_s: float = Field(
+        1.0, gt=0.0, description="Longest a drive may take to carry out a control word."
+    )
+    deceleration_rad_s2: float = Field(
+        8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down."
+    )
+    ramp_s: float = Field(
+        3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back."
+    )
+    settle_s: float = Field(
+        1.0, ge=0.0, description="Motion before the recording begins, for transients to fade."
+    )
+    with_human: HumanSafetySettings = Field(
+        HumanSafetySettings(), description="Tighter limits of runs with_human."
+    )
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        check_tighter(self, self.with_human, "cuff_force_n", "following_error_rad")
+        if self.longest_reply_s >= self.watchdog_s:
+            raise ValueError(
+                f"reply_s: found {self.reply_s:g}, expected less than watchdog_s"
+                f" ({self.watchdog_s:g}), or one lost reply stops the run; leave it out"
+            )
+        return self
+
+    @property
+    def longest_reply_s(self) -> float:
+        """Longest wait for one reply while the leg moves, s."""
+        # Not a third: three lost replies are tolerated. The fourth then stops the run, before the
+        # watchdog does, and names the device that is silent.
+        return 0.3 * self.watchdog_s if self.reply_s is None else self.reply_s
+
+    def in_force(self, run: str) -> Self:
+        """Return the limits in force in a run (``exo_alone`` or ``with_human``)."""
+        return self.model_copy(update=limits_in_force(self.with_human, run))
