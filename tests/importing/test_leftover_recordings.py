@@ -130,7 +130,8 @@ def test_what_a_killed_import_left_is_named(imported, pendulum, write_csv, tmp_p
     left = tmp_path / "recordings" / ".abc.tmp"
     left.mkdir(parents=True)
     outcome = imported(write_csv(pendulum.columns()))
-    assert (outcome.code, f"{left}: temporary file of an import that was killed" in outcome.err) == (0, True)
+    message = f"{left}: temporary file of an import that was killed"
+    assert (outcome.code, message in outcome.err) == (0, True)
 
 
 def test_a_file_that_grows_too_large_is_named_with_what_to_do(pendulum, write_csv, tmp_path):
