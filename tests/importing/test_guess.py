@@ -14,7 +14,7 @@ from scipy.io import savemat
 from exoid_cli.app import run
 from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.register import lost_sign
-from pipelines.importing.sanity.consistency import integral_agreement
+from pipelines.importing.quantities.consistency import integral_agreement
 
 
 @pytest.fixture
@@ -948,7 +948,7 @@ def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_an
 def test_a_column_without_a_number_in_the_middle_of_a_long_log_hides_no_angle(
     guessed, pendulum, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("pipelines.importing.sanity.consistency.MOST", 1000)
+    monkeypatch.setattr("pipelines.importing.quantities.consistency.MOST", 1000)
     rng, rows = np.random.default_rng(1), np.arange(len(pendulum.time))
     columns = {"time": pendulum.time} | {
         f"c{k}": rng.normal(size=len(rows)).cumsum() for k in range(25)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.importing.guess.names import TWIN, Meaning, in_counts
 from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import fit_torque
-from pipelines.importing.sanity.consistency import integral_agreement, likeliest_integrals
+from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
 from pipelines.settings.units import UNITS
 
 TURNING, SLIDING = (

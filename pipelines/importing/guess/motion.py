@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.importing.guess.register import are_whole
-from pipelines.importing.sanity.consistency import Agreement, integral_agreement
+from pipelines.importing.quantities.consistency import Agreement, integral_agreement
 from pipelines.settings.units import UNITS
 
 NEAR = 0.12

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.sanity.consistency import whole_rows
+from pipelines.importing.quantities.consistency import whole_rows
 
 WINDOW_S = 0.1
 """Of the parabola whose bend is the acceleration: short against a swing, long against an encoder's

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import argrelmin, correlate
 
-from pipelines.importing.sanity.consistency import whole_rows
+from pipelines.importing.quantities.consistency import whole_rows
 
 POINTS = 20_000
 """Instants that are looked at at most."""
