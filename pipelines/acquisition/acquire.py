@@ -270,20 +270,20 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
 
 def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
     """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
-    kind, told = _ending(output, supervisor)
+    kind, text = _ending(output, supervisor)
     with ExitStack() as held:
         try:
             lock = held.enter_context(locked(journal))
         except OSError as error:
             raise kind(
-                f"{told}; its samples are not in {journal} any more ({error.strerror}); where that"
+                f"{text}; its samples are not in {journal} any more ({error.strerror}); where that"
                 " was moved to, `exoid recover` makes a recording of it"
             ) from error
-        return _recorded(output, lock, kind, told, supervisor.fault)
+        return _recorded(output, lock, kind, text, supervisor.fault)
 
 
 def _recorded(
-    output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None
+    output: Path, lock: Lock, kind: type[ExoidError], text: str, fault: BaseException | None
 ) -> Outcome:
     """Write the recording and remove the journal; raise what was ``told`` where the run was stopped
     early."""
@@ -296,17 +296,17 @@ def _recorded(
             write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
         raise kind(
-            f"{told}; its samples are in {path}, but could not be written as a recording: {error};"
+            f"{text}; its samples are in {path}, but could not be written as a recording: {error};"
             f" once that is mended, `exoid recover {path}` makes one"
         ) from error
     if account.damaged:
-        left = (
+        state_of_drives = (
             f"{samples} samples are in {place}, but"
             if samples
             else "no sample of it can be read, since"
         )
         raise kind(
-            f"{told}; {left} the disk did not give back all that was written; check the disk,"
+            f"{text}; {state_of_drives} the disk did not give back all that was written; check the disk,"
             f" {path} is kept"
         ) from fault
     lock.remove()
@@ -316,7 +316,7 @@ def _recorded(
             if samples
             else " before the recording began"
         )
-        raise kind(told + rest) from fault
+        raise kind(text + rest) from fault
     return Outcome(
         place, samples, account.missed, account.found.get("latency", {}).get("left_out", 0)
     )

@@ -88,28 +88,28 @@ class PhaseLock:
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
             asked = time.perf_counter()
-            found, now = await self._counter(), time.perf_counter()
-            if now > self._fresh_until(found, asked) and now - began < self._patience_s:
+            count, now = await self._counter(), time.perf_counter()
+            if now > self._fresh_until(count, asked) and now - began < self._patience_s:
                 continue  # by now another sample may be latched
-            if found != before:
-                self._due += (found - looked - LEAN) * self._period
-                self._found = found
-                return found
+            if count != before:
+                self._due += (count - looked - LEAN) * self._period
+                self._found = count
+                return count
             if now - began > self._patience_s:
                 return last
-            self._early, looked = (asked, found), found
+            self._early, looked = (asked, count), count
             self._due = now + STEP_BACK * self._period
 
-    def _fresh_until(self, found: int, asked: float) -> float:
+    def _fresh_until(self, count: int, asked: float) -> float:
         """Return until when a sample that a look found is surely the newest, host's clock, s;
         ``asked`` is the look's.
 
         Samples follow one another in equal periods since the last look that came too early.
         """
         soon = asked + SLOW * self._period
-        since, then = self._early or (asked, found)
+        since, then = self._early or (asked, count)
         # Looks come too early every so often; where none has for long, the clocks are further apart
         # than they lean.
-        if not 0 <= found - then <= 0.5 / LEAN:
+        if not 0 <= count - then <= 0.5 / LEAN:
             return soon
-        return max(soon, since + (found - then) * (1.0 - LEAN) * self._period)
+        return max(soon, since + (count - then) * (1.0 - LEAN) * self._period)

@@ -108,11 +108,11 @@ def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) ->
 
 def check_start(rig: RigSettings, angle: NDArray) -> str | None:
     """Return why the leg must not be moved from where it stands, (J,) rad; None if it may."""
-    for drive, found in zip(rig.drive, angle, strict=True):
+    for drive, value in zip(rig.drive, angle, strict=True):
         low, high = drive.angle_rad
-        if not low <= found <= high:
+        if not low <= value <= high:
             return (
-                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to"
+                f"the {drive.joint} stands at {value:.3f} rad, outside its limits {low:g} to"
                 f" {high:g} rad; move the leg by hand, or check the encoder's zero"
             )
     return None
@@ -140,7 +140,9 @@ def _ramp(
         reference = rest + (share if before else share[::-1]) * (motion - rest)
         path = np.vstack([rest, reference] if before else [reference, rest])
         speed = np.abs(np.diff(path, axis=0)).max(axis=0) * rate
-        if all(found <= drive.speed_rad_s for found, drive in zip(speed, rig.drive, strict=True)):
+        if all(
+            fastest <= drive.speed_rad_s for fastest, drive in zip(speed, rig.drive, strict=True)
+        ):
             return reference
         ramp_s *= RAMP_GROWTH
     slowest = rig.drive[int(np.argmax(speed / [drive.speed_rad_s for drive in rig.drive]))]

@@ -60,7 +60,10 @@ def design(
     """Design an excitation; equal settings give an equal one, unless ``seconds`` cut the search
     short."""
     geometry = geometry or Geometry()
-    found = search(settings, geometry, report)
+    result = search(settings, geometry, report)
     return Design(
-        found.trajectory, quality(found.trajectory, settings, geometry), settings, found.stopped_by
+        result.trajectory,
+        quality(result.trajectory, settings, geometry),
+        settings,
+        result.stopped_by,
     )

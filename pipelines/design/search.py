@@ -160,10 +160,10 @@ def _let_fly(
     looks = -(-settings.iterations // ITERATIONS_PER_LOOK)
     for look in range(looks):
         fly(swarm, problem, settings.topology == "ring", ITERATIONS_PER_LOOK, rng)
-        found = swarm.best_cost.min()
-        if not found >= best - LEAST_GAIN * abs(best):
-            best, last_gain = found, look
-        report((look + 1) / looks, found)
+        lowest = swarm.best_cost.min()
+        if not lowest >= best - LEAST_GAIN * abs(best):
+            best, last_gain = lowest, look
+        report((look + 1) / looks, lowest)
         if time.monotonic() > deadline:
             return "seconds"
         if look - last_gain >= PATIENCE:

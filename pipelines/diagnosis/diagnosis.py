@@ -102,9 +102,9 @@ class Diagnosis:
             self.before.errors.rms**2,
             self.after.errors.rms**2,
         )
-        left = np.maximum(after - floor, 0.0)
+        remaining = np.maximum(after - floor, 0.0)
         was = self.before.above(self.floor)
-        shares = left / np.where(was, before - floor, 1.0)
+        shares = remaining / np.where(was, before - floor, 1.0)
         return [float(share) if there else None for share, there in zip(shares, was, strict=True)]
 
     @property
@@ -169,10 +169,10 @@ class Diagnosis:
     @property
     def collinear(self) -> list[str]:
         """Which parameters of the extended model the training runs hardly tell apart, in words."""
-        made = self.after.fit
-        shapes = [(made.causes[k].effect, i) for k, i, _ in self.uncertainty.shapes]
+        fit = self.after.fit
+        shapes = [(fit.causes[k].effect, i) for k, i, _ in self.uncertainty.shapes]
         own = (Column(effect, effect.shape[i], None) for effect, i in shapes)
-        columns = [*made.layout.columns, *own]
+        columns = [*fit.layout.columns, *own]
         # Nobody asks for the zeros of the cuffs.
         zeros = [isinstance(column.effect, ForceSensorZero) for column in columns]
         names = [c.name for c, zero in zip(columns, zeros, strict=True) if not zero]

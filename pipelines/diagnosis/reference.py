@@ -55,9 +55,11 @@ def meanings() -> dict[str, str]:
     tree = ast.parse(inspect.getsource(criteria))
     (body,) = (n.body for n in tree.body if isinstance(n, ast.ClassDef) and n.name == "Criteria")
     return {
-        statement.target.id: told
-        for statement, told in _documented(body)
-        if told and isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)
+        statement.target.id: meaning
+        for statement, meaning in _documented(body)
+        if meaning
+        and isinstance(statement, ast.AnnAssign)
+        and isinstance(statement.target, ast.Name)
     }
 
 
@@ -112,9 +114,9 @@ def _is_number(value: Any) -> bool:
 
 def reference() -> str:
     """Return the page as Markdown."""
-    told = meanings()
+    entries = meanings()
     rows = [
-        [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), told[field.name]]
+        [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), entries[field.name]]
         for field in fields(Criteria)
     ]
     return "\n".join(
@@ -155,8 +157,10 @@ def _measured() -> list[str]:
 
 def keep(title: str, measured: dict[str, Any]) -> None:
     """Write what was measured with the values as a section: ``about``, ``columns`` and ``rows``."""
-    told = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
-    MEASURED.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    measurements = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
+    MEASURED.write_text(
+        json.dumps(measurements, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -62,24 +62,25 @@ def closed_loop(model: Model, motion: Motion) -> Motion:
 
 def _set_points(motion: Motion) -> NDArray:
     """Return the commanded angles, straight lines between those that were told, (n, J)."""
-    told = np.full_like(motion.q, np.nan) if motion.reference is None else motion.reference
-    for joint, column in zip(motion.joints, told.T, strict=True):
+    reference = np.full_like(motion.q, np.nan) if motion.reference is None else motion.reference
+    for joint, column in zip(motion.joints, reference.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(
                 f"{motion.file or 'the motion'}: has no set-points of {the(joint)}, which a"
                 " simulation of its closed loop follows; record them with the run, or choose a"
                 " --method that needs none"
             )
-    known = (np.isfinite(column) for column in told.T)
+    known = (np.isfinite(column) for column in reference.T)
     lines = [
-        np.interp(motion.time, motion.time[k], c[k]) for k, c in zip(known, told.T, strict=True)
+        np.interp(motion.time, motion.time[k], c[k])
+        for k, c in zip(known, reference.T, strict=True)
     ]
     return np.ascontiguousarray(np.column_stack(lines))
 
 
 def _drives(motion: Motion, a: Assembly) -> Drives:
-    told: Mapping[str, Any] = motion.metadata.get("controller") or {}
-    each = [told.get(joint) or {} for joint in motion.joints]
+    controller: Mapping[str, Any] = motion.metadata.get("controller") or {}
+    each = [controller.get(joint) or {} for joint in motion.joints]
     if all(_gain(c, "kp") for c in each):
         kp, kd, limit, rate = (
             np.array([_gain(c, key) for c in each]) for key in ("kp", "kd", "limit", "rate_hz")

@@ -125,12 +125,12 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
 
 def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
     if reference.joints != plant.joints:
-        told, expected = (
+        given, expected = (
             ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
             for joints in (reference.joints, plant.joints)
         )
         raise InputError(
-            f"the reference moves {told}, expected the model's joints, {expected}; give one for"
+            f"the reference moves {given}, expected the model's joints, {expected}; give one for"
             " these"
         )
 

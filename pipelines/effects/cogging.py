@@ -90,8 +90,8 @@ class Cogging(Effect):
     def told_by(self, names: Collection[str]) -> "Cogging":
         """Return the effect with as many lines as the names of values tell of."""
         numbers = range(2, MOST_LINES + 1)
-        told = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]
-        return replace(self, lines=max(told, default=1))
+        present = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]
+        return replace(self, lines=max(present, default=1))
 
     def physical(self, values: NDArray) -> NDArray:
         """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line."""

@@ -302,8 +302,8 @@ class Effect(ABC):
         if self.joint:
             for role in ("linear", "shape", "reported"):
                 declared = getattr(self, role)
-                made = declared and tuple(p.at(self.on, self.joint) for p in declared)
-                object.__setattr__(self, role, made)
+                scaled = declared and tuple(p.at(self.on, self.joint) for p in declared)
+                object.__setattr__(self, role, scaled)
         if self.name in THE_LEG.mechanism.reactions:
             object.__setattr__(self, "reaction", self.on.mechanism.reactions.get(self.name))
 

@@ -28,7 +28,7 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
         Where one cannot be loaded, is not an effect, or takes a name that is already there.
     """
     taken = {effect.name: effect.__module__ for effect in known}
-    found = []
+    effects = []
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         effect = _loaded(entry)
         if effect.name in taken:
@@ -38,8 +38,8 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
                 "rename it",
             )
         taken[effect.name] = effect.__module__
-        found.append(effect)
-    return tuple(found)
+        effects.append(effect)
+    return tuple(effects)
 
 
 def _loaded(entry: EntryPoint) -> type[Effect]:

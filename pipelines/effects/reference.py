@@ -86,33 +86,33 @@ def laws_in_words(effect: type[Effect]) -> str:
 
 def page(effect: type[Effect]) -> str:
     """Return an effect's page as Markdown."""
-    told = facts(effect)
+    stated = facts(effect)
     rows = [_row(parameter) for parameter in effect().parameters]
     return "\n".join(
         [
-            f"# {told['title']}",
+            f"# {stated['title']}",
             "",
             (
-                f"`{told['effect']}`, side: {told['side']}, joints: {told['joints']}, runs:"
-                f" {', '.join(told['runs'])}"
+                f"`{stated['effect']}`, side: {stated['side']}, joints: {stated['joints']}, runs:"
+                f" {', '.join(stated['runs'])}"
             ),
             "",
-            told["meaning"],
+            stated["meaning"],
             "",
-            f"    {told['equation']}",
+            f"    {stated['equation']}",
             "",
             "| parameter | symbol | unit | meaning | on exoskeletons |",
             "|---|---|---|---|---|",
             *rows,
             "",
-            f"**Looks like:** {told['looks_like']}.",
+            f"**Looks like:** {stated['looks_like']}.",
             "",
-            *_paragraph("How the real one may differ", told["forms_differ"]),
-            f"**Family:** {told['family']}; **resembles** the laws: {laws_in_words(effect)}.",
+            *_paragraph("How the real one may differ", stated["forms_differ"]),
+            f"**Family:** {stated['family']}; **resembles** the laws: {laws_in_words(effect)}.",
             "",
-            f"**To confirm it on the rig:** {told['confirm']}.",
+            f"**To confirm it on the rig:** {stated['confirm']}.",
             "",
-            f"**Source:** {told['source']}.",
+            f"**Source:** {stated['source']}.",
             "",
         ]
     )

@@ -83,5 +83,7 @@ def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
     inertial = values[body]
     power = np.einsum("i,jik,k->j", inertial, fast, inertial)
     measured = (gram[:, p:-1, -1] - gram[:, p:-1, :p] @ values) @ inertial
-    left = torque - 2.0 * gram[:, :p, -1] @ values + np.einsum("i,jik,k->j", values, slow, values)
-    return bool(np.any((measured < REAL * power) & (power > LOUD**2 * left)))
+    residual = (
+        torque - 2.0 * gram[:, :p, -1] @ values + np.einsum("i,jik,k->j", values, slow, values)
+    )
+    return bool(np.any((measured < REAL * power) & (power > LOUD**2 * residual)))

@@ -70,9 +70,11 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     V, _, freedom = long_run_covariance(influences, len(difference))
     error = np.sqrt(np.diag(V))
     variance, directions = np.linalg.eigh(V / np.outer(error, error))
-    told = variance > FAINT
-    square = float(np.sum((directions.T[told] @ (difference / error)) ** 2 / variance[told]))
-    k = int(told.sum())
+    informed = variance > FAINT
+    square = float(
+        np.sum((directions.T[informed] @ (difference / error)) ** 2 / variance[informed])
+    )
+    k = int(informed.sum())
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
     return DurbinWuHausman(

@@ -54,25 +54,25 @@ class InstrumentalVariables(Estimator):
         values, weights = start.values, start.weights
         for iteration in range(1, ITERATIONS + 1):  # noqa: B007
             rows = _rows(problem, measured, nearest(problem, values, start.normal))
-            found = _solved(problem, rows, weights)
-            weights = _weights(problem, rows, found.values)
-            change = np.abs(found.values - values) / np.sqrt(
-                np.diag(found.sensitivity @ found.normal @ found.sensitivity.T)
+            solution = _solved(problem, rows, weights)
+            weights = _weights(problem, rows, solution.values)
+            change = np.abs(solution.values - values) / np.sqrt(
+                np.diag(solution.sensitivity @ solution.normal @ solution.sensitivity.T)
             )
-            values = found.values
+            values = solution.values
             if change.max() < SETTLED:
                 break
         # On the same rows by the same weights: they would differ by what one of them leaves out,
         # too.
         itself = [replace(r, instruments=r.measured.regressor) for r in rows]
-        test = durbin_wu_hausman(_solved(problem, itself, found.weights), found)
+        test = durbin_wu_hausman(_solved(problem, itself, solution.weights), solution)
         settled = bool(change.max() < SETTLED)
-        told = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
+        about = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
         remarks = (
             *distrust(settled, f"{ITERATIONS} iterations"),
-            _sentence(test, problem.names, found),
+            _sentence(test, problem.names, solution),
         )
-        return replace(found, told=told, remarks=remarks)
+        return replace(solution, told=about, remarks=remarks)
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
 def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
     """Tell of each parameter whether least squares is off by enough for anybody to mind, (k,)
     bool."""
-    found = estimated(fit)
-    reach = found.critical * np.sqrt(np.diag(found.covariance))
+    estimate = estimated(fit)
+    reach = estimate.critical * np.sqrt(np.diag(estimate.covariance))
     off = np.abs(test.difference)
     return np.asarray((off > SLIGHT * reach) & (off > SLIGHT_SHARE * np.abs(fit.values)))

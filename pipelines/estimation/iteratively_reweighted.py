@@ -160,13 +160,13 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         right += np.einsum("mj,mjp,mj->p", weights, r.regressor, r.torque, optimize=True)
         for j, size in enumerate(sizes):
             size.append(np.abs(residual[r.usable[:, j], j]))
-    left = [np.concatenate(size) for size in sizes]
+    residuals = [np.concatenate(size) for size in sizes]
     return Sums(
         normal,
         slope,
         right,
-        np.array([max(MAD * np.median(size), LEAST_NM) for size in left]),
-        np.array([np.mean(size > BISQUARE * s) for size, s in zip(left, scale, strict=True)]),
+        np.array([max(MAD * np.median(size), LEAST_NM) for size in residuals]),
+        np.array([np.mean(size > BISQUARE * s) for size, s in zip(residuals, scale, strict=True)]),
     )
 
 

@@ -63,10 +63,10 @@ class OutputError(Estimator):
             weights = _weights(_errors(problem, problem.completed(values)))
             values, more, settled = _searched(problem, values, size, weights)
             simulations += more
-        found = _fit(problem, values, size, weights)
-        told = found.told | {"simulations": simulations, "settled": settled}
+        fit = _fit(problem, values, size, weights)
+        about = fit.told | {"simulations": simulations, "settled": settled}
         return replace(
-            found, told=told, remarks=distrust(settled, f"{simulations} simulations of all runs")
+            fit, told=about, remarks=distrust(settled, f"{simulations} simulations of all runs")
         )
 
 
@@ -116,13 +116,15 @@ def _searched(
         # What runs away, or has a mass matrix that no machine has, is refused by the search: it
         # takes a shorter step.
         try:
-            found = np.concatenate(
+            residual = np.concatenate(
                 [(error * root).ravel() for error in _errors(problem, completed(step))]
             )
         except ZeroDivisionError:
             return np.full(outputs, np.nan)
         return (
-            found if np.all(np.abs(found) < RAN_AWAY * root.max()) else np.full_like(found, np.nan)
+            residual
+            if np.all(np.abs(residual) < RAN_AWAY * root.max())
+            else np.full_like(residual, np.nan)
         )
 
     def jacobian(step: NDArray) -> NDArray:
@@ -130,13 +132,13 @@ def _searched(
         k = len(problem.fitted)
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
-    found = least_squares(
+    solution = least_squares(
         residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None
     )
     return (
-        values + unit * found.x,
-        int(found.nfev + found.njev * (1 + len(unit))),
-        bool(found.success),
+        values + unit * solution.x,
+        int(solution.nfev + solution.njev * (1 + len(unit))),
+        bool(solution.success),
     )
 
 
@@ -155,7 +157,7 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> 
         for part, e in zip(slopes, errors, strict=True)
     ]
     rms = np.sqrt([np.mean(e**2, axis=(0, 1)) for e in errors]).tolist()
-    told = {"window_s": WINDOW_S, "angle_rms": rms}
+    about = {"window_s": WINDOW_S, "angle_rms": rms}
     return Fit(
         values,
         normal,
@@ -163,7 +165,7 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> 
         carry_of(problem, sensitivity, np.asarray(slope)),
         weights,
         _by_run(scores),
-        told,
+        about,
     )
 
 

@@ -64,8 +64,8 @@ class Training:
 
     def model_of(self, run: Run, values: NDArray) -> Model:
         """Return the model of one run with the columns' values, (p,)."""
-        found = (self.term_of(run, i, values) for i in range(len(self.model.terms)))
-        return Model(tuple(term for term in found if term is not None))
+        terms = (self.term_of(run, i, values) for i in range(len(self.model.terms)))
+        return Model(tuple(term for term in terms if term is not None))
 
     def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
         """Return a term as a run has it, with the columns' values, (p,); None where it never
@@ -91,8 +91,8 @@ class Training:
 
     def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
         """Return the same with the loads of other rigid bodies, (k,) each."""
-        made = replace(self, bodies=bodies)
-        return replace(made, runs=tuple(made.loaded(run) for run in self.runs))
+        training = replace(self, bodies=bodies)
+        return replace(training, runs=tuple(training.loaded(run) for run in self.runs))
 
     def regressions(self, run: Run) -> Iterator[Regression]:
         """Yield a run's regression on the p columns, piece by piece."""

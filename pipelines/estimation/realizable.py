@@ -55,8 +55,8 @@ class Realizable(Estimator):
             f" torque: {raised}. That is evidence of an effect that the model lacks: `exoid"
             " diagnose` looks for it"
         )
-        told = {**free.told, "constrained": True, "least_squares_values": free.values.tolist()}
-        return replace(free, values=values, told=told, remarks=(remark,))
+        about = {**free.told, "constrained": True, "least_squares_values": free.values.tolist()}
+        return replace(free, values=values, told=about, remarks=(remark,))
 
 
 def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:

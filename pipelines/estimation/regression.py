@@ -88,11 +88,11 @@ def mask_in_words(machine: Machine) -> str:
     """Say which samples are left out for being near a reversal."""
     speeds = reversal_speeds(machine)
     units = [joint.unit("velocity") for joint in machine.joints]
-    said = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
+    parts = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
     alike = (
-        said[:1]
-        if len(set(said)) == 1
-        else [f"{s} ({name})" for s, name in zip(said, machine.names, strict=True)]
+        parts[:1]
+        if len(set(parts)) == 1
+        else [f"{s} ({name})" for s, name in zip(parts, machine.names, strict=True)]
     )
     return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
 
@@ -128,8 +128,8 @@ def turns(motion: Motion) -> NDArray:
 def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Iterator[Regression]:
     """Yield a run as one linear regression, piece by piece; where there is a cut-off, only what is
     slower."""
-    felt = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
-    for piece in run.pieces(block_average(run).decimation + padding(run) + felt):
+    reach = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
+    for piece in run.pieces(block_average(run).decimation + padding(run) + reach):
         yield regress(piece, model, cutoff_hz)
 
 

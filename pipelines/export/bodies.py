@@ -128,10 +128,10 @@ def _in_series(
             " c, matlab or json, which need no bodies"
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
-    left, along = X1 - X2 - m2 * length**2, 0.0 if X4 is None else X4 - m2 * length
+    inertia, along = X1 - X2 - m2 * length**2, 0.0 if X4 is None else X4 - m2 * length
     of_thigh = np.hypot(along, across[0])
-    m1 = max(2.0 * of_thigh**2 / left, m2)
-    thigh = Body(hip, m1, left - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
+    m1 = max(2.0 * of_thigh**2 / inertia, m2)
+    thigh = Body(hip, m1, inertia - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
     shank = Body(
         knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, beyond=length, shift=shift[1]
     )

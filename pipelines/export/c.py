@@ -160,42 +160,42 @@ void {name}_torque_reading(double t, double tau[{joints}]) {{
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return header and source; their functions begin with the file's name."""
-    made, name = equations(exported), function_name(stem, ".c")
-    joints = len(made.joints)
-    of_memory = ", ".join(dict.fromkeys(made.memory_of))
+    model, name = equations(exported), function_name(stem, ".c")
+    joints = len(model.joints)
+    of_memory = ", ".join(dict.fromkeys(model.memory_of))
     places = {
-        "comment": comment([*exported.heading(C), "", *order_of(made)]),
+        "comment": comment([*exported.heading(C), "", *order_of(model)]),
         "name": name,
         "NAME": name.upper(),
         "GUARD": f"{name.upper()}_H",
         "joints": joints,
-        "room": max(1, made.memories),
+        "room": max(1, model.memories),
         "memory_comment": comment(
             [f"memory of {of_memory}" if of_memory else "no effect here has one; pass any number"]
         ),
         "constants": "\n".join(
-            _constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in made.used
+            _constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in model.used
         ),
-        "sensor_shift": _array(made.sensor_shift),
-        "link_shift": _array(made.link_shift),
-        "groups": "\n\n".join(_group(group, made.groups[group]) for group in GROUPS),
+        "sensor_shift": _array(model.sensor_shift),
+        "link_shift": _array(model.link_shift),
+        "groups": "\n\n".join(_group(group, model.groups[group]) for group in GROUPS),
         "rates": "".join(
             f"{line}\n"
-            for e in made.rates
+            for e in model.rates
             for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
         ),
         "readings": "".join(
             f"{line}\n"
-            for e in made.readings
+            for e in model.readings
             for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
         ),
     }
     return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
 
 
-def order_of(made: Equations) -> list[str]:
+def order_of(model: Equations) -> list[str]:
     """Say which joint stands where."""
-    return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints)]
+    return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
 
 
 def comment(lines: Iterable[str]) -> str:
@@ -212,9 +212,9 @@ def _array(values: Iterable[float]) -> str:
     return "{" + ", ".join(map(repr, values)) + "}"
 
 
-def _group(name: str, made: list[Equation]) -> str:
-    lines = [line for e in made for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
-    nothing = [] if made else ["    (void)at;", "    (void)tau;"]
+def _group(name: str, group: list[Equation]) -> str:
+    lines = [line for e in group for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
+    nothing = [] if group else ["    (void)at;", "    (void)tau;"]
     return "\n".join(
         [f"static void {name}(const struct instant *at, double *tau) {{", *nothing, *lines, "}"]
     )

@@ -155,7 +155,7 @@ def equations(exported: Exported) -> Equations:
         strict=True,
     )
     fixed = [Constant(name, float(value), unit, meaning) for name, value, unit, meaning in shape]
-    made = Equations(
+    model = Equations(
         exported.joints,
         (*fixed, *constants),
         {group: [] for group in GROUPS},
@@ -172,11 +172,11 @@ def equations(exported: Exported) -> Equations:
         count = len(term.effect.fitted)
         values = [constant(c.name, c.value) for c in constants[at : at + count]]
         at += count
-        _write(made, term, values, len(memory_of))
+        _write(model, term, values, len(memory_of))
         memory_of += [term.effect.label] * term.effect.states
     sensor = exported.shift(Side.SENSOR)
     return replace(
-        made,
+        model,
         memories=len(memory_of),
         memory_of=tuple(memory_of),
         sensor_shift=tuple(sensor.tolist()),
@@ -190,7 +190,7 @@ def _constant_name(effect: Effect, parameter: Parameter) -> str:
     )
 
 
-def _write(made: Equations, term: Term, values: list[Formula], first: int) -> None:
+def _write(model: Equations, term: Term, values: list[Formula], first: int) -> None:
     effect = term.effect
     on_drive = effect.side is Side.DRIVE
 
@@ -199,11 +199,11 @@ def _write(made: Equations, term: Term, values: list[Formula], first: int) -> No
         return Equation(effect.label, effect.equation, outcome, first_memory)
 
     if effect.reaction is not None:
-        made.groups[GROUPS[2 * on_drive + (not effect.inertial)]].append(equation(effect.reaction))
+        model.groups[GROUPS[2 * on_drive + (not effect.inertial)]].append(equation(effect.reaction))
     if effect.derivative is not None:
-        made.rates.append(equation(effect.derivative, first))
+        model.rates.append(equation(effect.derivative, first))
     if effect.torque_reading is not None:
-        made.readings.append(equation(effect.torque_reading))
+        model.readings.append(equation(effect.torque_reading))
 
 
 def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> list | Branch:

@@ -61,7 +61,7 @@ class Format:
     def holding(self, term: Term) -> Holding:
         """Return what becomes of a term, and that each run has its own where what is held is one
         run's."""
-        found, own = self.holds(term), [p.name for p in term.effect.parameters if p.per_run]
-        if found.degree is Degree.NOT or not own:
-            return found
-        return replace(found, how=f"{found.how}; {' and '.join(own)} of one run, each has its own")
+        held, own = self.holds(term), [p.name for p in term.effect.parameters if p.per_run]
+        if held.degree is Degree.NOT or not own:
+            return held
+        return replace(held, how=f"{held.how}; {' and '.join(own)} of one run, each has its own")

@@ -36,7 +36,7 @@ def looked_up(held: Held, shift: str, format_name: str) -> Callable[[Term], Hold
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:
             return exact(shift)
-        found = held.get(term.effect.name)
-        return found(term) if found else left_out(f"{format_name} has no element for it")
+        held_as = held.get(term.effect.name)
+        return held_as(term) if held_as else left_out(f"{format_name} has no element for it")
 
     return holding

@@ -40,7 +40,7 @@ def holding(term: Term) -> Holding:
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the document."""
     table = exported.table
-    said = {
+    document = {
         "contract": CONTRACT,
         "name": stem,
         "provenance": describe([table.path] if table.path else []),
@@ -66,7 +66,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         "effects": [_effect(term) for term in exported.terms],
         "not_in_this_run": [_effect(term) | {"why": why.how} for term, why in exported.absent],
     }
-    return {".json": json.dumps(said, ensure_ascii=False, indent=2, allow_nan=False) + "\n"}
+    return {".json": json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False) + "\n"}
 
 
 def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
@@ -76,15 +76,15 @@ def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
 def _effect(term: Term) -> dict[str, Any]:
     """Say of a term what it is, and its values."""
     effect = term.effect
-    told = facts(type(effect))
+    stated = facts(type(effect))
     values = effect.physical(term.values)
     return {
         "effect": effect.name,
         "joint": effect.joint,
-        "side": told["side"],
-        "equation": told["equation"],
-        "meaning": told["meaning"],
-        "source": told["source"],
+        "side": stated["side"],
+        "equation": stated["equation"],
+        "meaning": stated["meaning"],
+        "source": stated["source"],
         "values": [
             {
                 "name": p.name,

@@ -113,15 +113,15 @@ def function_name(stem: str, suffix: str, keywords: Iterable[str] = ()) -> str:
 
 def unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """Return the names, a number behind each that was there before; none is empty."""
-    known, found = set(taken), []
+    known, names_made = set(taken), []
     for name in names:
         base, number, chosen = name or "unnamed", 1, name or "unnamed"
         while chosen in known:
             number += 1
             chosen = f"{base}_{number}"
         known.add(chosen)
-        found.append(chosen)
-    return found
+        names_made.append(chosen)
+    return names_made
 
 
 def one_line(text: str) -> str:

@@ -118,23 +118,23 @@ end
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the function file."""
-    made = equations(exported)
-    joints = len(made.joints)
+    model = equations(exported)
+    joints = len(model.joints)
     order = [
-        f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints, start=1)
+        f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints, start=1)
     ]
     return {
         ".m": FILE.format(
             name=function_name(stem, ".m", KEYWORDS),
             comment=comment([*exported.heading(MATLAB), "", *order]),
             joints=joints,
-            memories=made.memories,
+            memories=model.memories,
             memory_of=one_line(
-                ", ".join(dict.fromkeys(made.memory_of)) or "no effect here has one"
+                ", ".join(dict.fromkeys(model.memory_of)) or "no effect here has one"
             ),
-            sensor_shift=_column(made.sensor_shift),
-            link_shift=_column(made.link_shift),
-            functions="\n\n".join(_functions(made)),
+            sensor_shift=_column(model.sensor_shift),
+            link_shift=_column(model.link_shift),
+            functions="\n\n".join(_functions(model)),
         )
     }
 
@@ -148,28 +148,32 @@ def _column(values: Iterable[float]) -> str:
     return "[" + "; ".join(map(repr, values)) + "]"
 
 
-def _functions(made: Equations) -> Iterable[str]:
+def _functions(model: Equations) -> Iterable[str]:
     for group in GROUPS:
         lines = [
-            line for e in made.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))
+            line for e in model.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))
         ]
-        yield _function(f"tau = {group}(at, tau)", lines, made)
+        yield _function(f"tau = {group}(at, tau)", lines, model)
     rates = [
-        line for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
+        line
+        for e in model.rates
+        for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
     ]
-    yield _function("rate = memory_rate(at)", [f"rate = zeros({made.memories}, 1);", *rates], made)
+    yield _function(
+        "rate = memory_rate(at)", [f"rate = zeros({model.memories}, 1);", *rates], model
+    )
     readings = [
-        line for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
+        line for e in model.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
     ]
-    yield _function("tau = torque_reading(at, tau)", readings, made)
+    yield _function("tau = torque_reading(at, tau)", readings, model)
 
 
-def _function(head: str, lines: list[str], made: Equations) -> str:
+def _function(head: str, lines: list[str], model: Equations) -> str:
     """Return a function that knows the constants it uses."""
     known = set(re.findall(r"\w+", "\n".join(lines)))
     used = [
         f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}"
-        for c in made.used
+        for c in model.used
         if c.name in known
     ]
     return "\n".join([f"function {head}", *used, *lines, "end"])

@@ -84,27 +84,27 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
-    made = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
+    element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
     hinge = {
         "type": "hinge" if body.joint.kind == "revolute" else "slide",
         "axis": numbers(*body.axis),
     }
     soft = _twist(body.joint, exported)
     at_link = {} if soft else _spring(body.joint, body.shift, exported)
-    ET.SubElement(made, "joint", {"name": name} | hinge | _joint(body, exported) | at_link)
+    ET.SubElement(element, "joint", {"name": name} | hinge | _joint(body, exported) | at_link)
     if soft:
-        ET.SubElement(made, "joint", {"name": twist} | hinge | soft)
+        ET.SubElement(element, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
     # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a
     # slide's centre is, its motion does not ask.
     aside = OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
     centre = numbers(*(body.centre + aside))
-    ET.SubElement(made, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
+    ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
     ET.SubElement(
-        made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0"
+        element, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0"
     )
-    return made
+    return element
 
 
 def _frame(body: Body) -> dict[str, str]:
@@ -184,10 +184,10 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     # The channel says g T where the drive delivers T, or g T + o; asked for u, the drive delivers
     # what makes it say u.
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
-    at_nought = -(offset.values[0] if offset else 0.0)
+    at_zero = -(offset.values[0] if offset else 0.0)
     if gain and offset and _comes_before(exported, gain, offset):
-        at_nought *= per_unit
-    bias = numbers(at_nought, 0.0, 0.0)
+        at_zero *= per_unit
+    bias = numbers(at_zero, 0.0, 0.0)
     ET.SubElement(
         actuators,
         "general",

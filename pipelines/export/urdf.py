@@ -39,21 +39,21 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     links = unique([f"{name}_link" for name in joints], ["base", *joints])
     ET.SubElement(root, "link", name="base")
     parent = "base"
-    made = bodies(exported)
-    for name, link, body in zip(joints, links, made, strict=True):
+    bodies_made = bodies(exported)
+    for name, link, body in zip(joints, links, bodies_made, strict=True):
         _link(root, link, body)
         _joint(root, name, parent, link, body, exported)
         parent = link
     # Of a lift, whose weight a counterweight carries in part, that part of gravity.
-    gravity = number(exported.geometry.gravity_m_s2 * (1.0 - made[0].carried))
-    said = [
+    gravity = number(exported.geometry.gravity_m_s2 * (1.0 - bodies_made[0].carried))
+    comments = [
         (
             "Masses are nominal where X does not determine them: what joints feel is kept. Limits"
             " are not the machine's."
         ),
         f"Gravity is the reader's to set: {gravity} m/s² along -z.",
     ]
-    return {".urdf": document(root, [*exported.heading(URDF), "", *said])}
+    return {".urdf": document(root, [*exported.heading(URDF), "", *comments])}
 
 
 def _link(root: ET.Element, name: str, body: Body) -> None:

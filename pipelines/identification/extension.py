@@ -116,9 +116,9 @@ def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
 def _shapeless(effect: type[Effect]) -> bool:
     """Tell whether amplitudes are all that is to be known of an effect, and are the same in every
     run."""
-    told = all(p.default is not None for p in effect.shape)
+    has_defaults = all(p.default is not None for p in effect.shape)
     alike = not any(p.per_run for p in (*effect.linear, *effect.shape))
-    return effect.name not in BASELINE and bool(effect.linear) and told and alike
+    return effect.name not in BASELINE and bool(effect.linear) and has_defaults and alike
 
 
 def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Extension:
@@ -141,12 +141,12 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     _refuse_another_machine(table, runs[0])
     kinds = {run.run for run in runs if run.purpose == "train"}
     with about(table.path):
-        beside = terms_beside_bodies(table.frame, runs[0].machine)
-    told = [one for one in beside if one[0].effect.name not in BASELINE]
-    acting = [one for one in told if any(one[0].effect.acts(kind) for kind in kinds)]
+        others = terms_beside_bodies(table.frame, runs[0].machine)
+    causes = [one for one in others if one[0].effect.name not in BASELINE]
+    acting = [one for one in causes if any(one[0].effect.acts(kind) for kind in kinds)]
     remarks = [
         f"{term.effect.label} is left out: it acts in none of these runs to train on"
-        for term, _ in told
+        for term, _ in causes
         if all(term is not other for other, _ in acting)
     ]
     terms = tuple(term for term, _ in acting)
@@ -200,21 +200,23 @@ def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: st
     own = [term for term in terms if term.effect.per_run]
     guesses = [guess(term, table, sha256, path) for term in own]
     learnt = [term.effect.label for term, guessed in zip(own, guesses, strict=True) if not guessed]
-    said = [guessed for guessed in guesses if guessed]
+    sentences = [guessed for guessed in guesses if guessed]
     if learnt and run.purpose == "validate":
-        said.append(
+        sentences.append(
             f"{run.file}: what it has for itself of {' and '.join(learnt)} was learnt from this"
             " run, so its error is not quite that of a run no fit has seen; the verdict's is"
         )
-    return said
+    return sentences
 
 
 def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDArray:
     """Return the covariance of the shapes of some terms, (s, s), from that of the rows that tell of
     each."""
-    told = table.metadata.get("covariance")
+    stated = table.metadata.get("covariance")
     error = table.frame["std_error"].to_numpy(float)
-    covariance = np.nan_to_num(np.diag(error**2) if told is None else np.array(told, dtype=float))
+    covariance = np.nan_to_num(
+        np.diag(error**2) if stated is None else np.array(stated, dtype=float)
+    )
     maps = [np.zeros((0, len(covariance)))]
     for term, rows in terms:
         effect, place = term.effect, dict(zip(rows["name"], rows.index, strict=True))

@@ -90,7 +90,7 @@ def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
         height_ratios=[3, 1.3] * len(joints),
     )
     for j, joint in enumerate(joints):
-        torque, left = axes[2 * j], axes[2 * j + 1]
+        torque, residual = axes[2 * j], axes[2 * j + 1]
         torque.plot(
             run["time_s"], run[joint.column("torque")], color=MEASURED, lw=2.2, label="measured"
         )
@@ -103,8 +103,8 @@ def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
         )
         torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
         torque.set_title(f"{joint.name}: {_error(drawn, joint)}", loc="left", fontsize=9)
-        _residual_over(left, run["time_s"], run, joint)
-        left.set_ylabel(f"left, {joint.unit('torque')}")
+        _residual_over(residual, run["time_s"], run, joint)
+        residual.set_ylabel(f"left, {joint.unit('torque')}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
     axes[-1].set_xlabel("time, s")
     figure.suptitle(f"{title}: torque no fit has seen", x=0.02, ha="left", fontweight="bold")

@@ -96,14 +96,14 @@ class Identified:
     @property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """What each run has for itself, by the effect's label, as ``parameters/1`` tells it."""
-        told: dict[str, list[dict[str, Any]]] = {}
+        by_label: dict[str, list[dict[str, Any]]] = {}
         for run in self.runs if self.extension.recordings else ():
             for i, effect in enumerate(term.effect for term in self.training.model):
                 own = [(place, p.name) for place, p in enumerate(effect.parameters) if p.per_run]
                 if own and effect.acts(run.run):
                     term = self.training.term_of(run, i, self.values)
                     values = None if term is None else effect.physical(term.values)
-                    told.setdefault(effect.label, []).append(
+                    by_label.setdefault(effect.label, []).append(
                         {
                             "name": run.file,
                             "sha256": self.extension.recordings[run.file],
@@ -113,7 +113,7 @@ class Identified:
                             },
                         }
                     )
-        return told
+        return by_label
 
 
 def identify(
@@ -156,10 +156,12 @@ def identify(
         for kind, one in _in_steps(training, estimator).items()
     }
     values = _values(steps)
-    told = list(rows(training, values))
-    covariance = _covariance(told, steps, extension, training)
+    table_rows = list(rows(training, values))
+    covariance = _covariance(table_rows, steps, extension, training)
     error = np.sqrt(np.diag(covariance))
-    table = table_of(told, np.where(error > 0.0, error, np.nan), _critical(told, steps, extension))
+    table = table_of(
+        table_rows, np.where(error > 0.0, error, np.nan), _critical(table_rows, steps, extension)
+    )
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
@@ -235,8 +237,8 @@ def _under_its_own_loads(
         training = training.with_bodies(
             {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
         )
-        found = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
-        step = np.concatenate([found[kind] for kind in kinds]) - at
+        fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
+        step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - at
         if np.all(np.abs(step) < RESTS * np.abs(at)):
             return training, True
         growth = (
@@ -253,8 +255,8 @@ def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
     """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,)
     each."""
     layout = training.layout
-    found = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
-    return found | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
+    bodies = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
+    return bodies | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
 
 
 def _found(training: Training, values: NDArray, run: Run) -> Model | None:
@@ -314,13 +316,13 @@ def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]
     """
     error = np.sqrt(np.diag(covariance))
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
-    told, others = [], []
+    own, others = [], []
     for (i, k), e in zip(shapes, error, strict=True):
         having = [training.runs[run].file for run in training.layout.terms[i].runs]
         apart = training.model.terms[i].effect.shape[k].per_run
-        told.append((i, k, e, having[:1] if apart else having))
+        own.append((i, k, e, having[:1] if apart else having))
         others += [(i, k, e, [file]) for file in having[1:]] if apart else []
-    answers = [_answer(training, *moved) for moved in (*told, *others)]
+    answers = [_answer(training, *moved) for moved in (*own, *others)]
     every = block_diag(covariance, np.diag([e**2 for _, _, e, _ in others]))
     return np.reshape(answers, (len(answers), training.layout.size)).T, every
 
@@ -342,7 +344,7 @@ def _answer(
 
 
 def _covariance(
-    told: Sequence[Row],
+    rows: Sequence[Row],
     steps: Mapping[str, Step[Estimate]],
     extension: Extension,
     training: Training,
@@ -364,21 +366,21 @@ def _covariance(
     through = np.vstack([to_shapes, np.eye(h)])
     covariance = through @ of_shapes @ through.T
     covariance[:p, :p] += of_linear
-    size = len(told[0].slope)
-    slopes = np.array([row.slope for row in told])
+    size = len(rows[0].slope)
+    slopes = np.array([row.slope for row in rows])
     return slopes @ covariance[:size, :size] @ slopes.T
 
 
 def _critical(
-    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension
+    rows: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension
 ) -> NDArray:
     """Return the half-width of each row's interval in standard errors.
 
     What is fitted with a human is no surer than the less sure of both steps, what is held as sure
     as it was found.
     """
-    slopes = np.array([row.slope for row in told])
-    critical, least = np.full(len(told), extension.critical), 0.0
+    slopes = np.array([row.slope for row in rows])
+    critical, least = np.full(len(rows), extension.critical), 0.0
     for step in steps.values():
         least = max(least, step.fit.critical)
         critical[slopes[:, step.problem.fitted].any(axis=1)] = least

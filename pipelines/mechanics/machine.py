@@ -26,10 +26,13 @@ def _collected() -> tuple[Mechanism, ...]:
     """
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
-    found = dict.fromkeys(
-        made for module in modules for made in vars(module).values() if isinstance(made, Mechanism)
+    mechanisms_of = dict.fromkeys(
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, Mechanism)
     )
-    for one, other in combinations(found, 2):
+    for one, other in combinations(mechanisms_of, 2):
         gravity = (one.has_gravity, other.has_gravity)
         if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
             raise InputError(
@@ -38,7 +41,7 @@ def _collected() -> tuple[Mechanism, ...]:
                 " recording could say of which it is; remove one of their files from"
                 " pipelines/mechanics/mechanisms, or let has_gravity tell them apart"
             )
-    return tuple(found)
+    return tuple(mechanisms_of)
 
 
 MECHANISMS = _collected()
@@ -90,8 +93,8 @@ class Machine:
     def told(self, geometry: Geometry) -> dict[str, float]:
         """Return what a file says of the machine's geometry: no length where none is in its
         equations."""
-        said = geometry.metadata()
-        return said if self.mechanism.has_length else {"gravity_m_s2": said["gravity_m_s2"]}
+        stated = geometry.metadata()
+        return stated if self.mechanism.has_length else {"gravity_m_s2": stated["gravity_m_s2"]}
 
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is

@@ -129,11 +129,11 @@ class Motion:
         """
         if self.forces is None or np.isfinite(self.forces).all():
             return self.forces
-        made, longest = self.forces.copy(), max(round(MOST_UNREAD_S * self.sample_rate_hz), 1)
+        forces, longest = self.forces.copy(), max(round(MOST_UNREAD_S * self.sample_rate_hz), 1)
         for stretch in self.segments():
             for cuff in range(len(CUFFS)):
-                made[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
-        return made
+                forces[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
+        return forces
 
     @cached_property
     def motor_temperature(self) -> NDArray:
@@ -187,10 +187,10 @@ class Motion:
         """
         if self.limb_load is not None:
             return self._smoothed(self.limb_load)
-        felt = self.cuff_torque(self.q)
-        if felt is None:
+        torque = self.cuff_torque(self.q)
+        if torque is None:
             return self.transmitted
-        return self._smoothed(np.where(np.isfinite(felt), felt, self.transmitted[0]))
+        return self._smoothed(np.where(np.isfinite(torque), torque, self.transmitted[0]))
 
     @cached_property
     def link_swing(self) -> Load | None:
@@ -237,19 +237,21 @@ class Motion:
         The measured torques would not do: their noise would stand on both sides of a regression.
         """
         of = self.load_columns.torque_of
-        made = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
+        motion = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
         # The motion is the same.
-        made.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
-        return made
+        motion.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
+        return motion
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
         """Return the same run with other kinematics, (n, J) each, as a corrected measurement
         has."""
-        made = replace(self, q=q, dq=dq, ddq=ddq)
+        motion = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
         kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
-        made.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
-        return made
+        motion.__dict__.update(
+            {name: self.__dict__[name] for name in kept if name in self.__dict__}
+        )
+        return motion
 
 
 class Piece(NamedTuple):

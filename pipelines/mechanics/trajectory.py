@@ -140,12 +140,12 @@ def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
             f" {trajectory.theta0.size} mean angles, expected one for each of the"
             f" {len(table.joints)} joints"
         )
-    told = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
-    found = table.stacked("angle")
-    row, joint = np.unravel_index(np.argmax(np.abs(found - told)), found.shape)
-    if abs(found[row, joint] - told[row, joint]) > ROUNDING_RAD:
+    stated = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
+    angles = table.stacked("angle")
+    row, joint = np.unravel_index(np.argmax(np.abs(angles - stated)), angles.shape)
+    if abs(angles[row, joint] - stated[row, joint]) > ROUNDING_RAD:
         raise ContractError(
             f"{table.path}: column {table.joints[joint].column('angle')}, row {row}: found"
-            f" {found[row, joint]:.6g}, but the metadata's coefficients give"
-            f" {told[row, joint]:.6g}; drop a and b, or compute the rows from them"
+            f" {angles[row, joint]:.6g}, but the metadata's coefficients give"
+            f" {stated[row, joint]:.6g}; drop a and b, or compute the rows from them"
         )

@@ -49,14 +49,14 @@ def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Ter
     InputError
         Where it tells of effects or joints that there are not, or not of all their values.
     """
-    beside = frame[frame["effect"] != RigidBody.name]
-    if (twice := beside[["effect", "joint", "run", "name"]].duplicated()).any():
-        row = beside[twice].iloc[0]
+    rest = frame[frame["effect"] != RigidBody.name]
+    if (twice := rest[["effect", "joint", "run", "name"]].duplicated()).any():
+        row = rest[twice].iloc[0]
         raise InputError(
             f"the parameters table: row {row.name} tells {row['name']} of {row['effect']} again,"
             " expected every value once; delete one of both rows"
         )
-    others = beside.groupby(["effect", "joint", "run"], sort=False, dropna=False)
+    others = rest.groupby(["effect", "joint", "run"], sort=False, dropna=False)
     return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
 
 

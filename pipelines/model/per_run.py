@@ -21,19 +21,19 @@ def with_own_values(
     as another's.
     """
     this = recording_behind(recording) if recording else None
-    found = [(own_term(term, table, this), guess(term, table, this, recording)) for term in model]
-    return Model(tuple(term for term, _ in found if term)), tuple(
-        sentence for _, sentence in found if sentence
+    terms = [(own_term(term, table, this), guess(term, table, this, recording)) for term in model]
+    return Model(tuple(term for term, _ in terms if term)), tuple(
+        sentence for _, sentence in terms if sentence
     )
 
 
 def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
     """Return a term as the recording of a hash has it; as it is where the table tells none, None if
     it never came."""
-    told = _told(term, table, sha256)
-    if told is None:
+    values = _told(term, table, sha256)
+    if values is None:
         return term
-    return None if None in told.values() else _with(term, told)
+    return None if None in values.values() else _with(term, values)
 
 
 def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) -> str | None:

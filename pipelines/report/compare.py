@@ -118,7 +118,7 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
     refuse_different_machines(pair, titles)
     models = list(_models(pair))
     refuse_different_units(models)
-    told: dict[str, Any] = {
+    context: dict[str, Any] = {
         "titles": titles,
         "machines": [machine(session, runs(session)) for session in pair],
         "verdicts": [session.verdict for session in pair],
@@ -136,11 +136,16 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
         "causes": _causes(pair),
         "errors": _errors(pair),
     }
-    told["headline"] = _what_changed(pair, told["beyond"], told["judged"])
-    text = render("compare.html", (), (), told, (*first.artifacts, *second.artifacts))
-    lines = tuple(row.words for row in told["beside_floor"])
+    context["headline"] = _what_changed(pair, context["beyond"], context["judged"])
+    text = render("compare.html", (), (), context, (*first.artifacts, *second.artifacts))
+    lines = tuple(row.words for row in context["beside_floor"])
     return Compared(
-        text, told["beyond"], told["judged"], told["headline"], lines, tuple(told["settings"])
+        text,
+        context["beyond"],
+        context["judged"],
+        context["headline"],
+        lines,
+        tuple(context["settings"]),
     )
 
 
@@ -154,8 +159,8 @@ def _what_changed(pair: tuple[Session, Session], beyond: int, judged: int) -> st
         else "nothing that both sessions have can be compared"
     )
     of_verdict = _verdict_changed(pair)
-    said = f"{of_verdict}; {of_parameters}" if of_verdict else of_parameters
-    return said[:1].upper() + said[1:]
+    sentence = f"{of_verdict}; {of_parameters}" if of_verdict else of_parameters
+    return sentence[:1].upper() + sentence[1:]
 
 
 def _verdict_changed(pair: tuple[Session, Session]) -> str:
@@ -189,11 +194,11 @@ class BesideFloor:
     @property
     def words(self) -> str:
         """Say it in a line."""
-        told = [
+        parts = [
             f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
             for v, f in zip(self.values, self.floors, strict=True)
         ]
-        return f"{self.joint}, {self.model}: {told[0]} → {told[1]}"
+        return f"{self.joint}, {self.model}: {parts[0]} → {parts[1]}"
 
 
 def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
@@ -220,8 +225,8 @@ def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
 def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
     """Refuse sessions whose machines differ in their joints' names or kinds, or in how these are
     put together."""
-    for what, told in (("", _joints_in_words), ("mechanism ", _mechanism)):
-        one, other = (told(session) for session in pair)
+    for what, description in (("", _joints_in_words), ("mechanism ", _mechanism)):
+        one, other = (description(session) for session in pair)
         if one and other and one != other:
             raise InputError(
                 f"{titles[0]} is of another machine than {titles[1]} ({what}{one}, and"
@@ -235,8 +240,8 @@ def _joints_in_words(session: Session) -> str:
 
 def _mechanism(session: Session) -> str | None:
     """Return the name of the mechanism that a session's first model says; None where none does."""
-    told = (one.metadata.get("mechanism") for one in session.of_kind("parameters"))
-    return next((name for name in told if isinstance(name, str)), None)
+    names = (one.metadata.get("mechanism") for one in session.of_kind("parameters"))
+    return next((name for name in names if isinstance(name, str)), None)
 
 
 def refuse_different_units(models: Iterable[ModelChanges]) -> None:

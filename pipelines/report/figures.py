@@ -22,11 +22,11 @@ Drawings = dict[str, Callable[[], Figure]]
 
 def figures(session: Session) -> Drawings:
     """Return what draws each figure of a session's page, by the name of its file."""
-    found: Drawings = {}
+    drawings: Drawings = {}
     if session.verdict:
-        found["error"] = partial(falls_figure, falls(session.verdict))
-        found["error-budget"] = partial(budget_figure, budget(session.verdict))
-    return found | {
+        drawings["error"] = partial(falls_figure, falls(session.verdict))
+        drawings["error-budget"] = partial(budget_figure, budget(session.verdict))
+    return drawings | {
         chart.key: partial(chart_figure, chart) for chart in charts(session, values=None).all
     }
 

@@ -38,7 +38,7 @@ def render(
     template: str,
     drawn: Iterable[Chart],
     moving: Iterable[Animation],
-    told: Mapping[str, Any],
+    context: Mapping[str, Any],
     artifacts: Iterable[Artifact],
 ) -> str:
     """Return a page as text; ``told`` is what its template shows, all of which is escaped."""
@@ -52,7 +52,7 @@ def render(
         _environment()
         .get_template(template)
         .render(
-            told,
+            context,
             style=Markup(style),
             style_hash=_digest(style),
             scripts=[Markup(script) for script in scripts],
@@ -103,9 +103,9 @@ def _digest(text: str) -> str:
 
 
 def _uplot_version(script: str) -> str:
-    found = re.search(r"uPlot \(v([\d.]+)\)", script)
-    assert found
-    return found[1]
+    match = re.search(r"uPlot \(v([\d.]+)\)", script)
+    assert match
+    return match[1]
 
 
 def _in_a_script(data: Any) -> str:

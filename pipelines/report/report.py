@@ -101,8 +101,8 @@ def charts(session: Session, values: int | None = VALUES) -> Charts:
     ]
     flat = [chart for group in groups for chart in group]
     thin = iter(flat if values is None else thinned_alike(flat, values))
-    measured, left, control = (tuple(next(thin) for _ in group) for group in groups)
-    return Charts(_hero(session, left), measured, left, control)
+    measured, residual, control = (tuple(next(thin) for _ in group) for group in groups)
+    return Charts(_hero(session, residual), measured, residual, control)
 
 
 def _hero(session: Session, residuals: Sequence[Chart]) -> Chart | None:
@@ -129,9 +129,9 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
 
 def _page(session: Session, title: str | None, output: Path | None, values: int) -> str:
     drawn, verdict, shown = charts(session, values), session.verdict, animations(session)
-    made, taken = models(session), recordings(session)
+    shown_models, taken = models(session), recordings(session)
     quantity = _quantity(session)
-    told = {
+    context = {
         "title": title or session.name,
         "machine": machine(session, taken),
         "status": status(verdict),
@@ -157,8 +157,8 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "candidates": _candidates(session),
         "most_candidates": MOST_CANDIDATES,
         "has_baseline": bool(session.baselines),
-        "models": made,
-        "parameters": side_by_side(made),
+        "models": shown_models,
+        "parameters": side_by_side(shown_models),
         "excitations": excitations(session),
         "recordings": taken,
         "control": _control(verdict) if verdict else None,
@@ -174,7 +174,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "origins": provenance.origins(session),
         "outside": provenance.outside(session),
     }
-    return render("report.html", drawn.all, shown, told, session.artifacts)
+    return render("report.html", drawn.all, shown, context, session.artifacts)
 
 
 def _quantity(session: Session) -> str:
@@ -208,9 +208,9 @@ def headline(session: Session) -> str:
     if verdict["causes"]:
         words = causes_in_words(verdict["causes"])
         return f"The simulation misses {words}"
-    found = verdict.get("findings")
-    if verdict["status"] == "unknown_cause" and found:
-        return f"The simulation misses {found[0]['words']}, and no listed cause explains it"
+    findings = verdict.get("findings")
+    if verdict["status"] == "unknown_cause" and findings:
+        return f"The simulation misses {findings[0]['words']}, and no listed cause explains it"
     return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
 
 
@@ -286,12 +286,12 @@ class JointResiduals:
 
 
 def _residuals(session: Session, drawn: Sequence[Chart]) -> list[JointResiduals]:
-    found = []
+    rows = []
     for joint in session.joints:
         own = tuple(chart for chart in drawn if chart.key.startswith(f"residual-{joint.name}-"))
         if own:
-            found.append(JointResiduals(joint.name, own, tuple(_predicted(session, joint))))
-    return found
+            rows.append(JointResiduals(joint.name, own, tuple(_predicted(session, joint))))
+    return rows
 
 
 def _predicted(session: Session, joint: Joint) -> list[Predicted]:
@@ -333,7 +333,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     named = next((row for row in rows if row["verdict"] == "named"), None)
     # What another set's zeros would be, one for all runs or each run's own, the table does not
     # tell.
-    told = dict.fromkeys(
+    reasons = dict.fromkeys(
         ("named", "indistinguishable"), told_in_words(session.verdict or {"causes": []})
     )
     return [
@@ -341,7 +341,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
             "rank": row["rank"],
             "is_more": (more := _beyond(row, named)) is not None,
             "words": [
-                told.get(row["verdict"], {}).get(label) or any_label_in_words(label)
+                reasons.get(row["verdict"], {}).get(label) or any_label_in_words(label)
                 for label in (row["causes"] if more is None else more)
             ],
             "probability": _likely(row["probability"]),
@@ -372,8 +372,8 @@ def _reason(reason: str, more: Sequence[str]) -> str:
     """Return why a set is not named, without its probability, which has a column, and whose reason
     it is."""
     first, _, others = reason.partition("; ")
-    told = others if first.startswith("its probability is ") else reason
-    return told.removeprefix(f"{' and '.join(sorted(more))} ")
+    sentence = others if first.startswith("its probability is ") else reason
+    return sentence.removeprefix(f"{' and '.join(sorted(more))} ")
 
 
 def _likely(probability: float) -> str:
@@ -400,24 +400,24 @@ def _taken(row: dict[Any, Any]) -> str:
 
 
 def _control(verdict: dict[str, Any]) -> dict[str, Any] | None:
-    told = verdict.get("control") or {}
+    benefit = verdict.get("control") or {}
     rows = [
         {
             "key": key,
             "words": words,
             "error": {
-                joint: 1e3 * value for joint, value in told[key]["tracking_rmse_rad"].items()
+                joint: 1e3 * value for joint, value in benefit[key]["tracking_rmse_rad"].items()
             },
-            "torque": told[key]["peak_torque_nm"],
+            "torque": benefit[key]["peak_torque_nm"],
         }
         for key, words in (("without", "rigid body and friction"), ("with", "with the causes"))
-        if told.get(key) and (key == "without" or verdict["causes"])
+        if benefit.get(key) and (key == "without" or verdict["causes"])
     ]
     if not rows:
         return None
     return {
-        "run": told["run"].replace("_", " "),
+        "run": benefit["run"].replace("_", " "),
         "joints": list(rows[0]["torque"]),
         "rows": rows,
-        "settled_s": (told.get("controller") or {}).get("settled_after_s"),
+        "settled_s": (benefit.get("controller") or {}).get("settled_after_s"),
     }

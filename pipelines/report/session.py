@@ -58,8 +58,8 @@ class Artifact:
     @property
     def method(self) -> dict[str, Any]:
         """How a model was found."""
-        told = self.metadata.get("method")
-        return told if isinstance(told, dict) else {}
+        stated = self.metadata.get("method")
+        return stated if isinstance(stated, dict) else {}
 
     def is_made_of(self, other: "Artifact") -> bool:
         """Tell whether the other file, byte for byte, is one of its inputs."""
@@ -120,11 +120,11 @@ class Session:
             "simulation",
             "verdict",
         )
-        told = sorted(
+        sets = sorted(
             (one for one in self.artifacts if one.kind in order),
             key=lambda one: order.index(one.kind),
         )
-        return joints_of(told[0].metadata) if told else ()
+        return joints_of(sets[0].metadata) if sets else ()
 
     @cached_property
     def verdict_file(self) -> Artifact | None:
@@ -136,20 +136,20 @@ class Session:
         InputError
             Where there are several, and none in ``diagnosed/``.
         """
-        found = self.of_kind("verdict")
+        files = self.of_kind("verdict")
         usual = [
             one
-            for one in found
+            for one in files
             if one.path.parent in [folder / "diagnosed" for folder in self.folders]
         ]
-        found = usual or found
-        if len(found) > 1:
-            names = ", ".join(self.shown(one.path) for one in found)
+        files = usual or files
+        if len(files) > 1:
+            names = ", ".join(self.shown(one.path) for one in files)
             raise InputError(
-                f"{self.folders[0]}: holds {len(found)} verdicts ({names}), expected one; name the"
+                f"{self.folders[0]}: holds {len(files)} verdicts ({names}), expected one; name the"
                 " folders of one diagnosis, or lay two sessions side by side with --compare"
             )
-        return found[0] if found else None
+        return files[0] if files else None
 
     @cached_property
     def verdict(self) -> dict[str, Any] | None:
@@ -184,14 +184,14 @@ class Session:
     def residuals(self) -> Table | None:
         """What is left before and after; of the identification alone where no diagnosis was
         made."""
-        found = self._beside_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
-        return self.table(found) if found else None
+        file = self._beside_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
+        return self.table(file) if file else None
 
     @cached_property
     def candidates(self) -> Table | None:
         """Every cause that was tried."""
-        found = self._beside_verdict("candidates")
-        return self.table(found) if found else None
+        file = self._beside_verdict("candidates")
+        return self.table(file) if file else None
 
     def table(self, artifact: Artifact) -> Table:
         """Return a file's checked table, read once."""
@@ -252,21 +252,21 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
             )
         for path in _files(folder):
             try:
-                found = _artifact(path)
+                artifact = _artifact(path)
             except ContractError as error:
                 unreadable[path] = str(error)
                 continue
-            if found:
-                artifacts.setdefault(path.resolve(), found)
+            if artifact:
+                artifacts.setdefault(path.resolve(), artifact)
     if config is None:
         config = next(
             (path for folder in folders if (path := folder / "exoid.toml").is_file()), None
         )
     if not artifacts:
-        told = f" ({next(iter(unreadable.values()))})" if unreadable else ""
+        reason = f" ({next(iter(unreadable.values()))})" if unreadable else ""
         where = ", ".join(map(str, folders))
         raise InputError(
-            f"{where}: no file of exoid's in it{told}, expected recordings, models or a verdict; "
+            f"{where}: no file of exoid's in it{reason}, expected recordings, models or a verdict; "
             "name the folder that `make` or `exoid diagnose` wrote to"
         )
     return Session(tuple(folders), tuple(artifacts.values()), unreadable, config)

@@ -40,9 +40,13 @@ class OwnClock:
         seen = _joined(self._seen)
         self._seen = [_last(seen, KEPT)]
         instants = (numbers + 0.5) / (self._rate * self._gain)
-        told = _between(seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0))
+        values = _between(
+            seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0)
+        )
         began = round(self._offset_s * self._rate)
-        return replace(told, sequence=began + numbers, time=self._offset_s + instants * self._gain)
+        return replace(
+            values, sequence=began + numbers, time=self._offset_s + instants * self._gain
+        )
 
 
 def _between(seen: Samples, at: NDArray) -> Samples:

@@ -181,11 +181,11 @@ def term_of(effect: PlantEffect, source: str) -> Term:
         Where its joint or its values are not the effect's.
     """
     try:
-        made = effect_named(effect.effect)(joint=effect.joint)
-        if (effect.joint is None) != made.whole_leg:
-            wanted = "no joint: it acts on the whole leg" if made.whole_leg else "a joint"
-            raise SettingsError(f"{made.name} has joint {effect.joint}, expected {wanted}")
-        return term_from(made, effect.values)
+        built = effect_named(effect.effect)(joint=effect.joint)
+        if (effect.joint is None) != built.whole_leg:
+            wanted = "no joint: it acts on the whole leg" if built.whole_leg else "a joint"
+            raise SettingsError(f"{built.name} has joint {effect.joint}, expected {wanted}")
+        return term_from(built, effect.values)
     except InputError as error:
         raise SettingsError(f"{source}: {error}") from None
 

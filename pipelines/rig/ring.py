@@ -62,8 +62,8 @@ class Ring:
             ]
         if self.newest:
             start = self.newest.address - first
-            told = self.newest.encode({"newest": self.last % self.newest.span("newest")})
-            registers[start : start + self.newest.count] = told
+            words = self.newest.encode({"newest": self.last % self.newest.span("newest")})
+            registers[start : start + self.newest.count] = words
 
     def taken(self) -> list[int]:
         """Return as many whole records as one FC24 answer carries, and let them go."""

@@ -189,11 +189,11 @@ class Drive(Device):
             return
         self.written = False
         start = self.write.address - self.first
-        told = self.write.decode(self.registers[start : start + self.write.count])
+        values = self.write.decode(self.registers[start : start + self.write.count])
         # Where there is a counter for that, only a new count tells that the host lives.
-        beat, self._beat = self._beat, told.get("heartbeat")
+        beat, self._beat = self._beat, values.get("heartbeat")
         if beat is None or beat != self._beat:
-            self.servo.hear(told["reference"], int(told["control"]))
+            self.servo.hear(values["reference"], int(values["control"]))
 
     def record(self, samples: Samples) -> None:
         """Take in what the plant did since the last time."""
@@ -340,11 +340,13 @@ class VirtualRig:
         (J,) rad."""
         for drive in self.drives:
             drive.hear()
-        told = [
+        set_points = [
             [drive.servo.next(float(angle[drive.joint])) for drive in self.drives]
             for _ in range(count)
         ]
-        for enabled, following in groupby(told, lambda drives: [follows for _, follows in drives]):
+        for enabled, following in groupby(
+            set_points, lambda drives: [follows for _, follows in drives]
+        ):
             references = np.array([[reference for reference, _ in drives] for drives in following])
             samples = self.plant.run(references, np.array(enabled))
             for drive in self.drives:

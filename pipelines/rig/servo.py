@@ -78,20 +78,20 @@ class Servo:
     def hear(self, reference: float, control: int) -> None:
         """Take a set-point (rad) and a control word."""
         # It holds where it is told no number: arithmetic would carry that on for ever.
-        told = reference if isfinite(reference) else self._last
-        cycles = self._cycles_to(told)
+        set_point = reference if isfinite(reference) else self._last
+        cycles = self._cycles_to(set_point)
         # The set-points' own speed: the way back from having gone on too far is none to go on at.
         if cycles:
-            self._pace = (told - self._told) / (cycles * self._cycle) if self.enabled else 0.0
+            self._pace = (set_point - self._told) / (cycles * self._cycle) if self.enabled else 0.0
         # A cycle after the one before was to be reached; by and by a cycle after it comes.
         way = self._way - self._unheard + cycles * self._cycle
         self._from, self._way = self._last, max(way + CATCH * (self._cycle - way), 1.0)
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
-        self._told, self._control = told, control
+        self._told, self._control = set_point, control
 
-    def _cycles_to(self, told: float) -> int:
+    def _cycles_to(self, set_point: float) -> int:
         """Return how many set-points a new one (rad) is after the last one; 0 where it corrects
         that.
 
@@ -103,7 +103,7 @@ class Servo:
         return min(
             max(floor(waited), 0),
             ceil(waited),
-            key=lambda n: abs(told - self._told - n * self._cycle * self._pace),
+            key=lambda n: abs(set_point - self._told - n * self._cycle * self._pace),
         )
 
     def next(self, angle: float) -> tuple[float, bool]:

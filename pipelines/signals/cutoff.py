@@ -77,22 +77,22 @@ def choose_cutoff(
     welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
     for piece in pieces:
         welch.add(piece)
-    found = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
+    spectra = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
     least, most = (share * rate_hz / 2 for share in HIGHEST_SHARE)
     highest = min(max(HIGHEST_HZ, least), most)
-    noisiest = int(np.argmin([s.meets_floor_hz for s in found]))
-    meets = found[noisiest].meets_floor_hz
-    fastest = int(np.argmax([s.motion_hz for s in found]))
-    needed = min(2.0 * found[fastest].motion_hz, highest)
-    said = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
+    noisiest = int(np.argmin([s.meets_floor_hz for s in spectra]))
+    meets = spectra[noisiest].meets_floor_hz
+    fastest = int(np.argmax([s.motion_hz for s in spectra]))
+    needed = min(2.0 * spectra[fastest].motion_hz, highest)
+    reason = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
     chosen = BEFORE_NOISE * meets
     if chosen < needed:
         return Cutoff(
-            needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz"
+            needed, f"{reason}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz"
         )
     if chosen > highest:
-        return Cutoff(highest, f"{said}; above {highest:g} Hz is only what reversals leave")
+        return Cutoff(highest, f"{reason}; above {highest:g} Hz is only what reversals leave")
     return Cutoff(
         max(chosen, 2.0 * rate_hz / samples),
-        f"{said}; in acceleration noise outweighs signal before that",
+        f"{reason}; in acceleration noise outweighs signal before that",
     )

@@ -35,8 +35,8 @@ def between_readings(x: NDArray, longest: int) -> NDArray:
     if len(read) in (0, 1, len(x)):
         return x
     every = np.arange(len(x))
-    made: NDArray = Akima1DInterpolator(read, x[read])(every)
+    interpolated: NDArray = Akima1DInterpolator(read, x[read])(every)
     later = np.searchsorted(read, every).clip(1, len(read) - 1)
-    made[read[later] - read[later - 1] > longest] = np.nan
-    made[read] = x[read]
-    return made
+    interpolated[read[later] - read[later - 1] > longest] = np.nan
+    interpolated[read] = x[read]
+    return interpolated

@@ -74,8 +74,8 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
         loop = _loop_as_recorded(plant, motion, segment.start, period)
         reference = np.ascontiguousarray(motion.reference[segment])
         begin = motion.time[segment.start] - 0.5 * period
-        told = follow(plant.assembly, drives, loop, reference, begin, temperature[segment])
-        for whole, part in zip(simulated, told, strict=False):
+        followed = follow(plant.assembly, drives, loop, reference, begin, temperature[segment])
+        for whole, part in zip(simulated, followed, strict=False):
             whole[segment] = part
     angle, velocity, torque = simulated
     return UnderReferences(
@@ -170,7 +170,7 @@ def _without_overlap(first: NDArray, length: int) -> NDArray:
 
 
 def closed_loop_frame(
-    made: UnderReferences, motion: Motion, joints: tuple[Joint, ...]
+    simulated: UnderReferences, motion: Motion, joints: tuple[Joint, ...]
 ) -> pd.DataFrame:
     """Return a closed loop under recorded references as a ``simulation/1`` table, the measured
     beside it."""
@@ -178,10 +178,10 @@ def closed_loop_frame(
     columns: dict[str, object] = {"time_s": motion.time}
     for j, joint in enumerate(joints):
         columns[joint.column("reference")] = motion.reference[:, j]
-        columns[joint.column("angle")] = made.angle[:, j]
-        columns[joint.column("velocity")] = made.velocity[:, j]
-        columns[joint.column("error")] = motion.reference[:, j] - made.angle[:, j]
-        columns[joint.column("torque")] = made.torque[:, j]
+        columns[joint.column("angle")] = simulated.angle[:, j]
+        columns[joint.column("velocity")] = simulated.velocity[:, j]
+        columns[joint.column("error")] = motion.reference[:, j] - simulated.angle[:, j]
+        columns[joint.column("torque")] = simulated.torque[:, j]
         columns[joint.column("network")] = np.nan
         columns[joint.column("angle_measured")] = motion.q[:, j]
         columns[joint.column("torque_measured")] = motion.torque[:, j]

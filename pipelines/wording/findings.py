@@ -75,10 +75,10 @@ VARIABLES = ("angle", "speed", "load", "time", "tone")
 
 def outcomes(verdict: Mapping[str, Any]) -> tuple[Outcome, ...]:
     """Return the three cases and their probabilities; nothing where physics was not looked at."""
-    told = verdict.get("posterior")
-    if not told:
+    posterior = verdict.get("posterior")
+    if not posterior:
         return ()
-    nothing, unlisted = round(told["nothing_missing"], 2), round(told["unlisted"], 2)
+    nothing, unlisted = round(posterior["nothing_missing"], 2), round(posterior["unlisted"], 2)
     listed = round(max(1.0 - nothing - unlisted, 0.0), 2)
     return (
         Outcome("nothing", "nothing", nothing),
@@ -102,16 +102,16 @@ def searched_runs(verdict: Mapping[str, Any]) -> str:
 
 def shares(verdict: Mapping[str, Any]) -> list[Shares]:
     """Return how each joint's residual splits."""
-    found = []
+    rows = []
     slides = all(of["angle"] == "m" for of in verdict["units"].values())
-    for joint, told in (verdict.get("router") or {}).items():
+    for joint, router in (verdict.get("router") or {}).items():
         depends = {one["variable"]: one["share_before"] for one in verdict["depends_on"][joint]}
-        found.append(
+        rows.append(
             Shares(
                 joint,
-                told["rms_nm"],
-                {part: told[part] or 0.0 for part in PARTS},
-                told["with_person_only"],
+                router["rms_nm"],
+                {part: router[part] or 0.0 for part in PARTS},
+                router["with_person_only"],
                 {
                     "position" if slides and name == "angle" else name: depends[name]
                     for name in VARIABLES
@@ -119,7 +119,7 @@ def shares(verdict: Mapping[str, Any]) -> list[Shares]:
                 },
             )
         )
-    return found
+    return rows
 
 
 def _grow(root: Node, finding: Mapping[str, Any]) -> None:
@@ -150,9 +150,9 @@ def _answer(node: Node, last: Mapping[str, Any], finding: Mapping[str, Any]) -> 
             _under(here, cause["words"], cause["words"], cause["probability"])
 
 
-def _alternative(node: Node, words: str, told: Mapping[str, Any]) -> None:
-    if told["probability"] >= LEAST:
-        _under(node, words, words, told["probability"])
+def _alternative(node: Node, words: str, entry: Mapping[str, Any]) -> None:
+    if entry["probability"] >= LEAST:
+        _under(node, words, words, entry["probability"])
 
 
 def _under(node: Node, key: Any, words: str, probability: float) -> Node:

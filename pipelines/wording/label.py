@@ -46,16 +46,16 @@ def effect_at(
         Where there is none of this name or at this joint, or it does not fit.
     """
     with about(setting):
-        told = effect_labelled(label)
-    if fits(type(told)) and told.joint in told.possible(machine):
-        return type(told)(joint=told.joint, on=machine)
+        effect = effect_labelled(label)
+    if fits(type(effect)) and effect.joint in effect.possible(machine):
+        return type(effect)(joint=effect.joint, on=machine)
     can_be = [
         one(joint=place, on=machine)
         for one in EFFECTS
         if fits(one)
         for place in one.possible(machine)
     ]
-    expected = [one.label for one in can_be if one.name == told.name] or [
+    expected = [one.label for one in can_be if one.name == effect.name] or [
         one.label for one in can_be
     ]
     raise InputError(

@@ -138,9 +138,9 @@ def _judge_motion(
     asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None
 ) -> Iterator[Finding]:
     peaks = {probe: _peak(series.of("angle")) for probe, series in moved.items()}
-    found = max(peaks, key=lambda probe: abs(peaks[probe]))
+    joint_moved = max(peaks, key=lambda probe: abs(peaks[probe]))
     peak, where, register = peaks[asked], f"{asked.map_path}.read", asked.block.registers["angle"]
-    if abs(peaks[found]) < HARDLY_RAD:
+    if abs(peaks[joint_moved]) < HARDLY_RAD:
         yield Finding(
             asked.name,
             f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is"
@@ -148,11 +148,11 @@ def _judge_motion(
             "angle",
         )
         return
-    if found is not asked and abs(peaks[found]) > CLEAR * abs(peak):
+    if joint_moved is not asked and abs(peaks[joint_moved]) > CLEAR * abs(peak):
         yield Finding(
             asked.name,
-            f"the {asked.place} was moved, but the angle of {found.name} changed, by"
-            f" {peaks[found]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
+            f"the {asked.place} was moved, but the angle of {joint_moved.name} changed, by"
+            f" {peaks[joint_moved]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
             " exchange host, port and unit of the two in the rig file",
             "angle",
         )
@@ -213,7 +213,7 @@ def _judge_push(
         for probe, series in pressed.items()
         for axis in AXES
     }
-    (found, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
+    (pushed, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
     where = f"{asked.map_path}.read"
     if abs(peak) < least:
         yield Finding(
@@ -222,10 +222,10 @@ def _judge_push(
             f" be pressed, expected {least:g} N and more; was it? Else compare scale and unit in"
             f" {where} with the manual",
         )
-    elif found is not asked:
+    elif pushed is not asked:
         yield Finding(
             asked.name,
-            f"{asked.place} was pressed, but {found.name} felt it ({axis} {peak:+.3g} N): the two"
+            f"{asked.place} was pressed, but {pushed.name} felt it ({axis} {peak:+.3g} N): the two"
             " are swapped; exchange host, port and unit of the two in the rig file",
         )
     elif axis != "force_y":

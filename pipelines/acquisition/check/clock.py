@@ -109,13 +109,13 @@ def _counter(
             f" {counter[1:][steps < 0][0]:g}; compare {where} with the device's manual",
         )
     else:
-        found, expected = (
+        measured, expected = (
             (counter[-1] - counter[0]) / seconds,
             f"{rate_hz:g}" if rate_hz else "a sample rate",
         )
         yield Finding(
             probe.name,
-            f"its counter goes up by {found:.4g} a second, expected {expected}; set the device's"
+            f"its counter goes up by {measured:.4g} a second, expected {expected}; set the device's"
             f" rate or acquire.sample_rate_hz, or correct {where}",
         )
 
@@ -124,11 +124,11 @@ def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
     """Tell whether a counter (n,) goes up, at the rate that is known."""
     if not np.isfinite(counter).all() or (np.diff(counter) < 0).any():
         return False
-    found = (counter[-1] - counter[0]) / seconds
+    measured = (counter[-1] - counter[0]) / seconds
     if rate_hz is None:
-        return bool(RATES_HZ[0] <= found <= RATES_HZ[1])
+        return bool(RATES_HZ[0] <= measured <= RATES_HZ[1])
     # A sample more or less at either end.
-    return bool(abs(found - rate_hz) <= RATE_TOLERANCE * rate_hz + 2.0 / seconds)
+    return bool(abs(measured - rate_hz) <= RATE_TOLERANCE * rate_hz + 2.0 / seconds)
 
 
 def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
@@ -137,17 +137,17 @@ def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterato
         return
     register, rate = series.block.registers["time"], clock.clock_rate or 0.0
     reference = "by its counter" if probe.in_lockstep else "of this computer's clock"
-    found = f"its clock goes on by {rate:.4g} s in each second {reference}"
+    measured = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
         if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
             yield Finding(
-                probe.name, f'{found}; with unit = "{unit}" the two agree: correct {where}'
+                probe.name, f'{measured}; with unit = "{unit}" the two agree: correct {where}'
             )
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
     yield Finding(
         probe.name,
-        f"{found};"
+        f"{measured};"
         f" {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
     )
 

@@ -31,8 +31,8 @@ class Interpretation:
 
 def interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     """Yield every other description of a register, the likeliest slips first."""
-    found = [Interpretation(*key) for key in _all(name, block)]
-    return iter(sorted((one for one in found if one.cost), key=lambda one: one.cost))
+    results = [Interpretation(*key) for key in _all(name, block)]
+    return iter(sorted((one for one in results if one.cost), key=lambda one: one.cost))
 
 
 def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:

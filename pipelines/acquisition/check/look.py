@@ -166,8 +166,8 @@ async def _meet(probe: Probe, report: DeviceReport) -> None:
     device, loop = probe.part.device, asyncio.get_running_loop()
     report.connected = True
     for entry in probe.part.map.identity:
-        (found,) = await device.read(entry.address, 1)
-        report.identity.append({"address": entry.address, "expected": entry.value, "found": found})
+        (value,) = await device.read(entry.address, 1)
+        report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
     await device.check_identity(probe.part.map.identity)
     until = loop.time() + READS_S
     for k in range(READS):
@@ -262,11 +262,11 @@ def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
     drives = [
         (d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock
     ]
-    for name, found in drives[1:]:
+    for name, counter in drives[1:]:
         first = drives[0][1]
-        if first and found and abs(found / first - 1.0) > RATE_TOLERANCE:
+        if first and counter and abs(counter / first - 1.0) > RATE_TOLERANCE:
             yield Finding(
                 name,
-                f"samples {found:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives"
+                f"samples {counter:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives"
                 " sample at one rate, on one synchronising signal if they have it",
             )

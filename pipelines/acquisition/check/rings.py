@@ -61,13 +61,13 @@ async def _judged(
         reading = await drive.look()
         agreement.add(reading)
         try:
-            found = await drive.drain(reading.sequence)
+            records = await drive.drain(reading.sequence)
         except DeviceError as error:
             return (
                 f"its record cannot be drained ({error}); compare {_where(drive)} with the device's"
                 " manual"
             )
-        for record in found:
+        for record in records:
             history.add(record.sequence, record.reference)  # nobody sends any
             agreement.check(record)
             begun |= stream.check(record, time.monotonic())

@@ -34,7 +34,7 @@ def check_velocity(
     if len(t) < 3:
         return
     travel = np.r_[0.0, np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(t))]
-    angle, told = q - q.mean(), travel - travel.mean()
+    angle, integral = q - q.mean(), travel - travel.mean()
     if np.ptp(q) < MOVED_RAD:
         if np.ptp(travel) > STANDING_RAD + np.ptp(q):
             yield Finding(
@@ -44,9 +44,11 @@ def check_velocity(
                 " the device's manual",
             )
         return
-    ratio = float(told @ angle / (angle @ angle))
+    ratio = float(integral @ angle / (angle @ angle))
     correlation = (
-        float(told @ angle / np.sqrt((told @ told) * (angle @ angle))) if told.any() else 0.0
+        float(integral @ angle / np.sqrt((integral @ integral) * (angle @ angle)))
+        if integral.any()
+        else 0.0
     )
     if abs(correlation) < CORRELATED:
         yield Finding(

@@ -49,10 +49,10 @@ def check_zeros(probe: Probe, series: Series, limit_n: float, *, alone: bool) ->
                 f" {where}.{axis}.offset",
             )
     if len(forces) >= ENOUGH and not np.ptp(forces, axis=0).any():
-        told = ", ".join(f"{force:.4g}" for force in forces[0])
+        listed = ", ".join(f"{force:.4g}" for force in forces[0])
         yield Finding(
             probe.name,
-            f"all three forces are constant ({told} N) over {len(forces)} samples, without any"
+            f"all three forces are constant ({listed} N) over {len(forces)} samples, without any"
             " noise; is the sensor connected, and are these its live registers?",
         )
 

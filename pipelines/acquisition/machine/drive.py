@@ -240,8 +240,8 @@ class Drive:
 
         Nothing is written: a torque that is taken away comes back with the other's next set-point.
         """
-        told = await self._asked()
-        if self.map.enabled_mask and not self._is_enabled(int(told["status"])):
+        at_first = await self._asked()
+        if self.map.enabled_mask and not self._is_enabled(int(at_first["status"])):
             return False
         until, first = time.monotonic() + WATCH_S, await self._all_told()
         while time.monotonic() < until:
@@ -257,19 +257,19 @@ class Drive:
 
     async def _all_told(self) -> tuple[object, float]:
         """Return what the drive has been told, as far as it tells, and its angle (rad)."""
-        told = await self._asked()
+        values = await self._asked()
         try:
             written: object = await self.device.read(self.tell.address, self.tell.count)
         except Refused:  # not every drive lets what is written be read; then its angle must tell
             written = None
-        return written, told["angle"]
+        return written, values["angle"]
 
     async def make_idle(self) -> bool:
         """Disable the drive before a run, whatever it does; tell whether it said that it was
         enabled."""
-        told = await self._asked()
-        was_enabled = bool(self.map.enabled_mask) and self._is_enabled(int(told["status"]))
-        await self.disable(told["angle"])
+        values = await self._asked()
+        was_enabled = bool(self.map.enabled_mask) and self._is_enabled(int(values["status"]))
+        await self.disable(values["angle"])
         return was_enabled
 
     async def reset_fault(self) -> None:
@@ -282,8 +282,8 @@ class Drive:
         DeviceError
             Where the drive keeps its fault.
         """
-        told = await self._asked()
-        if not int(told.get("status", 0)) & self.map.fault_mask:
+        values = await self._asked()
+        if not int(values.get("status", 0)) & self.map.fault_mask:
             return
         if self.map.fault_reset is None:
             raise SettingsError(
@@ -292,7 +292,7 @@ class Drive:
                 " manual"
             )
         try:
-            await self._tell_idle(self.map.fault_reset, told["angle"])
+            await self._tell_idle(self.map.fault_reset, values["angle"])
             await self._until(
                 lambda status: not status & self.map.fault_mask,
                 "to reset its fault",
@@ -300,9 +300,9 @@ class Drive:
             )
         except DeviceError:
             with suppress(DeviceError):  # the first one says what is wrong
-                await self._tell_idle(self.map.disable, told["angle"])
+                await self._tell_idle(self.map.disable, values["angle"])
             raise
-        await self._tell_idle(self.map.disable, told["angle"])
+        await self._tell_idle(self.map.disable, values["angle"])
 
     def words(self, control: int, reference: float) -> list[int]:
         """Return the registers that tell a control word and a set-point (rad).
@@ -369,25 +369,25 @@ class Drive:
         """Decode words."""
         return self._numbers(block.decode(words))
 
-    def _numbers(self, told: Mapping[str, float]) -> Mapping[str, float]:
+    def _numbers(self, values: Mapping[str, float]) -> Mapping[str, float]:
         """Refuse what is no number where that is counted with, or would mean that the drive does
         not tell it."""
         for name in COUNTED_WITH:
-            if not isfinite(told.get(name, 0.0)):
+            if not isfinite(values.get(name, 0.0)):
                 raise DeviceError(
-                    f"{self.device.label}: its {name} is {told[name]}, expected a number; compare"
+                    f"{self.device.label}: its {name} is {values[name]}, expected a number; compare"
                     " the register map in the rig file with the device's manual"
                 )
-        return told
+        return values
 
     def _reading(self, words: list[int], sent: float) -> Reading:
         values = self.told.decode(words)
         # Heeded whatever else it tells that is no number.
         self.conditions.append(condition := self._condition(values.get("status", 0.0)))
-        told = self._numbers(values)
-        self._temperature = told.get("temperature", np.nan)
-        number = self._newest(told["sequence"], sent)
-        return self._sample(number, self._time(told["time"]), told, self._sent, condition)
+        numbers = self._numbers(values)
+        self._temperature = numbers.get("temperature", np.nan)
+        number = self._newest(numbers["sequence"], sent)
+        return self._sample(number, self._time(numbers["time"]), numbers, self._sent, condition)
 
     def _condition(self, status: float) -> Condition:
         """Return what a status word tells; of one that is no number nothing."""
@@ -410,16 +410,16 @@ class Drive:
             f"clear the fault and start again{reset}"
         )
 
-    def _of_ring(self, number: int, told: Mapping[str, float]) -> Reading:
+    def _of_ring(self, number: int, values: Mapping[str, float]) -> Reading:
         """Return a record as a sample; temperature is what the last exchange told."""
-        told = self._numbers(told)
-        return self._sample(number, self._ring_time(told["time"]), told, np.nan, Condition())
+        values = self._numbers(values)
+        return self._sample(number, self._ring_time(values["time"]), values, np.nan, Condition())
 
     def _sample(
         self,
         number: int,
         time_s: float,
-        told: Mapping[str, float],
+        values: Mapping[str, float],
         sent: float,
         condition: Condition,
     ) -> Reading:
@@ -428,12 +428,12 @@ class Drive:
         return Reading(
             sequence=number,
             time=time_s,
-            angle=told["angle"],
-            torque=told["current"] * self.settings.torque_per_ampere,
-            current=told["current"],
-            velocity=told.get("velocity", np.nan),
+            angle=values["angle"],
+            torque=values["current"] * self.settings.torque_per_ampere,
+            current=values["current"],
+            velocity=values.get("velocity", np.nan),
             temperature=self._temperature,
-            reference=told.get("reference", sent),
+            reference=values.get("reference", sent),
             **vars(condition),
         )
 

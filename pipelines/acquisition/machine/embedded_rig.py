@@ -59,12 +59,12 @@ def embedded(
             bufsize=0,
             **_ON_ITS_OWN,
         )
-        said = Said(process)
+        output = Said(process)
         try:
             lines = len({device.line for device in (*rig.drive, *rig.sensor)})
-            yield _at(rig, dict(_place(said, path, complaints) for _ in range(lines)))
+            yield _at(rig, dict(_place(output, path, complaints) for _ in range(lines)))
         finally:
-            said.end()
+            output.end()
 
 
 class Said:
@@ -102,13 +102,13 @@ class Said:
         self._lines.put(b"")
 
 
-def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
+def _place(output: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
     """Wait until the rig says where a line is; return its name, None for that of devices on none,
     and the place."""
-    if line := said.line(START_S):
+    if line := output.line(START_S):
         name, _, place = line.rpartition(" ")
         return name or None, place
-    said.end()
+    output.end()
     complaints.seek(0)
     words = complaints.read().decode(errors="replace").strip()
     if not words:
@@ -117,7 +117,7 @@ def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, s
             " to see why"
         )
     # What the rig could not use is the user's to mend here as there.
-    kind = SettingsError if said.process.returncode == SettingsError.exit_code else DeviceError
+    kind = SettingsError if output.process.returncode == SettingsError.exit_code else DeviceError
     raise kind(words.splitlines()[-1].removeprefix("exoid: "))
 
 

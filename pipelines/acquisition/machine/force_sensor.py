@@ -53,7 +53,7 @@ class Sensor:
         """
         self._watchdog.waited(time.monotonic())
         try:
-            told = self.block.decode(
+            values = self.block.decode(
                 await self.device.read(self.block.address, self.block.count, in_motion=True)
             )
         except Unanswered as error:
@@ -64,9 +64,9 @@ class Sensor:
         now = time.monotonic()
         self._watchdog.reset(now)
         owed, self._owes = self._owes, False
-        if owed or not self._goes_on(self._counter(told["sequence"]), now):
+        if owed or not self._goes_on(self._counter(values["sequence"]), now):
             return None
-        return told["force_x"], told["force_y"], told["force_z"]
+        return values["force_x"], values["force_y"], values["force_z"]
 
     def _goes_on(self, count: float, now: float) -> bool:
         """Tell whether a sample is a new one; raise DeviceError where its counter went back or

@@ -68,11 +68,11 @@ class Machine:
     async def refuse_driven(self) -> None:
         """Refuse to write anything to a rig that somebody else drives."""
         driven = await all_answers(drive.is_driven() for drive in self.drives)
-        if found := [
+        if labels := [
             drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so
         ]:
             raise DeviceError(
-                f"{' and '.join(found)}: driven by somebody else, since angle or set-point change"
+                f"{' and '.join(labels)}: driven by somebody else, since angle or set-point change"
                 " while exoid sends nothing; end the other program, or hold the leg still; nothing"
                 " was sent"
             )
@@ -85,10 +85,10 @@ class Machine:
     async def make_idle(self) -> None:
         """Disable every drive before a run; refuse to go on where one was enabled: nobody knows
         what moved the leg."""
-        found = [drive.device.label for drive in self.drives if await drive.make_idle()]
-        if found:
+        enabled = [drive.device.label for drive in self.drives if await drive.make_idle()]
+        if enabled:
             raise DeviceError(
-                f"{' and '.join(found)}: enabled before the run began, by one that was killed"
+                f"{' and '.join(enabled)}: enabled before the run began, by one that was killed"
                 " perhaps; disabled now; see to the leg, and to what else moves it, and start"
                 " again"
             )
@@ -188,7 +188,7 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, number: int, tell: Tell) -> Answers:
+    async def cycle(self, number: int, send: Tell) -> Answers:
         """Tell all drives at once; return what came: the sample that all devices latched, or of
         each its newest.
 
@@ -198,17 +198,17 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            told = await answers_or_silence(map(tell, self.drives))
+            answers = await answers_or_silence(map(send, self.drives))
         else:
-            told = await answers_or_silence(map(tell, self.drives))
+            answers = await answers_or_silence(map(send, self.drives))
             forces = await self.felt(number)
-        readings = [answer for answer in told if isinstance(answer, Reading)]
-        whole = len(readings) == len(told)
+        readings = [answer for answer in answers if isinstance(answer, Reading)]
+        whole = len(readings) == len(answers)
         if whole and self.latches:
             whole = await self._latch(readings)
-            told = list(readings)
+            answers = list(readings)
         row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
-        return Answers(tuple(told), forces, row)
+        return Answers(tuple(answers), forces, row)
 
     async def felt(self, cycle: int | None = None) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of
@@ -274,12 +274,12 @@ async def answers_or_silence(asked: Iterable[Awaitable[Answer]]) -> list[Answer 
     None shall be left for the next request to find. What is worse than silence is raised.
     """
     answers = await asyncio.gather(*asked, return_exceptions=True)
-    told: list[Answer | Unanswered] = []
+    results: list[Answer | Unanswered] = []
     for answer in answers:
         if isinstance(answer, BaseException) and not isinstance(answer, Unanswered):
             raise answer
-        told.append(answer)
-    return told
+        results.append(answer)
+    return results
 
 
 async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:

@@ -79,26 +79,26 @@ class Alignment:
         self._first: deque[Reading] = deque(maxlen=MOST_WAITING)
         self._tracks = [Track() for _ in positions]
 
-    def rows(self, told: Sequence[Sequence[Reading]]) -> list[tuple[Reading, ...]]:
+    def rows(self, samples: Sequence[Sequence[Reading]]) -> list[tuple[Reading, ...]]:
         """Take in what each drive told since the last time, and return the rows that are whole now.
 
         A row for which one drive lacks a sample is left out: nothing is invented across a gap.
         """
-        self._first.extend(told[0])
-        for track, readings in zip(self._tracks, told[1:], strict=True):
+        self._first.extend(samples[0])
+        for track, readings in zip(self._tracks, samples[1:], strict=True):
             track.add(readings)
         rows = []
         while self._first:
-            found = [position(self._first[0].sequence) for position in self._positions]
-            places = [place for place in found if place is not None]
-            if len(places) < len(found) or any(
+            positions = [position(self._first[0].sequence) for position in self._positions]
+            places = [place for place in positions if place is not None]
+            if len(places) < len(positions) or any(
                 track.waits_for(place) for track, place in zip(self._tracks, places, strict=True)
             ):
                 break
             first = self._first.popleft()
             others = [track.at(place) for track, place in zip(self._tracks, places, strict=True)]
             row = (first, *(other for other in others if other is not None))
-            if len(row) == len(told):
+            if len(row) == len(samples):
                 rows.append(row)
             for track, place in zip(self._tracks, places, strict=True):
                 track.forget(floor(place) - 1)

@@ -84,10 +84,10 @@ class Beside:
         answer."""
         if self._request is None:
             return []
-        found, self._request = await self._request, None
-        if isinstance(found, DeviceError):
-            raise found
-        return found
+        samples, self._request = await self._request, None
+        if isinstance(samples, DeviceError):
+            raise samples
+        return samples
 
     def end(self) -> None:
         """Wait no more: the drive is to be slowed down."""
@@ -148,13 +148,13 @@ class Recorded:
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what was drained since the last cycle; mostly nothing, until a read is worth its
         while."""
-        found = await self.beside.brought() if self.beside.is_answered else []
+        samples = await self.beside.brought() if self.beside.is_answered else []
         is_due = self._drained is None or reading.sequence >= self._drained + self._block
         if is_due and not self.beside.is_under_way:
             self.beside.begin(partial(self._drain, reading.sequence))
             if self._drive.in_lockstep:  # the drives wait
-                return found + await self.beside.brought()
-        return found
+                return samples + await self.beside.brought()
+        return samples
 
     async def _drain(self, newest: int) -> list[Reading]:
         """Drain the ring; of what is not answered it keeps the samples, and the next drain brings
@@ -197,21 +197,21 @@ class Streams:
         now = time.monotonic()
         self._bucket_ends = self._bucket_ends or now + BUCKET_S
         pairs = zip(self._sources, row.drives, strict=True)
-        told = await all_answers(source.samples(reading) for source, reading in pairs)
-        told = self._judge(row, told, now)
+        samples = await all_answers(source.samples(reading) for source, reading in pairs)
+        samples = self._judge(row, samples, now)
         if self._own:
             self._compare(row, now)
         if not np.isnan(row.forces).all():
             self._forces[row.drives[0].sequence] = row.forces
-        return list(self._whole(told))
+        return list(self._whole(samples))
 
     def end(self) -> None:
         """Ask the drives for nothing more beside the cycle."""
         for source in self._sources:
             source.beside.end()
 
-    def _whole(self, told: Sequence[Sequence[Reading]]) -> Iterator[Row]:
-        for drives in self._alignment.rows(told):
+    def _whole(self, samples: Sequence[Sequence[Reading]]) -> Iterator[Row]:
+        for drives in self._alignment.rows(samples):
             sequence = drives[0].sequence
             forces = self._forces.pop(sequence, self._machine.no_force)
             for missed in [earlier for earlier in self._forces if earlier < sequence]:
@@ -236,20 +236,20 @@ class Streams:
 
         The offset is that at ``since_s`` of the first drive's clock.
         """
-        found: dict[str, dict] = {}
+        clocks: dict[str, dict] = {}
         for j, drift in enumerate(self._drifts, start=1):
             if self._last is None or drift.estimate is None:
                 continue
             first, other = self._last.drives[0], self._last.drives[j]
             offset = other.time - first.time - drift.estimate.rate * (first.time - since_s)
-            found[self._machine.drives[j].settings.joint] = {
+            clocks[self._machine.drives[j].settings.joint] = {
                 "offset_s": offset,
                 "offset_error_s": drift.estimate.lead_error / self._rate_hz,
                 "rate_ppm": 1e6 * drift.estimate.rate,
                 "rate_error_ppm": 1e6 * drift.estimate.rate_error,
                 "corrected": True,
             }
-        return found
+        return clocks
 
 
 def sources_of(machine: Machine, cycle_hz: float) -> list[Recorded | Cycled]:

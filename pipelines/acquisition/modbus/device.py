@@ -70,10 +70,10 @@ class Device:
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
         for entry in identity:
-            (found,) = await self.read(entry.address, 1)
-            if found != entry.value:
+            (value,) = await self.read(entry.address, 1)
+            if value != entry.value:
                 raise DeviceError(
-                    f"{self.label}: identity register {entry.address} holds 0x{found:04X}, expected"
+                    f"{self.label}: identity register {entry.address} holds 0x{value:04X}, expected"
                     f" 0x{entry.value:04X}: it is another device; check cabling and unit id, or"
                     " correct the rig file"
                 )
@@ -97,13 +97,13 @@ class Device:
         response = await self._request(
             what, self._in_motion, self._client.read_fifo_queue, address=address
         )
-        found = list(getattr(response, "values", []))
-        if len(found) % words:
+        registers = list(getattr(response, "values", []))
+        if len(registers) % words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(found)} registers, expected a multiple of"
+                f"{self.label}: answered {what} with {len(registers)} registers, expected a multiple of"
                 f" {words}; compare ring.words in the rig file with the device's manual"
             )
-        return found
+        return registers
 
     async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
         """Write a block by FC16."""

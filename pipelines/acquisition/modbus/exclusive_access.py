@@ -41,8 +41,8 @@ def _names(line: LineSettings) -> set[str]:
     if isinstance(line, RtuLine):
         return {os.path.realpath(line.place)}
     with suppress(OSError):  # a host that nobody knows will not be reached either
-        found = socket.getaddrinfo(line.host, line.port, type=socket.SOCK_STREAM)
-        return {f"{address[0]}:{line.port}" for *_, address in found}
+        addresses = socket.getaddrinfo(line.host, line.port, type=socket.SOCK_STREAM)
+        return {f"{address[0]}:{line.port}" for *_, address in addresses}
     return {line.place}
 
 

@@ -305,7 +305,7 @@ def _client(
     settings: LineSettings,
     tls: ssl.SSLContext | None,
     timeout_s: float,
-    told: Callable[[bool], None],
+    note: Callable[[bool], None],
 ) -> ModbusBaseClient:
     """Return the client of a line, not yet connected."""
     # Never a second try: a set-point that comes late is no set-point, and an exchange may move the
@@ -314,7 +314,7 @@ def _client(
         "timeout": timeout_s,
         "retries": 0,
         "reconnect_delay": 0,
-        "trace_connect": told,
+        "trace_connect": note,
     }
     if isinstance(settings, RtuLine):
         return AsyncModbusSerialClient(

@@ -54,10 +54,10 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
             records[drive.line] += took_s / brings * rig.record_rate_hz
     sensors = _sensors_s(rig) if with_sensors else {}
     cycle = look + max(drives.values()) + max(sensors.values(), default=0.0)
-    left = 1.0 - max(records.values(), default=0.0)
+    share = 1.0 - max(records.values(), default=0.0)
     longest = max(
         cycle + max(drains.values(), default=0.0),
-        cycle / left if left > 0.0 else float("inf"),
+        cycle / share if share > 0.0 else float("inf"),
         # An answer later than this share of a sample is too old to build on: see PhaseLock.
         look / SLOW,
     )

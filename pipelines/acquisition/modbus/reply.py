@@ -82,9 +82,9 @@ def _is_whole(function: int, frame: bytes) -> bool:
 class Conversation:
     """Requests and replies of one connection, one after the other."""
 
-    def __init__(self, heard: Callable[[int], None]) -> None:
+    def __init__(self, note: Callable[[int], None]) -> None:
         self._asked = ModbusPDU()
-        self._heard = heard
+        self._heard = note
 
     def __call__(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
         """Remember a request; return a reply, or what is wrong with it."""
@@ -117,10 +117,10 @@ def _instead(reply: ModbusPDU, wrong: str) -> NoReply:
     return none
 
 
-def check_replies(client: ModbusBaseClient, heard: Callable[[int], None]) -> None:
+def check_replies(client: ModbusBaseClient, note: Callable[[int], None]) -> None:
     """Have a client hand out nothing but replies, and a NoReply for what came instead of one.
 
     ``heard`` is told the unit of each that comes, wanted or not.
     """
     client.ctx.framer.decoder = ReplyDecoder()
-    client.ctx.trace_pdu = Conversation(heard)
+    client.ctx.trace_pdu = Conversation(note)

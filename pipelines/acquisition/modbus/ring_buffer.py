@@ -87,14 +87,14 @@ class Ring:
             first += count
         sent = time.perf_counter()
         words = await self._device.read(self._newest.address, self._newest.count, in_motion=True)
-        found = self._newest.decode(words)["newest"]
-        ends = int(carried(found, newest, self._span))
+        number = self._newest.decode(words)["newest"]
+        ends = int(carried(number, newest, self._span))
         # So far from what the exchange told: all of it is overwritten, or the answer damaged.
         # Nothing of it is sure.
         if abs(ends - newest) > self._capacity:
             ends = newest + self._capacity
         else:
-            self._numbered(found, sent)
+            self._numbered(number, sent)
         # The drive may have been writing the record after that one while these were read.
         overwritten = ends + 1 - self._capacity
         self._next = newest + 1  # not before all was answered: what was not is read again
@@ -151,14 +151,14 @@ class Queue:
         if self._began is None:
             self._began = newest
         for _ in range(self._reads):
-            found = await self._read()
+            words = await self._read()
             numbered = [
-                (int(carried(record["sequence"], newest, self._span)), record) for record in found
+                (int(carried(record["sequence"], newest, self._span)), record) for record in words
             ]
             self._fetched += [
                 (number, record) for number, record in numbered if number > self._began
             ]
-            if len(found) < self.block:
+            if len(words) < self.block:
                 break
         records, self._fetched = self._fetched, []
         return records

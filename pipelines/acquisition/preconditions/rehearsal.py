@@ -31,12 +31,12 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
     """
     cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
     allowed = MOST_LATE * cycles
-    late, made = await _late(machine, cycle_hz, cycles, allowed)
+    late, cycles_made = await _late(machine, cycle_hz, cycles, allowed)
     if late <= allowed:
         return
     less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
-        f"{late} of {made} cycles in which every device was asked took longer than the"
+        f"{late} of {cycles_made} cycles in which every device was asked took longer than the"
         f" {1e3 / cycle_hz:g} ms from one set-point to the next; lower"
         f" acquire.sample_rate_hz{less_often}, or close what else this computer does; nothing was"
         " moved"
@@ -52,20 +52,20 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
     """
     pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
     sources = sources_of(machine, cycle_hz)
-    late, made, last = 0, 0, await machine.count()
-    while made < cycles and late <= allowed:
-        found = await pace.wait(last)
-        late += found > last + 1
-        last = found
-        row = (await machine.cycle(made, _look)).row
-        made += 1
+    late, done, last = 0, 0, await machine.count()
+    while done < cycles and late <= allowed:
+        count = await pace.wait(last)
+        late += count > last + 1
+        last = count
+        row = (await machine.cycle(done, _look)).row
+        done += 1
         if row and sources:
             await all_answers(
                 source.samples(reading) for source, reading in zip(sources, row.drives, strict=True)
             )
     for source in sources:
         await source.beside.brought()
-    return late, made
+    return late, done
 
 
 async def _look(drive: Drive) -> Reading:

@@ -32,14 +32,14 @@ def misplaced_set_points(rig: RigSettings) -> Iterator[str]:
 
 
 def _contradiction(map_: DriveMap) -> str | None:
-    told, tells = map_.write.reference, map_.read.angle
-    if told.scale * tells.scale < 0.0:
+    written, read = map_.write.reference, map_.read.angle
+    if written.scale * read.scale < 0.0:
         return (
-            f"scale: found {told.scale:g} with {tells.scale:g} of read.angle, expected one sign for"
+            f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign for"
             " both, or the drive leaps to the other side of zero as it is enabled; find out by"
             " `exoid rig check --by-hand` which is wrong, and turn that"
         )
-    if map_.own_scale or not (apart := _apart(told, tells)):
+    if map_.own_scale or not (apart := _apart(written, read)):
         return None
     key, one, other = apart
     return (
@@ -49,17 +49,17 @@ def _contradiction(map_: DriveMap) -> str | None:
     )
 
 
-def _apart(told: Register, tells: Register) -> tuple[str, str, str] | None:
+def _apart(written: Register, read: Register) -> tuple[str, str, str] | None:
     """Return in which key two registers differ by which one angle is another count, with both
     values, if in any."""
     for key in ("type", "word_order", "byte_order"):
-        one, other = getattr(told, key), getattr(tells, key)
-        if one != other and not (key == "word_order" and told.registers == 1):
+        one, other = getattr(written, key), getattr(read, key)
+        if one != other and not (key == "word_order" and written.registers == 1):
             return key, one, other
-    if abs(told.si[0] / tells.si[0] - 1.0) > SAME_SCALE:
-        if told.scale == tells.scale:
-            return "unit", told.unit, tells.unit
-        return "scale", f"{told.scale:g} {told.unit}", f"{tells.scale:g} {tells.unit}"
-    if abs(told.si[1] - tells.si[1]) > max(told.step, tells.step):
-        return "offset", f"{told.si[1]:g} rad", f"{tells.si[1]:g} rad"
+    if abs(written.si[0] / read.si[0] - 1.0) > SAME_SCALE:
+        if written.scale == read.scale:
+            return "unit", written.unit, read.unit
+        return "scale", f"{written.scale:g} {written.unit}", f"{read.scale:g} {read.unit}"
+    if abs(written.si[1] - read.si[1]) > max(written.step, read.step):
+        return "offset", f"{written.si[1]:g} rad", f"{read.si[1]:g} rad"
     return None

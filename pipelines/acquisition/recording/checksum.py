@@ -24,11 +24,11 @@ def with_checksum(batch: bytes, head: bytes) -> bytes:
 
 def fits(batch: bytes, head: bytes) -> bool:
     """Return whether a batch is what was written after this head."""
-    told = _TOLD.search(batch)
-    if told is None:
+    stated = _TOLD.search(batch)
+    if stated is None:
         return False
-    begin, end = told.span(1)
-    return crc32(batch[:begin] + b"00000000" + batch[end:], crc32(head)) == int(told[1], 16)
+    begin, end = stated.span(1)
+    return crc32(batch[:begin] + b"00000000" + batch[end:], crc32(head)) == int(stated[1], 16)
 
 
 def has_any(content: bytes) -> bool:

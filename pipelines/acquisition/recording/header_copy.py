@@ -36,11 +36,11 @@ def ends_of(file: BinaryIO) -> Iterator[bytes]:
 def head_in(file: BinaryIO) -> bytes | None:
     """Return the head that the first whole copy in a journal holds; None where there is none."""
     for content in ends_of(file):
-        for told in _TOLD.finditer(content):
+        for stated in _TOLD.finditer(content):
             try:
-                head = b64decode(told[2])
+                head = b64decode(stated[2])
             except ValueError:
                 continue
-            if crc32(head) == int(told[1], 16):
+            if crc32(head) == int(stated[1], 16):
                 return head
     return None

@@ -129,13 +129,13 @@ class Journal:
                 errno.ENOENT, "it was removed or moved while the run went on", str(self.path)
             )
 
-    def end(self, abort: str | None, found: Mapping[str, Any] | None = None) -> None:
+    def end(self, abort: str | None, metadata: Mapping[str, Any] | None = None) -> None:
         """Say how the run ended: why it was stopped early, None if it was not. Only a killed run
         never says.
 
         ``found`` is what else its metadata shall tell that was not known before the run.
         """
-        words = {ABORT: abort or "", FOUND: json.dumps(found or {}), ROWS: str(self.rows)}
+        words = {ABORT: abort or "", FOUND: json.dumps(metadata or {}), ROWS: str(self.rows)}
         self._last_words = {key: word.encode() for key, word in words.items()}
 
     def close(self) -> None:
@@ -162,17 +162,19 @@ class Journal:
             for column, field in zip(columns, self._schema, strict=True)
         ]
         stream = io.BytesIO()
-        with pa.ipc.new_stream(stream, self._schema) as made:
+        with pa.ipc.new_stream(stream, self._schema) as writer:
             metadata = {**(more or {}), checksum.KEY: checksum.BLANK}
-            made.write_batch(pa.record_batch(arrays, schema=self._schema), custom_metadata=metadata)
+            writer.write_batch(
+                pa.record_batch(arrays, schema=self._schema), custom_metadata=metadata
+            )
         return checksum.with_checksum(stream.getvalue()[len(self._head) : -len(END)], self._head)
 
     def _hand_over(self, parts: bytes) -> None:
         """Write parts of the stream; all of them or, where the disk is full, nothing."""
-        whole, left = self._file.tell(), memoryview(parts)
+        whole, rest = self._file.tell(), memoryview(parts)
         try:
-            while left:
-                left = left[self._file.write(left) :]
+            while rest:
+                rest = rest[self._file.write(rest) :]
         except OSError:
             # After half a batch nothing could be read that comes later.
             self._file.truncate(whole)
@@ -309,8 +311,8 @@ def _why_no_journal(path: Path) -> str:
 
 
 def _short(value: object) -> str:
-    told = json.dumps(value)
-    return told if len(told) <= 40 else f"{told[:37]}..."
+    text = json.dumps(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 class _Within:
@@ -343,8 +345,8 @@ def _between(file: BinaryIO, begin: int, end: int) -> bytes:
 def _next_mark(file: BinaryIO, begin: int) -> int | None:
     """Return where the next part of a stream may begin, from a place on; None where none does."""
     while len(chunk := _between(file, begin, begin + SCANNED)) >= 4:
-        if found := MARK.search(chunk):
-            return begin + found.start()
+        if match := MARK.search(chunk):
+            return begin + match.start()
         begin += len(chunk) - 3  # a mark may begin in the last three
     return None
 

@@ -27,8 +27,8 @@ class Latencies:
         if not (cycles := sum(self._counts)):
             return {}
         shares = {"median_ms": 0.5, "p99_ms": 0.99}
-        told = {name: 1e3 * self._quantile(share * cycles) for name, share in shares.items()}
-        return {"cycles": cycles, **told, "longest_ms": 1e3 * self._longest}
+        percentiles = {name: 1e3 * self._quantile(share * cycles) for name, share in shares.items()}
+        return {"cycles": cycles, **percentiles, "longest_ms": 1e3 * self._longest}
 
     def _quantile(self, rank: float) -> float:
         """Return the middle of the bin that holds the duration of a rank, s."""

@@ -73,13 +73,13 @@ def account_of(journal: JournalFile) -> Account:
         if offset is None:
             offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
         index = sequence + offset
-        found, samples = (
+        metadata, samples = (
             _gaps(np.concatenate([[reached - 1], index]), rate_hz),
             samples + len(index),
         )
-        gaps, reached = gaps + found, int(index[-1]) + 1
-    said = None if last_words is None else _said(last_words)
-    if said is None:
+        gaps, reached = gaps + metadata, int(index[-1]) + 1
+    ending = None if last_words is None else _said(last_words)
+    if ending is None:
         # A full disk takes the last words with it: nobody can tell the two apart.
         why = (
             f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its"
@@ -90,7 +90,7 @@ def account_of(journal: JournalFile) -> Account:
         return Account(
             samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked
         )
-    abort, found_out, rows = said
+    abort, found_out, rows = ending
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
     damaged = journal.damaged > 0 or rows != journal.rows
@@ -101,22 +101,22 @@ def _said(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], i
     """Return why a run stopped early, what else it found out, and its number of samples; None where
     that is damaged."""
     try:
-        found = json.loads(last_words[FOUND])
-        said = last_words[ABORT].decode() or None, found, int(last_words[ROWS])
+        metadata = json.loads(last_words[FOUND])
+        ending = last_words[ABORT].decode() or None, metadata, int(last_words[ROWS])
     except (KeyError, ValueError):
         return None
-    return said if isinstance(found, dict) else None
+    return ending if isinstance(metadata, dict) else None
 
 
 def _refuse_other_columns(journal: JournalFile) -> None:
     """Refuse a journal whose columns are none of a run's."""
     fields = {field.name: field for field in journal.schema}
     for name in ("time_s", "sequence", *fields):
-        found, expected = fields.get(name), field_of(name)
-        if found is None or found.type != expected.type:
-            told = "is missing" if found is None else f"holds {found.type}"
+        stored, expected = fields.get(name), field_of(name)
+        if stored is None or stored.type != expected.type:
+            fault = "is missing" if stored is None else f"holds {stored.type}"
             raise ContractError(
-                f"{journal.path}: its column {name} {told}, expected {expected.type}; exoid wrote"
+                f"{journal.path}: its column {name} {fault}, expected {expected.type}; exoid wrote"
                 " no such journal, nothing was changed"
             )
 
@@ -128,9 +128,9 @@ def _positive(journal: JournalFile, *keys: str) -> float:
         value = value.get(key) if isinstance(value, dict) else None
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= LARGEST:
         return value
-    told = "is missing" if value is None else f"is {value!r:.40}"
+    fault = "is missing" if value is None else f"is {value!r:.40}"
     raise ContractError(
-        f"{journal.path}: {'.'.join(keys)} of its metadata {told}, expected a number above 0 and up"
+        f"{journal.path}: {'.'.join(keys)} of its metadata {fault}, expected a number above 0 and up"
         f" to {LARGEST:g}; exoid wrote no such journal, nothing was changed"
     )
 

@@ -52,10 +52,10 @@ def _in_time(
     kept = fine.copy()
     sequence, time = (rows.column(name).to_numpy() for name in ("sequence", "time_s"))
     for k in np.flatnonzero(fine):
-        found = int(sequence[k]), float(time[k])
+        instant = int(sequence[k]), float(time[k])
         if last is not None:
-            samples, seconds = found[0] - last[0], found[1] - last[1]
+            samples, seconds = instant[0] - last[0], instant[1] - last[1]
             kept[k] = samples > 0 and seconds > 0.0 and keeps_time(samples, seconds, rate_hz)
         if kept[k]:
-            last = found
+            last = instant
     return kept, last

@@ -36,11 +36,11 @@ class Limits:
     def violation(self, samples: Row | Answers) -> str | None:
         """Return which limit samples break, None if they keep all."""
         samples_hz = self._rate * self._samples_per_cycle
-        for j, (drive, found) in enumerate(zip(self._rig.drive, samples.drives, strict=True)):
-            if isinstance(found, Reading):
-                if why := sample_violation(drive, self._last.get(j, found), found, samples_hz):
+        for j, (drive, reading) in enumerate(zip(self._rig.drive, samples.drives, strict=True)):
+            if isinstance(reading, Reading):
+                if why := sample_violation(drive, self._last.get(j, reading), reading, samples_hz):
                     return why
-                self._last[j] = found
+                self._last[j] = reading
         return self.cuff_violation(samples)
 
     def cuff_violation(self, samples: Row | Answers) -> str | None:

@@ -45,7 +45,7 @@ class CandidateRows:
         self._last_laden: tuple[tuple[float, ...], list[Run]] = (), self._slow
         self._last_change: tuple[Candidate, NDArray | None, tuple[NDArray, NDArray]] | None = None
 
-    def __call__(self, candidate: Candidate, beside: NDArray | None = None) -> NDArray | None:
+    def __call__(self, candidate: Candidate, others: NDArray | None = None) -> NDArray | None:
         """Return a candidate's rows; None where they are not finite.
 
         Parameters
@@ -60,13 +60,13 @@ class CandidateRows:
         elif candidate.directions:
             shapes = ((shape,) * len(self._kinds) for shape in candidate.directions)
             single = [Candidate(candidate.effect, own) for own in shapes]
-            rows = np.hstack([self._transformed(one, beside) for one in single])
+            rows = np.hstack([self._transformed(one, others) for one in single])
         else:
-            rows = self._transformed(candidate, beside)
+            rows = self._transformed(candidate, others)
         return rows if np.isfinite(rows).all() else None
 
     def with_refitted_bodies(
-        self, candidate: Candidate, beside: NDArray | None = None
+        self, candidate: Candidate, others: NDArray | None = None
     ) -> Candidate:
         """Return a transmission with the rigid bodies of a fit of baseline and transmission
         together.
@@ -78,7 +78,7 @@ class CandidateRows:
         beside : (N, b) array, optional
             Rows of what else is fitted with them.
         """
-        _, refitted = self._change(candidate, beside)
+        _, refitted = self._change(candidate, others)
         bodies = relaxed(refitted, np.array(candidate.bodies) if candidate.bodies else None)
         return replace(candidate, bodies=tuple(bodies.tolist()))
 
@@ -108,41 +108,44 @@ class CandidateRows:
         own = candidate.columns_in(self._kinds)
         return [own.expand(part, r) for r, part in enumerate(parts)]
 
-    def _transformed(self, candidate: Candidate, beside: NDArray | None) -> NDArray:
+    def _transformed(self, candidate: Candidate, others: NDArray | None) -> NDArray:
         """Return what the transformed baseline adds to the plain one, under the values it then has.
 
         Each run has a column of its own where its shape is its own.
         """
-        row, _ = self._change(candidate, beside)
+        row, _ = self._change(candidate, others)
         if not candidate.effect.per_run:
             return row
         numbers = [r for r, run in enumerate(self._slow) if candidate.effect.explains(run.motion)]
         return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
 
-    def _change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
+    def _change(self, candidate: Candidate, others: NDArray | None) -> tuple[NDArray, NDArray]:
         """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its
         values then, (b,)."""
         last = self._last_change
         # Its rows are asked for, then its bodies.
-        if last is None or last[0] != candidate or last[1] is not beside:
-            last = self._last_change = candidate, beside, self._compute_change(candidate, beside)
+        if last is None or last[0] != candidate or last[1] is not others:
+            last = self._last_change = candidate, others, self._compute_change(candidate, others)
         return last[2]
 
     def _compute_change(
-        self, candidate: Candidate, beside: NDArray | None
+        self, candidate: Candidate, others: NDArray | None
     ) -> tuple[NDArray, NDArray]:
         regression, runs = self._regression, self._laden(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
-        made = [
+        transformed = [
             columns_under([candidate.term(r)], run, self._baseline) if acts else self._plain[r]
             for r, (run, acts) in enumerate(zip(runs, acting, strict=True))
         ]
-        columns = regression.rows([c for c, _ in made])
+        columns = regression.rows([c for c, _ in transformed])
         change = regression.rows(
-            [(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)]
+            [
+                (y - run.measured)[:, :, np.newaxis]
+                for (_, y), run in zip(transformed, runs, strict=True)
+            ]
         )
         target = regression.torque_rows + change[:, 0]
-        wide = columns if beside is None else np.hstack([columns, beside])
+        wide = columns if others is None else np.hstack([columns, others])
         values = _least_squares(wide, target)[: columns.shape[1]]
         return ((columns - self._plain_rows) @ values)[:, np.newaxis] - change, values
 

@@ -37,12 +37,12 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
     worn = [
         x * (run.motion.run == "with_human") for x, run in zip(drives, prepared.runs, strict=True)
     ]
-    felt = bool(np.isfinite(prepared.noise.density[joints:]).any())
+    has_cuffs = bool(np.isfinite(prepared.noise.density[joints:]).any())
     kinds = {run.motion.run for run in prepared.runs}
     parts = [(list(laws), _both(drives, zero))]
-    if "with_human" in kinds and (len(kinds) == 2 or felt):
+    if "with_human" in kinds and (len(kinds) == 2 or has_cuffs):
         parts.append(([replace(law, wearer="human") for law in laws], _both(worn, worn)))
-    if felt:
+    if has_cuffs:
         chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
@@ -53,8 +53,8 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
 
 def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the columns of each joint's tones: every run has phases of its own."""
-    for j, found in enumerate(prepared.lines):
-        tones = np.array([line.cycles for line in found.of_kind(Kind.TIME)])
+    for j, lines in enumerate(prepared.lines):
+        tones = np.array([line.cycles for line in lines.of_kind(Kind.TIME)])
         if not len(tones):
             continue
         width, count = 2 * len(tones), len(prepared.runs)
@@ -79,11 +79,11 @@ def _coarse_steps(
     usable = [run.motion.valid[:, np.newaxis] & away_from_reversals(run.motion) for run in runs]
     for j in range(joints):
         rms = float(prepared.torque[j])
-        torque, left = (
+        torque, residuals = (
             [x[u[:, j], j] for x, u in zip(one, usable, strict=True)]
             for one in (predicted, residual)
         )
-        step = coarse_step(torque, left, rms)
+        step = coarse_step(torque, residuals, rms)
         if step is None:
             continue
         columns = [np.zeros((*run.measured.shape, 1)) for run in runs]
@@ -101,7 +101,7 @@ def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
 
 def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[Curve], NDArray]:
     """Return every curve of time, and their rows (N, t), the baseline projected out."""
-    told, rows = [], []
+    kept, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)
         # Noise of a density adds twice that over the duration to the square of a cosine's
@@ -113,6 +113,6 @@ def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list
             parts = [np.zeros((*other.measured.shape, len(variance))) for other in prepared.runs]
             parts[r][:, j] = curves * prepared.torque[j]
             share = np.nan_to_num(noise[j] / prepared.torque[j] ** 2)
-            told += [Curve(j, r, float(v), float(s)) for v, s in zip(variance, share, strict=True)]
+            kept += [Curve(j, r, float(v), float(s)) for v, s in zip(variance, share, strict=True)]
             rows.append(regression.project(regression.rows(parts)))
-    return told, np.hstack(rows)
+    return kept, np.hstack(rows)

@@ -82,23 +82,23 @@ class Library:
         Beside a large cause a small one has another shape than alone.
         """
         grown, main = self, self.causes[number]
-        beside = np.hstack([main.columns, main.derivative])
-        alone = ShapeRefinement(self.rows, self.regression, beside)
-        found = [
+        rows_of_main = np.hstack([main.columns, main.derivative])
+        alone = ShapeRefinement(self.rows, self.regression, rows_of_main)
+        partners = [
             alone.best_of(fits)
             for fits in self.screened
             if fits[0].candidate.label != main.candidate.label
         ]
-        fits = sorted((f for f in found if f is not None), key=lambda f: -f.worth)
+        fits = sorted((f for f in partners if f is not None), key=lambda f: -f.worth)
         for fitted in fits[:most]:
-            none = np.zeros((len(beside), 0))
+            none = np.zeros((len(rows_of_main), 0))
             cause = Cause.of(fitted, none, self.regression, first=True)
             grown = grown if cause is None else grown._with([main, cause])
         return grown
 
-    def _with(self, made: Sequence[Cause], laws: Sequence[str] = ()) -> "Library":
+    def _with(self, added: Sequence[Cause], laws: Sequence[str] = ()) -> "Library":
         """Return the library with a set of causes refined beside one another as well."""
-        own = self._together(list(made), laws)
+        own = self._together(list(added), laws)
         if own is None:
             return self
         count, number = len(self.causes), len(self.contexts)
@@ -106,28 +106,30 @@ class Library:
         context = Context(tuple(range(count, count + len(own))), tuple(laws))
         return replace(self, causes=(*self.causes, *own), contexts=(*self.contexts, context))
 
-    def _together(self, made: list[Cause], laws: Sequence[str]) -> list[Cause] | None:
+    def _together(self, refined_causes: list[Cause], laws: Sequence[str]) -> list[Cause] | None:
         """Return the causes of a set, each refined with the rest of it fitted freely."""
         regression = self.regression
-        shaped = [n for n, cause in enumerate(made) if has_shapes(cause.candidate)]
-        if not shaped or len(made) + len(laws) < 2:
+        shaped = [n for n, cause in enumerate(refined_causes) if has_shapes(cause.candidate)]
+        if not shaped or len(refined_causes) + len(laws) < 2:
             return None
         rows = [self._law(label) for label in laws]
         for _ in range(SWEEPS):
             for n in shaped:
                 others = [
-                    np.hstack([c.columns, c.derivative]) for k, c in enumerate(made) if k != n
+                    np.hstack([c.columns, c.derivative])
+                    for k, c in enumerate(refined_causes)
+                    if k != n
                 ]
-                beside = np.hstack([*rows, *others])
-                alone = ShapeRefinement(self.rows, regression, beside)
-                start = alone.fit(made[n].candidate)
+                other_rows = np.hstack([*rows, *others])
+                alone = ShapeRefinement(self.rows, regression, other_rows)
+                start = alone.fit(refined_causes[n].candidate)
                 if start is None:
                     return None
                 cause = Cause.of(*alone.refined(start), regression, first=True)
                 if cause is None:
                     return None
-                made[n] = cause
-        return made
+                refined_causes[n] = cause
+        return refined_causes
 
     def _law(self, variant: str) -> NDArray:
         """Return the rows of a law, (N, k)."""
@@ -188,15 +190,15 @@ def _ripples(
     prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression
 ) -> list[Cause]:
     """Return each joint's ripple as order tracking has it, at the full sampling rate."""
-    found, machine = [], prepared.baseline.machine
+    ripples, machine = [], prepared.baseline.machine
     for joint in prepared.baseline.joints:
         if orders := orders_of(joint, prepared):
             effect = Cogging(joint, on=machine, lines=len(orders))
             fitted = alone.fit(Candidate(effect, (orders,) * len(prepared.runs)))
             if fitted is not None:
                 none = np.zeros((len(fitted.columns), 0))
-                found.append(Cause.of(fitted, none, regression, first=True))
-    return [cause for cause in found if cause is not None]
+                ripples.append(Cause.of(fitted, none, regression, first=True))
+    return [cause for cause in ripples if cause is not None]
 
 
 def orders_of(joint: str, prepared: Prepared) -> tuple[float, ...]:
@@ -234,4 +236,4 @@ def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[F
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]
     refined = [alone.refined(kind[0]) for kind in (plain, refitted) if kind]
-    return max(refined, key=lambda found: found[0].worth)
+    return max(refined, key=lambda pair: pair[0].worth)

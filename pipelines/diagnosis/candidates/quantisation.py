@@ -41,12 +41,12 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     rms : float
         The joint's torque, N·m.
     """
-    x, left = np.concatenate(torque), np.concatenate(residual)
+    x, y = np.concatenate(torque), np.concatenate(residual)
     if not len(x) or not rms > 0.0:
         return None
     middle = float(np.median(x))
     edges = middle + rms * np.linspace(-REACH, REACH, BINS + 1)
-    counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=left)[0]
+    counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=y)[0]
     # Far from zero the phase of a line turns faster with its step.
     count = round(PEAKS * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
     per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms

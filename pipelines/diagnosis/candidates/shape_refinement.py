@@ -80,14 +80,14 @@ class ShapeRefinement:
         self,
         rows: CandidateRows,
         regression: DecisionRegression,
-        beside: NDArray | None = None,
+        others: NDArray | None = None,
     ) -> None:
         """Prepare; ``beside`` (N, b) are rows of what else is fitted freely."""
-        self._rows, self._regression, self._beside = rows, regression, beside
+        self._rows, self._regression, self._beside = rows, regression, others
         measured = regression.measured
         basis = np.zeros((len(measured), 0))
-        if beside is not None and beside.shape[1]:
-            basis, _ = np.linalg.qr(regression.project(beside))
+        if others is not None and others.shape[1]:
+            basis, _ = np.linalg.qr(regression.project(others))
         self._basis = basis
         self._measured = measured - basis @ (basis.T @ measured)
 
@@ -110,8 +110,8 @@ class ShapeRefinement:
         amplitudes, gain = _solved(plain, self._measured)
         as_is = gain
         if candidate.bends and not candidate.directions:
-            left = self._measured - plain.sum(axis=1)
-            as_is = 0.5 * float(self._measured @ self._measured - left @ left)
+            remainder = self._measured - plain.sum(axis=1)
+            as_is = 0.5 * float(self._measured @ self._measured - remainder @ remainder)
         return Fitted(candidate, columns, amplitudes, gain, as_is)
 
     def best_of(self, fits: Sequence[Fitted]) -> Fitted | None:
@@ -132,7 +132,7 @@ class ShapeRefinement:
             return self._refined(start)
         own = None if start.candidate.bodies else self.fit(self._with_own_bodies(start.candidate))
         starts = [start] if own is None else [start, own]
-        best, slopes = max(map(self._refined, starts), key=lambda found: found[0].worth)
+        best, slopes = max(map(self._refined, starts), key=lambda pair: pair[0].worth)
         for _ in range(BODY_REFITS):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
             refined = None if ahead is None else self._refined(ahead)
@@ -268,8 +268,8 @@ class ShapeRefinement:
         parts = [slopes] if transforms else [fitted.columns, slopes]
         plain = self._project(np.hstack(parts))
         # What transforms the motion has no amplitude: what it leaves is the shape's to explain.
-        left = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
-        solution, _ = _solved(plain, left)
+        remainder = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
+        solution, _ = _solved(plain, remainder)
         length = 1.0
         for _ in range(LENGTHS):
             candidate = fitted.candidate

@@ -36,25 +36,25 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     motions : sequence of Motion
         All runs of one leg, made from recordings, so that the measured angles are there.
     """
-    found = [
+    faults = [
         fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
     ]
-    found = _hopeless(motions, found)
+    faults = _hopeless(motions, faults)
     rightly_wired = []
-    for motion in excluding(motions, found):
+    for motion in excluding(motions, faults):
         if not motion.valid.any():
             continue
-        found += sampling_faults(motion)
+        faults += sampling_faults(motion)
         wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
         wrong = wrong or [*sign_faults(motion)]
         run = averages(motion)
         if run is not None and not wrong:
             wrong = [*wiring_faults(run), *cuff_faults(run)]
             rightly_wired += [] if wrong else [run]
-        found += wrong
-    found += torque_unit_faults(rightly_wired)
+        faults += wrong
+    faults += torque_unit_faults(rightly_wired)
     files = [motion.file for motion in motions]
-    return sorted(found, key=lambda fault: files.index(fault.file))
+    return sorted(faults, key=lambda fault: files.index(fault.file))
 
 
 def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
@@ -66,22 +66,22 @@ def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]
     """
     sound = excluding(motions, faults)
     hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
-    told: list[Fault] = []
+    reported: list[Fault] = []
     for fault in faults:
         run = hopeless.get(fault.file)
         if run is None:
-            told.append(fault)
+            reported.append(fault)
         elif fault.samples is None or not _others_suffice(run, motions, hopeless):
-            told.append(replace(fault, samples=None))
+            reported.append(replace(fault, samples=None))
         else:
-            told.append(
+            reported.append(
                 replace(
                     fault,
                     what=f"{fault.what}; this run is left out",
                     samples=np.ones(len(run), bool),
                 )
             )
-    return told
+    return reported
 
 
 def _too_little(whole: Motion, sound: Motion) -> bool:

@@ -87,12 +87,12 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     )
     for j in stale[:1] if together else stale:
         samples = same[:, j]
-        share, found = samples.mean(), stretches(samples)
+        share, intervals = samples.mean(), stretches(samples)
         who = "every device" if together else f"{the(motion.joints[j])}'s drive"
         yield Fault(
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
-            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, found)}: {who}"
+            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}: {who}"
             " gave stale values, the last sample's again, though the joint moved; wait for new"
             " data before reading",
             samples,
@@ -133,18 +133,18 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
     angle = motion.measured_angle[:, joint]
     still = constant_stretches(angle, round(STUCK_ANGLE_S * motion.sample_rate_hz))
     lasting = still[:, 1] - still[:, 0]
-    found = still[
+    stuck = still[
         [_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]
     ]
-    if len(found):
-        samples = mask_of(found, len(angle))
+    if len(stuck):
+        samples = mask_of(stuck, len(angle))
         # The filter carries the standstill on into its neighbourhood.
         reach = int(np.ceil(EDGE_PERIODS * motion.sample_rate_hz / motion.cutoff_hz))
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),
             f"{the(motion.joints[joint])}'s angle is stuck: constant for"
-            f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, found)}, while the rest"
+            f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, stuck)}, while the rest"
             " moved on; check the encoder's cable and the drive's status",
             dilate(samples, reach),
         )
@@ -236,10 +236,10 @@ def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
     return bool(rest.any()) and float(np.mean(torque[1:][rest] == torque[:-1][rest])) > IN_STEPS
 
 
-def _outlasts(found: NDArray) -> NDArray:
+def _outlasts(intervals: NDArray) -> NDArray:
     """Tell which of the stretches (runs, 2) lasts ``OUTLASTS`` times as long as any other, (runs,)
     bool."""
-    lasting = found[:, 1] - found[:, 0]
+    lasting = intervals[:, 1] - intervals[:, 0]
     second = np.partition(lasting, -2)[-2] if len(lasting) > 1 else 0
     return np.asarray(lasting > OUTLASTS * second, dtype=bool)
 

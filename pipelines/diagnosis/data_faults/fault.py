@@ -45,23 +45,23 @@ def stretches(marked: NDArray) -> NDArray:
 def constant_stretches(x: NDArray, least: int) -> NDArray:
     """Return first and one past the last of each run of at least ``least`` equal values in (n,),
     (runs, 2)."""
-    found = stretches(x[1:] == x[:-1])
-    found[:, 1] += 1
-    return found[found[:, 1] - found[:, 0] >= least]
+    intervals = stretches(x[1:] == x[:-1])
+    intervals[:, 1] += 1
+    return intervals[intervals[:, 1] - intervals[:, 0] >= least]
 
 
-def mask_of(found: NDArray, n: int) -> NDArray:
+def mask_of(intervals: NDArray, n: int) -> NDArray:
     """Return the samples of stretches (runs, 2) as (n,) bool."""
     marked = np.zeros(n, dtype=bool)
-    for start, stop in found:
+    for start, stop in intervals:
         marked[start:stop] = True
     return marked
 
 
-def when(motion: Motion, found: NDArray) -> str:
+def when(motion: Motion, intervals: NDArray) -> str:
     """Say where in time stretches (runs, 2) lie."""
-    if len(found) == 1:
-        start, stop = found[0]
+    if len(intervals) == 1:
+        start, stop = intervals[0]
         return f"from {motion.time[start]:.2f} s to {motion.time[stop - 1]:.2f} s"
-    first, last = motion.time[found[0, 0]], motion.time[found[-1, 1] - 1]
-    return f"{len(found)} times between {first:.2f} s and {last:.2f} s"
+    first, last = motion.time[intervals[0, 0]], motion.time[intervals[-1, 1] - 1]
+    return f"{len(intervals)} times between {first:.2f} s and {last:.2f} s"

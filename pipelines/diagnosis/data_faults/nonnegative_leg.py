@@ -100,20 +100,21 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
     scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
     power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
     root = np.sqrt(np.maximum(power, 0.0))[:, np.newaxis] * direction.T
-    multiples, left = nnls(root[:, :-1], root[:, -1])
-    return left**2, multiples * scale[-1] / scale[:-1]
+    multiples, misfit = nnls(root[:, :-1], root[:, -1])
+    return misfit**2, multiples * scale[-1] / scale[:-1]
 
 
 def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
     """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros
     are free."""
     g = run.motion.geometry
-    felt = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
-    wide = [np.broadcast_to(unit, (len(felt), 2, 3)) for unit in ZEROS]
+    measured = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
+    wide = [np.broadcast_to(unit, (len(measured), 2, 3)) for unit in ZEROS]
     zeros = np.stack([cuff_torque(unit[:, 0], unit[:, 1], run.q, g) for unit in wide], -1)
-    weight = 1.0 / np.maximum(felt.std(axis=0), 1e-12)
+    weight = 1.0 / np.maximum(measured.std(axis=0), 1e-12)
     stacked = [
-        np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)
+        np.concatenate([x[:, j] * weight[j] for j in range(2)])
+        for x in (run.body(), measured, zeros)
     ]
     return fit(stacked[0], stacked[1], stacked[2])[0]
 

@@ -34,12 +34,12 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
     run = observe(motion)
     if run.usable[:, 0].sum() < LEAST_BLOCKS:
         return
-    found, half = _inertia_and_loss(run, baseline_of([run]))
-    if not (found + half < 0.0).all():
+    estimates, half = _inertia_and_loss(run, baseline_of([run]))
+    if not (estimates + half < 0.0).all():
         return
     (joint,), inertia = motion.machine.joints, motion.machine.mechanism.parameters[0]
     channel = column(motion, 0, "torque")
-    (body, loss), (low, lost_low), (high, lost_high) = found, found - half, found + half
+    (body, loss), (low, lost_low), (high, lost_high) = estimates, estimates - half, estimates + half
     yield Fault(
         motion.file,
         channel,
@@ -60,22 +60,24 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
     counts for neither.
     """
     motion, usable = run.motion, run.usable[:, :1]
-    beside = np.stack([np.ones_like(motion.q), motion.q], axis=2)
+    constants = np.stack([np.ones_like(motion.q), motion.q], axis=2)
     columns = (
-        np.concatenate([columns_under((), run, model)[0][:, 0], run.average(beside)[:, 0]], axis=1)
+        np.concatenate(
+            [columns_under((), run, model)[0][:, 0], run.average(constants)[:, 0]], axis=1
+        )
         * usable
     )
-    told = np.zeros((2, columns.shape[1]))
-    told[0, 0] = 1.0
+    information = np.zeros((2, columns.shape[1]))
+    information[0, 0] = 1.0
     friction = model.layout.terms[1].slice
-    told[1, friction] = (run.state[1] * columns[:, friction]).sum(axis=0) / usable.sum()
+    information[1, friction] = (run.state[1] * columns[:, friction]).sum(axis=0) / usable.sum()
     scale = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-12)
-    columns, told = columns / scale, told / scale
+    columns, information = columns / scale, information / scale
     torque = run.measured[:, :1] * usable
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
     values = inverse @ (columns.T @ torque[:, 0])
     scores = (torque - (columns @ values)[:, np.newaxis]) * columns
     segment = motion.segment[run.starts]
     covariance, critical, _ = long_run_covariance(lambda: by_segment(segment, scores), len(values))
-    spread = told @ inverse @ covariance @ inverse @ told.T
-    return told @ values, critical * np.sqrt(np.diag(spread))
+    spread = information @ inverse @ covariance @ inverse @ information.T
+    return information @ values, critical * np.sqrt(np.diag(spread))

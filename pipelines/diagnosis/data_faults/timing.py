@@ -197,16 +197,16 @@ def _judged(asked: _Asked) -> tuple[str, bool]:
             ),
             False,
         )
-    told = "the angles are smooth against the sample count, so only the stamps are wrong: "
+    reason = "the angles are smooth against the sample count, so only the stamps are wrong: "
     if asked.share < BELOW:
         return (
             (
-                f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing"
+                f"{reason}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing"
                 " is lost"
             ),
             False,
         )
-    return f"{told}rebuild time_s from the device's counter and sample rate", True
+    return f"{reason}rebuild time_s from the device's counter and sample rate", True
 
 
 def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:

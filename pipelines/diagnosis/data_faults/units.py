@@ -149,8 +149,8 @@ def drive_law(motion: Motion, joint: int) -> float | None:
     columns = np.column_stack([reference - angle, speed, motion.dq[:, joint]])[good]
     torque = motion.torque[good, joint]
     multiples = np.linalg.lstsq(columns.T @ columns, columns.T @ torque)[0]
-    left = np.sum((torque - columns @ multiples) ** 2)
-    holds = left < (1.0 - LAW_HOLDS) * np.sum(torque**2)
+    misfit = np.sum((torque - columns @ multiples) ** 2)
+    holds = misfit < (1.0 - LAW_HOLDS) * np.sum(torque**2)
     return float(abs(multiples[0])) / stiffness if holds else None
 
 
@@ -202,9 +202,9 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
         if first.motion.run != second.motion.run:
             continue
         for j in range(2):
-            left, multiples = fit(first.joint_columns(j), first.torque[:, j])
+            misfit, multiples = fit(first.joint_columns(j), first.torque[:, j])
             factor = _times_predicted(second, multiples, j)
-            if left > 1.0 - EXPLAINED or 1 / WRONG < factor < WRONG:
+            if misfit > 1.0 - EXPLAINED or 1 / WRONG < factor < WRONG:
                 continue
             odd, like = (second, first) if _less_plausible(second, first) else (first, second)
             times = factor if odd is second else 1 / max(factor, 1e-6)

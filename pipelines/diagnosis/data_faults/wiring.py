@@ -95,15 +95,15 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
 
 def wiring_faults(run: Averages) -> Iterator[Fault]:
     """Yield channels that only make a leg when exchanged or reversed."""
-    left: dict[tuple[Reading, int, int, float], float] = {}
+    misfits: dict[tuple[Reading, int, int, float], float] = {}
     for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
         columns = run.joint_columns(joint, reading)
         for channel, sign in product((HIP, KNEE), (1.0, -1.0)):
-            left[reading, joint, channel, sign] = fit(columns, sign * run.torque[:, channel])[0]
+            misfits[reading, joint, channel, sign] = fit(columns, sign * run.torque[:, channel])[0]
 
     def misfit(wiring: Wiring) -> float:
         reading, channels, signs, *_ = wiring
-        return sum(left[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
+        return sum(misfits[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
 
     as_recorded, best = (
         WIRINGS[0],

@@ -169,10 +169,10 @@ class Excess:
 def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Dependence]:
     """Rank what the residuals (m, O) of the drives depend on, most first, joint by joint."""
     machine = runs[0].motion.machine
-    found = []
+    results = []
     for j, joint in enumerate(machine.names):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
-        made = [
+        terms = [
             Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s))
             for v, s in shares.items()
         ]
@@ -183,10 +183,10 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
             if in_step
             else "that is no harmonic of the motion"
         )
-        said = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
-        made.append(Dependence(joint, "tone", share, said))
-        found += sorted(made, key=_rank, reverse=True)
-    return found
+        sentence = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
+        terms.append(Dependence(joint, "tone", share, sentence))
+        results += sorted(terms, key=_rank, reverse=True)
+    return results
 
 
 def _rank(dependence: Dependence) -> float:
@@ -234,8 +234,8 @@ def variable_share(
     """Return the share of a joint's residual (m, O) variance that smooth curves along a variable
     foretell."""
     total = error = 0.0
-    for some, left in by_kind(runs, residuals):
-        y = pooled(some, [r[:, j] for r in left], j)
+    for some, of_kind in by_kind(runs, residuals):
+        y = pooled(some, [r[:, j] for r in of_kind], j)
         if not len(y):
             continue
         y = y - y.mean()
@@ -311,7 +311,7 @@ def _tone_in(
     all folds but one and judged on that one.
     """
     total = error = 0.0
-    found = []
+    tones = []
     for held in range(FOLDS):
         rest = [run.usable[:, j] & (run.fold != held) for run in runs]
         frequency = _strongest(
@@ -319,7 +319,7 @@ def _tone_in(
             [part(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)],
             above,
         )
-        found.append(frequency)
+        tones.append(frequency)
         for run, learnt, residual in zip(runs, rest, residuals, strict=True):
             judged = run.usable[:, j] & (run.fold == held)
             if not learnt.any():
@@ -330,7 +330,7 @@ def _tone_in(
             mean = residual[learnt, j].mean()
             total += float(np.sum((residual[judged, j] - mean) ** 2))
             error += float(np.sum((residual[judged, j] - A[judged] @ values) ** 2))
-    return float(np.median(found)), max(1.0 - error / total, 0.0) if total > 0 else 0.0
+    return float(np.median(tones)), max(1.0 - error / total, 0.0) if total > 0 else 0.0
 
 
 def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
@@ -383,7 +383,7 @@ def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) ->
 
 def describe(
     machine: Machine,
-    found: Sequence[Dependence],
+    results: Sequence[Dependence],
     above: Sequence[Excess],
     together: Sequence[Together] = (),
 ) -> str:
@@ -393,11 +393,11 @@ def describe(
     ``together`` are pairs of variables that foretell the residual (see ``smooth_term``).
     """
     squares = {
-        d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in found
+        d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in results
     }
     joint = max(squares, key=lambda name: squares[name])
     where = _where([e for e in above if e.joint == joint])
-    own = [d for d in found if d.joint == joint]
+    own = [d for d in results if d.joint == joint]
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
         words = " together with ".join(

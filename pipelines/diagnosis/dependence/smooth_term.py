@@ -67,12 +67,12 @@ class SmoothTerm:
 
     def describe(self) -> str:
         """Say what the surfaces are over."""
-        said = []
+        parts = []
         for surface in self.surfaces:
             names = " and ".join(v.name.replace("_", " ") for v in surface.curve.variables)
             where = f"{surface.joint}, {' and '.join(surface.runs)}"
-            said.append(f"{where}: {names} ({100 * surface.share:.0f} % of what is left)")
-        return "; ".join(said) or "no smooth term earned its place"
+            parts.append(f"{where}: {names} ({100 * surface.share:.0f} % of what is left)")
+        return "; ".join(parts) or "no smooth term earned its place"
 
 
 def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm:
@@ -81,10 +81,10 @@ def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm
     With both kinds of run a law must foretell one kind from the other, or be at home in the one
     that has most of the error.
     """
-    made = [
+    terms = [
         _of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))
     ]
-    return SmoothTerm(tuple(surface for surface in made if surface is not None))
+    return SmoothTerm(tuple(surface for surface in terms if surface is not None))
 
 
 def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:

@@ -259,8 +259,8 @@ def detectability(
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        found = list(_looks(effect, sight, power))
-        looks[effect] = [look for look in found if look.plausible] or found
+        results = list(_looks(effect, sight, power))
+        looks[effect] = [look for look in results if look.plausible] or results
     chosen = [_usual(own) for own in looks.values()]
     unexplained = _unexplained(chosen, list(looks.values()))
     return [
@@ -293,9 +293,9 @@ def detectability_of_recorded(
     )
 
 
-def as_json(found: Sequence[Detectable]) -> dict:
+def as_json(results: Sequence[Detectable]) -> dict:
     """Return what ``detectability.json`` holds."""
-    return {"contract": "detectability/1", "causes": [one.as_json() for one in found]}
+    return {"contract": "detectability/1", "causes": [one.as_json() for one in results]}
 
 
 @cache
@@ -366,8 +366,8 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
     direction = _direction(effect, columns, sight)
     own = candidate.columns_in([run.motion.run for run in sight.runs])
     span = sight.left([own.expand(column, r) for r, column in enumerate(columns)])
-    left = sight.left(direction)[:, 0]
-    growth, by = _growth(effect, left, direction, span.shape[1], sight, power)
+    remainder = sight.left(direction)[:, 0]
+    growth, by = _growth(effect, remainder, direction, span.shape[1], sight, power)
     size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
     if effect.linear[0].typical[0] < 0:
@@ -378,8 +378,8 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
         size,
         size * unit if np.isfinite(size) else np.inf,
         by,
-        _squared(left) * growth if np.isfinite(growth) else np.inf,
-        _unit(left),
+        _squared(remainder) * growth if np.isfinite(growth) else np.inf,
+        _unit(remainder),
         _orthonormal(span),
         _orthonormal(sight.left(_wide(effect, columns, _levels(effect), sight.runs))),
         least * unit < torque and largest * unit > LEAST * torque,
@@ -438,9 +438,9 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
         shape = zero + (start - zero) / reach * np.exp(x)
         column = _bend(replace(candidate, shapes=(tuple(shape),) * len(sight.runs)), sight)
-        left = sight.left(column)[:, 0]
-        growth, by = _growth(effect, left, column, 1, sight, power)
-        return growth, by, left, column, float(effect.physical(effect.completed(shape))[0])
+        remainder = sight.left(column)[:, 0]
+        growth, by = _growth(effect, remainder, column, 1, sight, power)
+        return growth, by, remainder, column, float(effect.physical(effect.completed(shape))[0])
 
     x0 = float(np.log(reach))
     x1 = x0 - np.log(1.5)
@@ -453,17 +453,17 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
             break
         x0, x1 = x1, x1 - float(np.clip(np.log(now[0]) / slope, -2.0, 2.0))
         before, now = now, at(x1)
-    growth, by, left, column, value = now
+    growth, by, remainder, column, value = now
     seen = np.isfinite(growth) and abs(np.log(growth)) < 0.2
     return Look(
         (),
         value if seen else np.inf,
         sight.rms(effect, column) if seen else np.inf,
         by,
-        _squared(left) if seen else np.inf,
-        _unit(left),
-        _orthonormal(left[:, np.newaxis]),
-        np.zeros((len(left), 0)),
+        _squared(remainder) if seen else np.inf,
+        _unit(remainder),
+        _orthonormal(remainder[:, np.newaxis]),
+        np.zeros((len(remainder), 0)),
         plausible=True,
     )
 
@@ -483,17 +483,17 @@ def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
 
 def _growth(
     effect: Effect,
-    left: NDArray,
+    remainder: NDArray,
     column: Sequence[NDArray],
     columns: int,
     sight: Sight,
     power: float,
 ) -> tuple[float, str]:
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
-    if _squared(left) <= NOTHING * _squared(sight.rows(column)[:, 0]):
+    if _squared(remainder) <= NOTHING * _squared(sight.rows(column)[:, 0]):
         return np.inf, "noise"
     price = 0.5 * columns * np.log(sight.independent) - weights(CRITERIA)[FEATURES.index("cause")]
-    by_noise = needed_noncentrality(columns, price, power) / _squared(left)
+    by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
     # A good rig has a little of the effect, as if its amplitude were known to so much.
     share = sight.share(effect, column)
     by_background = (
@@ -553,11 +553,11 @@ def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray
     every = [other for others in looks for other in others]
     directions = np.array([look.left for look in chosen])
     by_level = 1.0 - _explained(directions, [other.level for other in every])
-    left = np.maximum(1.0 - _explained(directions, [other.span for other in every]), 0.0)
-    for row, look, level in zip(left, chosen, by_level, strict=True):
+    shares = np.maximum(1.0 - _explained(directions, [other.span for other in every]), 0.0)
+    for row, look, level in zip(shares, chosen, by_level, strict=True):
         row[_alike(look, level)] = 1.0
     first = np.cumsum([0, *(len(others) for others in looks[:-1])])
-    return np.minimum.reduceat(left, first, axis=1)
+    return np.minimum.reduceat(shares, first, axis=1)
 
 
 def _explained(directions: NDArray, spans: Sequence[NDArray]) -> NDArray:

@@ -13,11 +13,13 @@ from pipelines.plotting.style import BLUE, GREY, ORANGE, STYLE, save
 from pipelines.wording.label import effect_labelled, title_in_words
 
 
-def draw(found: Sequence[Detectable], stem: Path, title: str) -> None:
+def draw(results: Sequence[Detectable], stem: Path, title: str) -> None:
     """Write the bars as PNG and PDF; a cause of the whole leg stands with the hip."""
-    first = next(one.effect.joint for one in found if one.effect.joint)
-    joints = list(dict.fromkeys([first, *(one.effect.joint for one in found if one.effect.joint)]))
-    groups = [[one for one in found if (one.effect.joint or first) == joint] for joint in joints]
+    first = next(one.effect.joint for one in results if one.effect.joint)
+    joints = list(
+        dict.fromkeys([first, *(one.effect.joint for one in results if one.effect.joint)])
+    )
+    groups = [[one for one in results if (one.effect.joint or first) == joint] for joint in joints]
     height = 0.9 + 0.22 * max(len(group) for group in groups)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(

@@ -28,13 +28,15 @@ def planned_motions(
     q, dq, ddq = trajectory.at(time)
     geometry = Geometry(thigh_length_m=plant.thigh_length_m, gravity_m_s2=plant.gravity_m_s2)
     Y = LEG.regressor(q, dq, ddq, geometry)
-    made = []
+    motions = []
     for kind in kinds:
         X = np.array(plant.exo_inertial) + (
             np.array(plant.human_inertial) if kind == "with_human" else 0.0
         )
-        made.append(_motion(time, (q, dq, ddq), Y @ X, kind, plant, geometry, trajectory, rate_hz))
-    return made
+        motions.append(
+            _motion(time, (q, dq, ddq), Y @ X, kind, plant, geometry, trajectory, rate_hz)
+        )
+    return motions
 
 
 def _motion(

@@ -94,8 +94,8 @@ class DecisionRegression:
         rows = blank.rows(baseline)
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
         basis = _orthonormal(rows)
-        left = measured - basis @ (basis.T @ measured)
-        return replace(blank, baseline=rows, torque_rows=measured, basis=basis, measured=left)
+        residual = measured - basis @ (basis.T @ measured)
+        return replace(blank, baseline=rows, torque_rows=measured, basis=basis, measured=residual)
 
     @property
     def joints(self) -> int:

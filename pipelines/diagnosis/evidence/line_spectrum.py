@@ -109,10 +109,10 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     for channel in channels:
         # Each score is dealt to its two neighbours on the grid.
         place = (channel.grid.angle - first) / step
-        left = place.astype(int)
-        share = place - left
-        total += np.bincount(left, channel.score * (1.0 - share), len(total))
-        total += np.bincount(left + 1, channel.score * share, len(total))
+        below = place.astype(int)
+        share = place - below
+        total += np.bincount(below, channel.score * (1.0 - share), len(total))
+        total += np.bincount(below + 1, channel.score * share, len(total))
     points = max(len(total), int(OVERSAMPLED * finest / searched.width))
     length = fft.next_fast_len(points, real=True)
     transform = fft.rfft(total, length)
@@ -124,9 +124,9 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     # What was dealt so is damped by the square of a sinc.
     power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
     some = orders[:: max(1, len(orders) // 256)]
-    told = np.sum([information_at(channel, some) for channel in channels], axis=0)
-    told = np.maximum(told, LEAST_INFORMED * np.max(told))
-    ratio = power / np.interp(orders, some, told)
+    information = np.sum([information_at(channel, some) for channel in channels], axis=0)
+    information = np.maximum(information, LEAST_INFORMED * np.max(information))
+    ratio = power / np.interp(orders, some, information)
     level = _level(ratio, OVERSAMPLED * AROUND_IN_ANGLE, 1)
     return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1)
 
@@ -151,8 +151,8 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
         grid = channel.grid
         x = np.zeros(round(grid.rate_hz / step))
         x[grid.place] = channel.score
-        told = np.maximum(len(channel.score) * channel.weight(hz), TINY)
-        ratio += np.abs(fft.rfft(x)[kept]) ** 2 / told
+        information = np.maximum(len(channel.score) * channel.weight(hz), TINY)
+        ratio += np.abs(fft.rfft(x)[kept]) ** 2 / information
     level = _level(ratio, 2 * AROUND_IN_TIME, len(channels))
     if channels[0].grid.period_s:
         level = _with_harmonics(hz, ratio, level, channels[0].grid.period_s, len(channels))
@@ -187,8 +187,8 @@ def _with_harmonics(
     place = np.clip(np.round((harmonics - hz[0]) / step).astype(int), 1, len(hz) - 2)
     at = np.maximum(np.maximum(ratio[place - 1], ratio[place]), ratio[place + 1])
     padded = np.pad(at, HARMONICS, mode="edge")
-    beside = [np.roll(padded, k) for k in range(-HARMONICS, HARMONICS + 1) if k]
-    highest = np.max(beside, axis=0)[HARMONICS:-HARMONICS] / phases
+    neighbours = [np.roll(padded, k) for k in range(-HARMONICS, HARMONICS + 1) if k]
+    highest = np.max(neighbours, axis=0)[HARMONICS:-HARMONICS] / phases
     number = np.round(hz * period_s)
     near = np.abs(hz * period_s - number) < 2.0 * step * period_s
     raised = highest[np.clip(number - first, 0, len(harmonics) - 1).astype(int)]

@@ -142,7 +142,9 @@ def lines_in(motions: Sequence[Motion], residuals: Sequence[NDArray]) -> list[Jo
         One for each joint, as of ``lines_of``.
     """
     machine = motions[0].machine
-    each = [traces_of(motion, left) for motion, left in zip(motions, residuals, strict=True)]
+    each = [
+        traces_of(motion, residual) for motion, residual in zip(motions, residuals, strict=True)
+    ]
     ripples = [Cogging(joint, on=machine) for joint in machine.names]
     bounds = [ripple.shape[0].typical for ripple in ripples]
     return lines_of([list(traces) for traces in zip(*each, strict=True)], bounds)
@@ -305,25 +307,30 @@ class _Search:
                 for waves, channel in zip(self.waves, channels, strict=True)
             ]
         )
-        told = np.array([0.5 * information(channel, kind, cycles) for channel in channels])
+        information_of = np.array(
+            [0.5 * information(channel, kind, cycles) for channel in channels]
+        )
         if kind is Kind.ANGLE:
-            products, told = np.broadcast_to(products.sum(axis=0), products.shape), told.sum()
-        amplitudes = (products.T / told).T[:, np.newaxis]
+            products, information_of = (
+                np.broadcast_to(products.sum(axis=0), products.shape),
+                information_of.sum(),
+            )
+        amplitudes = (products.T / information_of).T[:, np.newaxis]
         of_kind = {known.kind: known for known in lines}
         of_kind[kind] = self._between(*of_kind[kind].with_one(cycles, amplitudes), channels)
         return list(of_kind.values())
 
     def _sharpened(self, hz: float, channels: Sequence[Channel]) -> float:
         """Return the frequency of a hum, from its power a quarter of a width to each side."""
-        beside = 0.25 / self.longest_s
+        step = 0.25 / self.longest_s
         powers = [
             sum(
                 abs(np.exp(2j * np.pi * x * waves.grid.time) @ channel.score) ** 2
                 for waves, channel in zip(self.waves, channels, strict=True)
             )
-            for x in (hz - beside, hz, hz + beside)
+            for x in (hz - step, hz, hz + step)
         ]
-        return hz + beside * _summit(*powers)
+        return hz + step * _summit(*powers)
 
     def repeats(self, lines: Sequence[Sinusoids], kind: Kind) -> bool:
         """Tell whether the last line over angle has come to lie beside another."""
@@ -379,7 +386,7 @@ class _Search:
         searches: int,
     ) -> tuple[Line, ...]:
         """Return the lines that are significant beside all others, the strongest first."""
-        made = []
+        lines_made = []
         for known, spectrum in zip(lines, spectra, strict=True):
             level = spectrum.steep_level if len(known) else spectrum.level
             for number, cycles in enumerate(known.cycles):
@@ -392,11 +399,13 @@ class _Search:
                 size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
                 sine, cosine = amplitudes[0]
                 phase = float(np.arctan2(cosine, sine)) if known.kind is Kind.ANGLE else np.nan
-                made.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
-        made.sort(key=lambda line: -line.log_likelihood_ratio)
+                lines_made.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
+        lines_made.sort(key=lambda line: -line.log_likelihood_ratio)
         widths = {spectrum.kind: spectrum.width for spectrum in spectra}
-        alone = [not _is_trace_of(line, made[:i], widths) for i, line in enumerate(made)]
-        return tuple(line for line, is_alone in zip(made, alone, strict=True) if is_alone)
+        alone = [
+            not _is_trace_of(line, lines_made[:i], widths) for i, line in enumerate(lines_made)
+        ]
+        return tuple(line for line, is_alone in zip(lines_made, alone, strict=True) if is_alone)
 
 
 def _is_trace_of(line: Line, stronger: Sequence[Line], widths: dict[Kind, float]) -> bool:

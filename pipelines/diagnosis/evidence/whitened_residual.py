@@ -160,9 +160,9 @@ class Channel:
         folded = np.abs((hz + 0.5 * rate) % rate - 0.5 * rate)
         # The frequencies are equidistant, so that none needs to be searched for.
         place = np.minimum(folded / self.grid.hz[1], len(self.weights) - 1.001)
-        left = place.astype(int)
-        share = place - left
-        return np.asarray((1.0 - share) * self.weights[left] + share * self.weights[left + 1])
+        below = place.astype(int)
+        share = place - below
+        return np.asarray((1.0 - share) * self.weights[below] + share * self.weights[below + 1])
 
 
 def filtered(x: NDArray, response: NDArray) -> NDArray:

@@ -53,15 +53,17 @@ class Onset:
 
         ``weights`` (O,) are the outputs' inverse variances.
         """
-        before, after = (np.where(learnt, left**2, 0.0) @ weights for left in (without, throughout))
+        before, after = (
+            np.where(learnt, residual**2, 0.0) @ weights for residual in (without, throughout)
+        )
         ahead = np.concatenate([[0.0], np.cumsum(before)])
         behind = np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
         squares = ahead + behind
         best = int(np.argmin(squares))
-        left = np.concatenate([without[:best], throughout[best:]])
+        residual = np.concatenate([without[:best], throughout[best:]])
         pull = np.where(learnt, weights * (without - throughout), 0.0)
         size = float(np.sum(pull * (without - throughout)))
-        scores = np.sum(pull * left, axis=1, keepdims=True)
+        scores = np.sum(pull * residual, axis=1, keepdims=True)
         noise = float(long_run_covariance(lambda: [(0, scores)], 1).covariance[0, 0])
         instants = np.concatenate([[ALWAYS], 0.5 * (run.time[1:] + run.time[:-1]), [NEVER]])
         return cls(instants, squares, pull, size, noise / size if size > 0.0 else 1.0)

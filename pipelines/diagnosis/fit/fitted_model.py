@@ -19,28 +19,28 @@ from pipelines.effects import Effect
 from pipelines.model import Model, model_from_parameters
 
 
-def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
+def fitted_model(fit: Fit, baseline: Baseline, kind: str) -> Model:
     """Return a fit as the model of a kind of run; what each run has for itself is as in the first
     one fitted."""
     # Nobody asks how sure the values are.
-    size = len(made.values)
+    size = len(fit.values)
     frame, _ = parameter_rows.parameters(
-        made, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size))
+        fit, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size))
     )
     return model_from_parameters(frame, kind, baseline.machine)
 
 
-def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
+def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
     """Return a fit as the model of one run, with the onsets and phases that it has for itself."""
-    model = fitted_model(made, baseline, run.motion.run)
-    if not any(cause.effect.per_run for cause in made.causes):
+    model = fitted_model(fit, baseline, run.motion.run)
+    if not any(cause.effect.per_run for cause in fit.causes):
         return model
-    own = {term.effect.label: term.values for term in settled(made, run, baseline)}
+    own = {term.effect.label: term.values for term in settled(fit, run, baseline)}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 
 
 def values_of_each_run(
-    made: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
+    fit: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
 ) -> dict[str, list[dict[str, Any]]]:
     """Return what each run has for itself of the causes that have such values, by label, as
     ``verdict.json`` tells.
@@ -48,19 +48,21 @@ def values_of_each_run(
     Those of the runs that were trained on are the fit's own, with its intervals; the others were
     learnt from their runs, all else held, and have none.
     """
-    told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
-    for number, cause in enumerate(made.causes):
-        for r in made.columns_of(number).runs if cause.label in told else ():
-            told[cause.label].append(
-                _told(cause.effect, train[r], *parameter_rows.values_in_run(made, sure, number, r))
+    values_of: dict[str, list[dict[str, Any]]] = {
+        c.label: [] for c in fit.causes if c.effect.per_run
+    }
+    for number, cause in enumerate(fit.causes):
+        for r in fit.columns_of(number).runs if cause.label in values_of else ():
+            values_of[cause.label].append(
+                _told(cause.effect, train[r], *parameter_rows.values_in_run(fit, sure, number, r))
             )
-    for run in validate if told else ():
-        for term in settled(made, run, baseline):
-            if term.effect.label in told and term.effect.explains(run.motion):
-                told[term.effect.label].append(
+    for run in validate if values_of else ():
+        for term in settled(fit, run, baseline):
+            if term.effect.label in values_of and term.effect.explains(run.motion):
+                values_of[term.effect.label].append(
                     _told(term.effect, run, term.effect.physical(term.values))
                 )
-    return told
+    return values_of
 
 
 def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None) -> dict[str, Any]:

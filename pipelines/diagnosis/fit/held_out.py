@@ -39,11 +39,13 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
         return measured - columns @ fit.layout.select(fit.values, None)
     half = _halves(run)
-    left = np.zeros_like(run.measured)
+    residual = np.zeros_like(run.measured)
     for side in (0, 1):
         scored = half == side
-        left[scored] = _learn(fit, run, baseline, run.usable & ~scored[:, np.newaxis])[1][scored]
-    return left
+        residual[scored] = _learn(fit, run, baseline, run.usable & ~scored[:, np.newaxis])[1][
+            scored
+        ]
+    return residual
 
 
 def _halves(run: Run) -> NDArray:
@@ -77,21 +79,21 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     terms = [_shared_term(cause) for cause in fit.causes]
     for place in begins:
         terms = _with_shape(terms, *place, NEVER)
-    made = _learn_amplitudes(fit, terms, run, baseline, learnt)
+    learned = _learn_amplitudes(fit, terms, run, baseline, learnt)
     for _ in range(ROUNDS if begins else 0):
         for place in begins:
-            instant = _begun(fit, made, place, run, baseline, learnt)
-            made = _learn_amplitudes(
-                fit, _with_shape(made[2], *place, instant), run, baseline, learnt
+            instant = _begun(fit, learned, place, run, baseline, learnt)
+            learned = _learn_amplitudes(
+                fit, _with_shape(learned[2], *place, instant), run, baseline, learnt
             )
-    return made
+    return learned
 
 
 def _begun(
-    fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray
+    fit: Fit, learned: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray
 ) -> float:
     """Return the instant (s) at which a cause begins, all else held."""
-    values, _, terms = made
+    values, _, terms = learned
     ends = [
         columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)
     ]
@@ -143,12 +145,12 @@ def _bent(
     return terms, plain
 
 
-def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
+def _solved(columns: NDArray, target: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
     """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O)
     where it is learnt."""
     root = np.sqrt(weights) * learnt
     A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
-    return np.asarray(np.linalg.lstsq(A, (left * root).ravel(), rcond=1e-9)[0])
+    return np.asarray(np.linalg.lstsq(A, (target * root).ravel(), rcond=1e-9)[0])
 
 
 def _slope(

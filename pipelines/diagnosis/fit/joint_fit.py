@@ -62,21 +62,23 @@ def fit(
     causes = tuple(sorted(causes, key=_last_sensors))
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
-    found, rms, cost = _errors(gram, values)
-    return Fit(causes, values, found, rms, cost, _layout(causes, runs, baseline), loads)
+    errors, rms, cost = _errors(gram, values)
+    return Fit(causes, values, errors, rms, cost, _layout(causes, runs, baseline), loads)
 
 
-def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
+def laden(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
     """Return runs with the loads that a fit is for."""
     return (
-        list(runs) if made.loads is None else [with_load(run, baseline, made.loads) for run in runs]
+        list(runs)
+        if fitted.loads is None
+        else [with_load(run, baseline, fitted.loads) for run in runs]
     )
 
 
-def residuals_on(made: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
+def residuals_on(fitted: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return what a fit leaves of each run that it was made on, (m, O) N·m."""
-    columns = stacked_columns(made.causes, laden(runs, made, baseline), baseline)
-    return [measured - c @ made.values for c, measured in columns]
+    columns = stacked_columns(fitted.causes, laden(runs, fitted, baseline), baseline)
+    return [measured - c @ fitted.values for c, measured in columns]
 
 
 def _last_sensors(cause: Candidate) -> bool:
@@ -97,8 +99,10 @@ def stacked_columns(
     """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in
     places of their own."""
     layout = _layout(causes, runs, baseline)
-    made = (columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs))
-    return [(layout.expand(columns, r), measured) for r, (columns, measured) in enumerate(made)]
+    of_runs = (
+        columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)
+    )
+    return [(layout.expand(columns, r), measured) for r, (columns, measured) in enumerate(of_runs)]
 
 
 def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
@@ -111,26 +115,28 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
 
 
 def onsets_of(
-    made: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline
+    fitted: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline
 ) -> list[Onset]:
     """Return for each run when a cause may begin in it by its shape parameter ``i``, all else as it
     was fitted."""
-    ends = [made.instead(number, made.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)]
+    ends = [
+        fitted.instead(number, fitted.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)
+    ]
     without, throughout = (
         [
-            measured - columns @ made.values
+            measured - columns @ fitted.values
             for columns, measured in stacked_columns(causes, runs, baseline)
         ]
         for causes in ends
     )
     return [
-        Onset.of(run, never, always, run.usable, made.weights)
+        Onset.of(run, never, always, run.usable, fitted.weights)
         for run, never, always in zip(runs, without, throughout, strict=True)
     ]
 
 
 def slope(
-    made: Fit,
+    fitted: Fit,
     place: tuple[int, int, int],
     runs: Sequence[Run],
     baseline: Baseline,
@@ -142,12 +148,12 @@ def slope(
     and torques.
     """
     number, i, run = place
-    cause = made.causes[number]
+    cause = fitted.causes[number]
     step = step_of(cause, i, max(run, 0))
     moved = cause.moved(i, step, None if run < 0 else [run])
-    ahead = stacked_columns(made.instead(number, moved), runs, baseline)
+    ahead = stacked_columns(fitted.instead(number, moved), runs, baseline)
     return [
-        ((c @ made.values - y) - (d @ made.values - z)) / step
+        ((c @ fitted.values - y) - (d @ fitted.values - z)) / step
         for (c, y), (d, z) in zip(ahead, plain, strict=True)
     ]
 

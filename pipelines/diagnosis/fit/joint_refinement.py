@@ -63,18 +63,18 @@ class Refinement:
 
     def _refined(self, best: Fit) -> Fit:
         """Return the best fit of some rounds from a start."""
-        made = [best]
+        fits = [best]
         for _ in range(ROUNDS if best.causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
             loads = self._loads_after(best)
             runs = self._laden(loads)
             start = self._fit(best.causes, runs, loads)
             ahead = self._round(start, runs)
-            made.append(ahead)
+            fits.append(ahead)
             if ahead.cost > best.cost - ENOUGH * abs(best.cost):
                 break
             best = ahead
-        return min(made, key=lambda one: one.cost)
+        return min(fits, key=lambda one: one.cost)
 
     def _start(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit of the shapes as they are, with the rigid bodies with which the library
@@ -127,22 +127,22 @@ class Refinement:
                         causes = best.instead(number, cause.reshaped(i, form))
                         tried.append(self._fit(causes, runs, best.loads))
         if len(tried) > 1:
-            tried = [self._stepped(made, runs) for made in tried]
-        return min(tried, key=lambda made: made.cost)
+            tried = [self._stepped(one, runs) for one in tried]
+        return min(tried, key=lambda one: one.cost)
 
     def _onsets(self, best: Fit, runs: Sequence[Run]) -> Fit:
         """Move instants at which causes begin to where they explain most, all else held."""
         for number, cause in enumerate(best.causes):
             if (i := cause.onset) is None:
                 continue
-            found = onsets_of(best, number, i, runs, self._baseline)
+            onsets = onsets_of(best, number, i, runs, self._baseline)
             acting = best.columns_of(number).runs
             instants = [
-                found[r].likeliest if r in acting else shape[i]
+                onsets[r].likeliest if r in acting else shape[i]
                 for r, shape in enumerate(cause.shapes)
             ]
             causes = best.instead(number, cause.with_own(i, instants))
-            best = min((best, self._fit(causes, runs, best.loads)), key=lambda made: made.cost)
+            best = min((best, self._fit(causes, runs, best.loads)), key=lambda one: one.cost)
         return best
 
     def _step(self, best: Fit, runs: Sequence[Run]) -> Fit | None:
@@ -167,13 +167,13 @@ class Refinement:
             length *= 0.5
         return None
 
-    def _places(self, made: Fit) -> list[Place]:
+    def _places(self, fitted: Fit) -> list[Place]:
         """Return the free shapes: of a cause that bends each run in its own way, one of each."""
         places: list[Place] = []
-        for number, cause in enumerate(made.causes):
+        for number, cause in enumerate(fitted.causes):
             for i, unit in free_shapes(cause):
                 own = i == cause.own_bend
-                acting = made.columns_of(number).runs if own else (-1,)
+                acting = fitted.columns_of(number).runs if own else (-1,)
                 places += [(number, i, run, unit) for run in acting]
         return places
 

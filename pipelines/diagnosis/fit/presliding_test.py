@@ -109,8 +109,10 @@ class _About:
         ):
             return None
         read, speed = np.ascontiguousarray(motion.measured_angle[:, j]), motion.dq[:, j]
-        told = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(motion)
-        rest = filtered(motion, motion.torque[:, j] - told[:, j], CUTOFF_HZ)
+        coulomb_torque = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(
+            motion
+        )
+        rest = filtered(motion, motion.torque[:, j] - coulomb_torque[:, j], CUTOFF_HZ)
         return cls(motion, model, j, read, speed, rest, level, near)
 
     def left(self, side: "Side") -> NDArray:
@@ -133,17 +135,17 @@ Side = Callable[[_About], NDArray]
 
 
 def built_up(
-    made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
+    fit: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
 ) -> list[BuildUp]:
     """Return the joints whose friction builds up; the travel is told by the runs to train on, and
     the others judge."""
-    known = {cause.label for cause in made.causes}
+    known = {cause.label for cause in fit.causes}
     # Once: what a run has for itself is learnt for that.
     runs = [
-        [(run.motion, model_of_run(made, baseline, run)) for run in some]
+        [(run.motion, model_of_run(fit, baseline, run)) for run in some]
         for some in (train, validate)
     ]
-    found = []
+    rows = []
     for j, joint in enumerate(baseline.joints):
         if known & {gives(joint, on=baseline.machine).label for gives in GIVES}:
             continue
@@ -152,8 +154,8 @@ def built_up(
         if not all(about):
             continue
         if (one := _of_joint(about[0], about[1], baseline, j)) is not None:
-            found.append(one)
-    return found
+            rows.append(one)
+    return rows
 
 
 def _of_joint(
@@ -176,15 +178,15 @@ def _of_joint(
     as_read = _side_over(0.5 * count, SHORTEST * scale.travel)
     rivals = [_side_at_once, as_read, *by_speed, *map(_side_late, LATE_S)]
     beaten, otherwise = (_best(some, rivals)[1] for some in (train, validate))
-    left = _power(validate, over[best])
+    remaining = _power(validate, over[best])
     independent = CUTOFF_HZ * sum(about.seconds for about in train)
-    ratios = trained / beaten, left / otherwise
+    ratios = trained / beaten, remaining / otherwise
     if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
         return None
     return BuildUp(
         joint,
         float(travels[best]),
-        *np.sqrt([_power(validate, _side_at_once), otherwise, left]).tolist(),
+        *np.sqrt([_power(validate, _side_at_once), otherwise, remaining]).tolist(),
     )
 
 

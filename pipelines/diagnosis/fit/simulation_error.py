@@ -13,7 +13,7 @@ from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 
 
-def simulation_error(made: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArray | None:
+def simulation_error(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArray | None:
     """Return the rms angle error of 1 s simulations, one after the other, over all runs, (J,) rad.
 
     None where the forward dynamics cannot hold the fitted model, or runs away.
@@ -21,7 +21,7 @@ def simulation_error(made: Fit, runs: Sequence[Run], baseline: Baseline) -> NDAr
     squares, count = 0.0, 0
     for run in runs:
         try:
-            result = replay(model_of_run(made, baseline, run), run.motion, WINDOW_S, WINDOW_S)
+            result = replay(model_of_run(fit, baseline, run), run.motion, WINDOW_S, WINDOW_S)
         except (ExoidError, ZeroDivisionError):
             return None
         with np.errstate(over="ignore"):

@@ -76,7 +76,7 @@ def uncertainty(
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
-    left = [y - c @ fit.values for c, y in plain]
+    residuals = [y - c @ fit.values for c, y in plain]
     forms = _forms(fit.causes)
     places = [*_shapes(fit.causes, len(runs), fitted=True), *forms]
     slopes = [slope(fit, place, runs, baseline, plain) for place in places]
@@ -91,10 +91,10 @@ def uncertainty(
     )
     scores = [
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a)
-        for run, e, a in zip(runs, left, wide, strict=True)
+        for run, e, a in zip(runs, residuals, wide, strict=True)
     ]
     filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
-    misfit = np.maximum(imperfect, slow_error(runs, left).excess)
+    misfit = np.maximum(imperfect, slow_error(runs, residuals).excess)
     for run, a in zip(runs, wide, strict=True):
         filling = filling + np.einsum(
             "mo,o,moi,moj->ij", run.usable, _correlated_blocks(run) * (weights * misfit) ** 2, a, a

@@ -29,10 +29,10 @@ class Validated:
     errors: Errors
 
     @classmethod
-    def of(cls, made: Fit, validate: Sequence[Run], baseline: Baseline) -> "Validated":
+    def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "Validated":
         """Evaluate a fit on the validation runs."""
-        residuals = tuple(evaluate(made, validate, baseline))
-        return cls(made, validate, residuals, errors_of(validate, residuals))
+        residuals = tuple(evaluate(fit, validate, baseline))
+        return cls(fit, validate, residuals, errors_of(validate, residuals))
 
     @cached_property
     def floor(self) -> Floor:
@@ -50,7 +50,7 @@ class Validated:
 
 
 def without_each(
-    made: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
+    fitted: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
     """Return the model without each of its causes, the others kept and fitted anew under the same
     loads, by label.
@@ -60,13 +60,13 @@ def without_each(
     weights : NDArray
         (O,) inverse variances of the outputs, 1/(N·m)².
     """
-    found, runs = {}, laden(train, made, baseline)
-    for label in dict.fromkeys(cause.label for cause in made.causes):
-        rest = [cause for cause in made.causes if cause.label != label]
-        found[label] = Validated.of(
-            fit(rest, runs, baseline, weights, made.loads), validate, baseline
+    validated, runs = {}, laden(train, fitted, baseline)
+    for label in dict.fromkeys(cause.label for cause in fitted.causes):
+        rest = [cause for cause in fitted.causes if cause.label != label]
+        validated[label] = Validated.of(
+            fit(rest, runs, baseline, weights, fitted.loads), validate, baseline
         )
-    return found
+    return validated
 
 
 def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Gain]:
@@ -96,16 +96,16 @@ def removed_share(less: Validated, whole: Validated) -> float | None:
     return float(np.clip((without**2 - with_it**2) / power, 0.0, 1.0)) if power > 0.0 else None
 
 
-def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
+def log_likelihoods(validated: Validated, noise: NoiseModel) -> NDArray:
     """Return the log likelihood of the validation runs, for each drive (J,), up to a constant.
 
     In the decision band, under the noise that the training runs have.
     """
-    joints = len(made.runs[0].motion.joints)
+    joints = len(validated.runs[0].motion.joints)
     sigma = noise.sigma(LENGTH_S)[:joints]
     known, total = np.isfinite(sigma), np.zeros(joints)
-    for run, left in zip(made.runs, made.residuals, strict=True):
+    for run, residual in zip(validated.runs, validated.residuals, strict=True):
         band = DecisionBand.of(run)
-        squares = np.sum(band.weight[:, :joints] * band.average(left)[:, :joints] ** 2, axis=0)
+        squares = np.sum(band.weight[:, :joints] * band.average(residual)[:, :joints] ** 2, axis=0)
         total[known] -= 0.5 * squares[known] / sigma[known] ** 2
     return total

@@ -61,10 +61,10 @@ def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> 
     where the group is likely, though none of it may be as probable as nothing.
     """
     best = _best(posterior)
-    found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
+    candidates = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
     for group in together:
         if posterior.any_of(group) >= CRITERIA.likely and not any(
-            group & one.members for one in found
+            group & one.members for one in candidates
         ):
             members = (
                 (chosen, i)
@@ -72,8 +72,8 @@ def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> 
                 for i in chosen
                 if posterior.elements[i].label in group
             )
-            found.append(_named(posterior, *next(members)))
-    named = [one for one in found if one.probability >= CRITERIA.likely]
+            candidates.append(_named(posterior, *next(members)))
+    named = [one for one in candidates if one.probability >= CRITERIA.likely]
     return Answer(
         tuple(sorted(named, key=lambda one: -one.probability)),
         posterior.nothing,

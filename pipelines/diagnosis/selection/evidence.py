@@ -220,11 +220,11 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     order = np.concatenate([slow, rest]).astype(int)
     free = np.full(len(gram), 1.0 / CRITERIA.explained_share**2)
     as_noise = np.concatenate([1.0 / np.maximum(variance, LEAST_VARIANCE), free[: len(rest)]])
-    beside = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
+    next_to_noise = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
     if not most:
-        return beside
-    of_slow_noise = max(_beyond_noise(gram, right, free, 0) - beside, 0.0)
-    return beside + min(of_slow_noise, most)
+        return next_to_noise
+    of_slow_noise = max(_beyond_noise(gram, right, free, 0) - next_to_noise, 0.0)
+    return next_to_noise + min(of_slow_noise, most)
 
 
 def _beyond_noise(gram: NDArray, right: NDArray, precision: NDArray, first: int) -> float:
@@ -330,10 +330,10 @@ Laws = dict[tuple[str, int | None, str], list[tuple[int, float]]]
 
 
 def _laws_by_kind(laws: Sequence[LawColumn], places: NDArray) -> Laws:
-    found: Laws = {}
+    laws_of: Laws = {}
     for law, place in zip(laws, places, strict=True):
-        found.setdefault((law.kind, law.joint, law.wearer), []).append((int(place), law.variance))
-    return found
+        laws_of.setdefault((law.kind, law.joint, law.wearer), []).append((int(place), law.variance))
+    return laws_of
 
 
 def _normalised(variance: Sequence[float]) -> list[float]:

@@ -66,13 +66,13 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     """Return what is missing, the most probable first; empty where nothing is."""
     if 1.0 - posterior.nothing < CRITERIA.likely:
         return []
-    found = [_of_cause(posterior, named) for named in answer.named]
-    named = {label for one in found for label, _ in one.causes}
+    results = [_of_cause(posterior, named) for named in answer.named]
+    named = {label for one in results for label, _ in one.causes}
     rest = frozenset(
         i for i, element in enumerate(posterior.elements) if element.label not in named
     )
-    found += _remainder(posterior, rest)
-    return sorted(found, key=lambda finding: -finding.probability)
+    results += _remainder(posterior, rest)
+    return sorted(results, key=lambda finding: -finding.probability)
 
 
 def _of_cause(posterior: Posterior, named: Named) -> Finding:

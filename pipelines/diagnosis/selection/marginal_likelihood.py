@@ -52,12 +52,12 @@ class MarginalLikelihood:
         self.apart = np.array([e.log_prior + _shown(e, criteria) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
-        told = self.evidence.background
+        background = self.evidence.background
         sd = [
             np.sqrt(self.criteria.background_cause**2 * variance + noise)
-            for _, variance, noise in told
+            for _, variance, noise in background
         ]
-        return np.array([place for place, _, _ in told], dtype=int), np.array(sd)
+        return np.array([place for place, _, _ in background], dtype=int), np.array(sd)
 
     def prior(self, chosen: Sequence[int]) -> float:
         """Return the prior log odds of a set against the empty one."""
@@ -141,8 +141,8 @@ class MarginalLikelihood:
             return 0.0
         half = _forward(lower, sd[:, np.newaxis] * known.imitation.T[columns])
         variance = known.variance @ (1.0 / self.power)
-        left, spread = known.alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
-        return float(np.sum(log_ndtr(left / spread) - log_ndtr(known.alone / np.sqrt(variance))))
+        values, spread = known.alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
+        return float(np.sum(log_ndtr(values / spread) - log_ndtr(known.alone / np.sqrt(variance))))
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""

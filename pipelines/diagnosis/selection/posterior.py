@@ -111,11 +111,11 @@ class Posterior:
     @cached_property
     def by_labels(self) -> dict[frozenset[str], float]:
         """Probability of each set of labels, whatever the shapes."""
-        found: dict[frozenset[str], float] = {}
+        totals: dict[frozenset[str], float] = {}
         for chosen, p in zip(self.sets, self.probabilities, strict=True):
             labels = self.labels_of(chosen)
-            found[labels] = found.get(labels, 0.0) + float(p)
-        return found
+            totals[labels] = totals.get(labels, 0.0) + float(p)
+        return totals
 
     @cached_property
     def unweighed(self) -> frozenset[frozenset[str]]:
@@ -133,12 +133,14 @@ class Posterior:
     @cached_property
     def marginals(self) -> dict[str, float]:
         """Probability that each label is in the true set, the most probable first."""
-        found: dict[str, float] = {}
+        totals: dict[str, float] = {}
         for labels, p in self.by_labels.items():
             for label in labels:
-                found[label] = found.get(label, 0.0) + p
+                totals[label] = totals.get(label, 0.0) + p
         # Rounding may carry a sum of probabilities a little beyond one.
-        return {label: min(p, 1.0) for label, p in sorted(found.items(), key=lambda item: -item[1])}
+        return {
+            label: min(p, 1.0) for label, p in sorted(totals.items(), key=lambda item: -item[1])
+        }
 
 
 def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
@@ -166,29 +168,29 @@ def _ordered(chosen: Sequence[int]) -> Set:
 def likely_contexts(weighed: Posterior) -> list[Context]:
     """Return the sets of several elements, more probable than nothing, to refine their causes
     together."""
-    found: dict[frozenset[str], Context] = {}
+    contexts: dict[frozenset[str], Context] = {}
     for chosen in weighed.sets:
         elements = [weighed.elements[i] for i in chosen]
         causes = tuple(e.place for e in elements if not e.is_law)
         if len(elements) > 1 and causes:
             laws = tuple(e.variant for e in elements if e.is_law)
-            found.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
-        if not chosen or len(found) == CONTEXTS:
+            contexts.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
+        if not chosen or len(contexts) == CONTEXTS:
             break
-    return list(found.values())
+    return list(contexts.values())
 
 
 def strongest(weighed: Posterior) -> list[int]:
     """Return the library's numbers of the causes that alone explain most, unless nothing is
     missing."""
-    found: dict[str, int] = {}
+    causes: dict[str, int] = {}
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
-        if not chosen or len(found) == STRONGEST:
+        if not chosen or len(causes) == STRONGEST:
             break
         if element is not None and not element.is_law:
-            found.setdefault(element.label, element.place)
-    return list(found.values())
+            causes.setdefault(element.label, element.place)
+    return list(causes.values())
 
 
 def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[int]]:
@@ -208,9 +210,9 @@ def _pairs(weigh: MarginalLikelihood) -> list[Set]:
     several, best, wide = _contenders(weigh)
     pairs, odds = weigh.pairs(several)
     order = np.argsort(-odds)[:PAIRS]
-    found = {tuple(sorted(map(int, pairs[n]))) for n in order}
-    found |= {tuple(sorted((w, i))) for w in wide for i in best[:PARTNERS] if i != w}
-    return sorted(found)
+    chosen = {tuple(sorted(map(int, pairs[n]))) for n in order}
+    chosen |= {tuple(sorted((w, i))) for w in wide for i in best[:PARTNERS] if i != w}
+    return sorted(chosen)
 
 
 def _triples(weigh: MarginalLikelihood, odds: dict[Set, float]) -> list[Set]:
@@ -218,10 +220,10 @@ def _triples(weigh: MarginalLikelihood, odds: dict[Set, float]) -> list[Set]:
     elements = weigh.evidence.elements
     _, best, wide = _contenders(weigh)
     pairs = sorted((s for s in odds if len(s) == 2), key=lambda s: -odds[s])[:EXTENDED]
-    found: set[Set] = set()
+    triples: set[Set] = set()
     for pair in pairs:
         labels = {elements[i].label for i in pair}
         more = [i for i in {*best, *wide} if elements[i].label not in labels]
         scored = sorted(more, key=lambda i: -weigh.rough((*pair, i)))
-        found |= {tuple(sorted((*pair, i))) for i in scored[:TRIPLES]}
-    return sorted(found)
+        triples |= {tuple(sorted((*pair, i))) for i in scored[:TRIPLES]}
+    return sorted(triples)

@@ -43,8 +43,8 @@ def of_set(chosen: Sequence[NDArray]) -> NDArray:
 def weights(criteria: Criteria) -> NDArray:
     """Return the log odds of one unit of each feature, (f,); the base rate counts once in a set
     that is not empty."""
-    found = {name: getattr(criteria, name) for name in FEATURES}
-    found["cause"] += criteria.base_rate
-    found["law"] += criteria.base_rate
-    found["further"] -= criteria.base_rate
-    return np.array(list(found.values()))
+    by_name = {name: getattr(criteria, name) for name in FEATURES}
+    by_name["cause"] += criteria.base_rate
+    by_name["law"] += criteria.base_rate
+    by_name["further"] -= criteria.base_rate
+    return np.array(list(by_name.values()))

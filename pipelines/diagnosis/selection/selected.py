@@ -98,8 +98,10 @@ class Selected:
         them."""
         assert self.posterior is not None
         answer = replace(self.answer, named=())
-        found = tuple(findings(self.posterior, answer))
-        return replace(self, answer=answer, findings=found, dropped=frozenset(self.answer.labels))
+        findings_now = tuple(findings(self.posterior, answer))
+        return replace(
+            self, answer=answer, findings=findings_now, dropped=frozenset(self.answer.labels)
+        )
 
     def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
         """Return what all runs show, after what the first ``train_count`` of them, to train on,
@@ -266,10 +268,16 @@ def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:
     """Weigh all sets of causes and laws, and read the answer off the posterior."""
-    library, evidence, found = weighed(prepared, report)
-    answer = answer_of(found)
+    library, evidence, result = weighed(prepared, report)
+    answer = answer_of(result)
     return Selected(
-        library, evidence, found, found, answer, tuple(findings(found, answer)), _router(prepared)
+        library,
+        evidence,
+        result,
+        result,
+        answer,
+        tuple(findings(result, answer)),
+        _router(prepared),
     )
 
 
@@ -294,13 +302,13 @@ def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evide
     report(LIBRARY_SHARE, "posterior")
     auxiliary = auxiliary_evidence(prepared)
     evidence = Evidence.of(library, auxiliary)
-    found = posterior(evidence)
+    result = posterior(evidence)
     refined = library
-    for number in strongest(found):
+    for number in strongest(result):
         refined = refined.with_partners(number, PARTNERS)
-    refined = refined.refined_together(likely_contexts(found))
+    refined = refined.refined_together(likely_contexts(result))
     if refined is library:
-        return library, evidence, found
+        return library, evidence, result
     evidence = Evidence.of(refined, auxiliary)
     return refined, evidence, posterior(evidence)
 

@@ -78,18 +78,18 @@ def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
 
 def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
     """Return what was fitted, as files name it; what each run has for itself is left out."""
-    found: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     for number, cause in enumerate(fitted.fit.causes):
         columns = fitted.fit.columns_of(number)
         if any(columns.per_run):
             continue
         amplitudes = columns.select(fitted.fit.values, None, np.zeros(len(columns.per_run)))
         values = cause.effect.physical(np.append(amplitudes, cause.shapes[0]))
-        found += [
+        rows += [
             {"name": p.name, "value": float(v), "unit": p.unit}
             for p, v in zip(cause.effect.parameters, values, strict=True)
         ]
-    return found
+    return rows
 
 
 def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[str, str]:

@@ -135,13 +135,13 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
     if by_all is None:
         return []
     named = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
-    said = (
+    sentence = (
         f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and"
         " that leaves an error above the noise on the validation runs"
     )
     if d.causes:
-        said += ". The gain is therefore a little too good: record another run to validate on"
-    return [said]
+        sentence += ". The gain is therefore a little too good: record another run to validate on"
+    return [sentence]
 
 
 def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
@@ -189,8 +189,8 @@ def _one_kind(d: Diagnosis) -> list[str]:
             "cannot be told from a mass beside the axis. Record with_human runs as well"
         ]
     if kinds == {"with_human"}:
-        felt = any(run.motion.forces is not None for run in d.train)
-        apart = "are separated by the cuff forces alone" if felt else "cannot be separated"
+        has_cuffs = any(run.motion.forces is not None for run in d.train)
+        apart = "are separated by the cuff forces alone" if has_cuffs else "cannot be separated"
         return [
             f"every run is with a person: causes in the machine and in the person {apart}, and the "
             "machine's friction alone is unknown. Record exo_alone runs as well"

@@ -33,7 +33,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
     Both count from ``settled_after_s`` on: before, the drives are at their limit, whatever the leg.
     """
     run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
-    told: dict[str, Any] = {
+    benefit: dict[str, Any] = {
         "run": run,
         "controller": {
             "type": "rbf",
@@ -45,20 +45,20 @@ def control(d: Diagnosis) -> dict[str, Any]:
         "reason": None,
     }
     if not d.baseline.machine.is_exoskeleton:
-        return told | {"reason": "the reference case is a leg's gait, with its gains and limits"}
+        return benefit | {"reason": "the reference case is a leg's gait, with its gains and limits"}
     if d.data.spoilt:
-        return told | {
+        return benefit | {
             "reason": "acquisition is at fault: no model of these recordings can be trusted"
         }
     fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}
     reasons = [] if d.causes else ["no cause is named"]
-    for which, made in fits.items():
+    for which, fitted in fits.items():
         try:
-            told[which] = _tracked(fitted_model(made, d.baseline, run), run, d)
+            benefit[which] = _tracked(fitted_model(fitted, d.baseline, run), run, d)
         except ExoidError as error:
             # What is wrong; its second sentence tells those who asked for a simulation what to do.
             reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
-    return told | {"reason": "; ".join(reasons) or None}
+    return benefit | {"reason": "; ".join(reasons) or None}
 
 
 def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:

@@ -33,8 +33,8 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
 
     A cause's share, by its label, is below zero at a joint whose error it raises.
     """
-    left = d.after.errors.rms**2
-    floor = np.minimum(d.floor_rms**2, left)
+    remaining = d.after.errors.rms**2
+    floor = np.minimum(d.floor_rms**2, remaining)
     causes = shares_of_causes(d.causes, lambda labels: _mean_square(d, labels))
     scatter = scatter_between_periods(d.validate, d.after.residuals)
     budget = {}
@@ -42,11 +42,11 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
         shares = {FLOOR: float(floor[j])} | {
             label: float(share[j]) for label, share in causes.items()
         }
-        above = float(left[j] - floor[j])
+        above = float(remaining[j] - floor[j])
         if scatter is None:
             shares[LEFT] = above
         else:
-            shares[REPEATS] = float(np.clip(left[j] - scatter[j], 0.0, above))
+            shares[REPEATS] = float(np.clip(remaining[j] - scatter[j], 0.0, above))
             shares[WANDERS] = above - shares[REPEATS]
         budget[joint] = shares
     return budget
@@ -68,7 +68,7 @@ def shares_of_causes(
         Mean squares (J,) that the model with a set of causes leaves.
     """
     sets = [frozenset(s) for size in range(len(labels) + 1) for s in combinations(labels, size)]
-    left = {s: left_by(s) for s in sets} if labels else {}
+    remaining = {s: left_by(s) for s in sets} if labels else {}
     orders = factorial(len(labels))
     return {
         label: sum(
@@ -76,7 +76,7 @@ def shares_of_causes(
                 factorial(len(s))
                 * factorial(len(labels) - len(s) - 1)
                 / orders
-                * (left[s] - left[s | {label}])
+                * (remaining[s] - remaining[s | {label}])
                 for s in sets
                 if label not in s
             ),
@@ -94,13 +94,13 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
-    made = fit(
+    fitted = fit(
         [c for c in d.after.fit.causes if c.label in labels],
         d.train,
         d.baseline,
         d.before.fit.weights,
     )
-    return errors_of(d.validate, evaluate(made, d.validate, d.baseline)).rms ** 2
+    return errors_of(d.validate, evaluate(fitted, d.validate, d.baseline)).rms ** 2
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:

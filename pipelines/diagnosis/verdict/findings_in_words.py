@@ -28,9 +28,9 @@ def family_of(label: str, weighed: Posterior) -> str:
 
 
 def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, Any]:
-    told, machine = finding.as_json(), d.baseline.machine
+    entry, machine = finding.as_json(), d.baseline.machine
     against = d.selected.dropped
-    for cause, (label, _) in zip(told["causes"], finding.causes, strict=True):
+    for cause, (label, _) in zip(entry["causes"], finding.causes, strict=True):
         effect = d.effects.get(label) or d.effect_of(label)
         cause |= {
             "family": family_of(label, weighed),
@@ -40,13 +40,13 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     # The most probable law tells whose angle, speed or load it is.
     law, p = next(iter(finding.laws), ("", 0.0))
     of_other_joint = p >= CRITERIA.likely and is_of_other_joint(law)
-    for node in told["path"]:
-        node["words"] = _node_in_words(d, node, told, of_other_joint)
-    told["laws"] = list(_laws(finding, machine))
-    last = told["path"][-1]["words"]
+    for node in entry["path"]:
+        node["words"] = _node_in_words(d, node, entry, of_other_joint)
+    entry["laws"] = list(_laws(finding, machine))
+    last = entry["path"][-1]["words"]
     # Where it is unknown whether it repeats, the path ends at its beginning.
-    told["words"] = last if len(told["path"]) > 1 else "something that may repeat or not"
-    return told
+    entry["words"] = last if len(entry["path"]) > 1 else "something that may repeat or not"
+    return entry
 
 
 def _node_in_words(

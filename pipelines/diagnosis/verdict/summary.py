@@ -19,15 +19,15 @@ CLOSEST = 0.05
 """Probability from which a cause is said to come closest."""
 
 
-def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
+def summary(d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None) -> str:
     """Return the verdict's first sentences."""
     if d.data.spoilt:
         return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
-    said = finding_in_words(d, causes, left)
-    said += _noise_without_periods(d)
+    text = finding_in_words(d, causes, remainder)
+    text += _noise_without_periods(d)
     if d.data.faults:
-        said += f" Faults of acquisition were found as well: {_in_short(d.data.faults[0], d)}."
-    return said
+        text += f" Faults of acquisition were found as well: {_in_short(d.data.faults[0], d)}."
+    return text
 
 
 def _noise_without_periods(d: Diagnosis) -> str:
@@ -66,9 +66,11 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
     return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 
-def finding_in_words(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
+def finding_in_words(
+    d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None
+) -> str:
     """Return what was found, without remarks on floor and faults."""
-    described = f" {left.description}" if left and left.description else ""
+    described = f" {remainder.description}" if remainder and remainder.description else ""
     if d.status == "nothing_missing":
         return f"{_nothing(d)}{described}"
     if d.status == "unknown_cause":
@@ -101,20 +103,20 @@ def _nothing(d: Diagnosis) -> str:
     place = _worst_joint(d)
     joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
-    said = (
+    text = (
         "Nothing is missing that these data could show (probability"
         f" {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest"
         f" at {the(joint)}: {_size(d, place)}"
     )
     if hiding := floor_that_hides(d).get(joint):
-        said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
-    said = f"{said}.{_dropped(d) or _nearest(d)}"
+        text += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
+    text = f"{text}.{_dropped(d) or _nearest(d)}"
     if d.is_mostly_unexplained:
-        said += (
+        text += (
             " Most of that error is not noise, and neither a listed cause nor a smooth law"
             " explains it."
         )
-    return said
+    return text
 
 
 def _nearest(d: Diagnosis) -> str:
@@ -129,25 +131,25 @@ def _nearest(d: Diagnosis) -> str:
 
 def _unlisted(d: Diagnosis) -> str:
     """Say at which depth something is known that no listed cause explains."""
-    found = findings(d)
-    if not found:
+    results = findings(d)
+    if not results:
         return "Something is missing, and no listed cause is likely."
-    first, *more = found
+    first, *more = results
     also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
     which = (
         "that no listed cause explains"
         if d.selected.shows_unlisted
         else "and these data do not tell which listed cause it is"
     )
-    said = (
+    text = (
         f"Something is missing {which}: {first['words']} (probability"
         f" {first['probability']:.2f}){also}."
     )
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
     # An effect that resembles a listed cause is told by that cause.
     if laws and laws[0]["words"] != first["words"] and not laws[0]["law"].startswith(UNLISTED):
-        said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
-    return f"{said}{_dropped(d) or _closest(d, first)}"
+        text += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
+    return f"{text}{_dropped(d) or _closest(d, first)}"
 
 
 def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
@@ -171,16 +173,16 @@ def _dropped(d: Diagnosis) -> str:
         return ""
     words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
     plural = len(labels) > 1
-    said = f" {words[:1].upper()}{words[1:]} would explain"
+    text = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
         they, lower, s = ("they", "lower", "") if plural else ("it", "lowers", "s")
         fitted = (
             f"fitted to the training runs alone, {they} {lower} the error on the validation runs"
             " too little"
         )
-        return f"{said} all runs together, but {fitted}, or raise{s} it."
+        return f"{text} all runs together, but {fitted}, or raise{s} it."
     return (
-        f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the"
+        f"{text} the training runs, but {'raise' if plural else 'raises'} the error on the"
         " validation runs."
     )
 
@@ -230,13 +232,13 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 def _remains(d: Diagnosis, most: int) -> str:
     """Say how far the joint is from its floor, and where else something stays unexplained."""
     ratio = d.after.errors.rms / d.floor_rms
-    left = d.left_over
-    here = f"{'still ' if left[most] else ''}{ratio[most]:.2f} times the floor"
+    above = d.left_over
+    here = f"{'still ' if above[most] else ''}{ratio[most]:.2f} times the floor"
     others = [
         f"; {the(joint)}'s is then {amount(d.baseline.machine, joint, d.after.errors.rms[j])}, "
         f"{ratio[j]:.2f} times its floor"
         for j, joint in enumerate(d.baseline.joints)
-        if left[j] and j != most
+        if above[j] and j != most
     ]
     return (here if ratio[most] > CRITERIA.at_floor else "which is noise") + "".join(others)
 

@@ -39,7 +39,7 @@ class Unexplained:
         }
 
 
-def unexplained(d: Diagnosis, found: list[Dependence]) -> Unexplained:
+def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
     """Describe the residual of validation runs and extend the model by a smooth term learnt on
     train runs.
 
@@ -47,14 +47,14 @@ def unexplained(d: Diagnosis, found: list[Dependence]) -> Unexplained:
     """
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
-    left = [
+    joints = [
         r - np.nan_to_num(term.torque(run))
         for run, r in zip(d.validate, d.after.residuals, strict=True)
     ]
-    rms = errors_of(d.validate, left).rms
+    rms = errors_of(d.validate, joints).rms
     return Unexplained(
-        description=describe(d.baseline.machine, found, above, term.together),
-        depends_on=found[:MENTIONED],
+        description=describe(d.baseline.machine, dependences, above, term.together),
+        depends_on=dependences[:MENTIONED],
         smooth=term.describe(),
         rmse_nm={joint: float(v) for joint, v in zip(d.baseline.joints, rms, strict=True)},
     )

@@ -29,13 +29,13 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     causes = [_cause(d, named) for named in d.named]
     before = dependences(d.validate, d.before.residuals)
     after = dependences(d.validate, d.after.residuals) if d.causes else before
-    left = unexplained(d, after) if d.leaves_something else None
+    remainder = unexplained(d, after) if d.leaves_something else None
     low_pass = f"; torque and model behind a low-pass of {CUTOFF_HZ:g} Hz"
     return {
         "contract": "verdict/1",
         "status": d.status,
-        "summary": summary(d, causes, left),
-        "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
+        "summary": summary(d, causes, remainder),
+        "finding": None if d.data.spoilt else finding_in_words(d, causes, remainder),
         "findings": findings(d),
         "sought_on": "train" if d.selected.by_all is None else "all",
         "router": {
@@ -61,7 +61,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "data_faults": [
             {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
         ],
-        "residual": left.as_json() if left else None,
+        "residual": remainder.as_json() if remainder else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
     }
@@ -127,13 +127,13 @@ def _depends_on(
     before: Sequence[Dependence], after: Sequence[Dependence]
 ) -> dict[str, list[dict[str, Any]]]:
     """Return what each joint's residual depends on, under the baseline and the extended model."""
-    left = {(one.joint, one.variable): one.share for one in after}
+    shares = {(one.joint, one.variable): one.share for one in after}
     return {
         joint: [
             {
                 "variable": one.variable,
                 "share_before": one.share,
-                "share_after": left[joint, one.variable],
+                "share_after": shares[joint, one.variable],
             }
             for one in before
             if one.joint == joint

@@ -37,7 +37,7 @@ class Stretch:
 
 def worst_stretch(d: Diagnosis) -> Stretch:
     """Return where the baseline leaves most of the torque, in units of each joint's noise floor."""
-    return max(_stretches(d), key=lambda found: found[0])[1]
+    return max(_stretches(d), key=lambda pair: pair[0])[1]
 
 
 def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
@@ -54,7 +54,7 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
 
 
 def simulated_error(
-    made: Validated, d: Diagnosis, stretch: Stretch
+    validated: Validated, d: Diagnosis, stretch: Stretch
 ) -> tuple[NDArray, NDArray] | None:
     """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN
     between two.
@@ -64,7 +64,7 @@ def simulated_error(
     """
     run = d.validate[stretch.run]
     try:
-        result = replay(model_of_run(made.fit, d.baseline, run), run.motion, every_s=WINDOW_S)
+        result = replay(model_of_run(validated.fit, d.baseline, run), run.motion, every_s=WINDOW_S)
     except (ExoidError, ZeroDivisionError):
         return None
     if not np.all(np.isfinite(result.error)):

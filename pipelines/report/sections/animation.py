@@ -43,11 +43,11 @@ def animations(session: Session) -> list[Animation]:
     """Return one for each replayed run of a machine that can be drawn."""
     if not drawn_as(session):
         return []
-    found = []
+    results = []
     for run, replays in replayed(session).items():
         tables = {model: session.table(one) for model, one in replays.items()}
-        found.append(_animation(session, run, tables))
-    return found
+        results.append(_animation(session, run, tables))
+    return results
 
 
 def drawn_as(session: Session) -> str:

@@ -22,31 +22,33 @@ rest."""
 def loops(session: Session) -> dict[str, Artifact]:
     """Return one adaptive loop of each model; where there are several, that with a person in the
     leg."""
-    found = {}
-    for model, made in session.simulations_by_model("loop").items():
+    results = {}
+    for model, simulations in session.simulations_by_model("loop").items():
         ranked = sorted(
-            made, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human"
+            simulations, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human"
         )
         if ranked and model in models_of(session):
-            found[model] = ranked[0]
-    return found
+            results[model] = ranked[0]
+    return results
 
 
 def control_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each joint, then that of the sweep."""
-    made = loops(session)
-    tables = {model: session.table(one).frame for model, one in made.items()}
+    of_models = loops(session)
+    tables = {model: session.table(one).frame for model, one in of_models.items()}
     if not tables:
         return
     settled = (
-        next(iter(made.values()))
+        next(iter(of_models.values()))
         .metadata.get("config", {})
         .get("simulate", {})
         .get("settled_after_s", 0.0)
     )
     for joint in session.joints:
         yield _loop_chart(joint, tables, settled)
-    sweep = _sweep_chart(session, {model: one.path.with_name(SWEEP) for model, one in made.items()})
+    sweep = _sweep_chart(
+        session, {model: one.path.with_name(SWEEP) for model, one in of_models.items()}
+    )
     if sweep:
         yield sweep
 

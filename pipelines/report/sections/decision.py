@@ -79,9 +79,9 @@ def _split(verdict: Mapping[str, Any], one: Shares) -> Split:
     )
 
 
-def _end_to_end(told: list[tuple[str, str, float]]) -> tuple[Part, ...]:
+def _end_to_end(shares: list[tuple[str, str, float]]) -> tuple[Part, ...]:
     parts, low = [], 0.0
-    for words, tone, share in told:
+    for words, tone, share in shares:
         parts.append(Part(words, tone, low, share))
         low += share
     return tuple(parts)

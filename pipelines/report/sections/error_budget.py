@@ -94,8 +94,8 @@ class Fall:
 
 def budget(verdict: dict[str, Any]) -> list[Bar]:
     """Return a bar for each joint; what takes away from an error lies left of zero."""
-    found = []
-    told = told_in_words(verdict)
+    rows = []
+    texts = told_in_words(verdict)
     for joint, shares in verdict["error_budget"].items():
         left = right = 0.0
         segments = []
@@ -103,7 +103,7 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
         for key, share in shares.items():
             start = right if share >= 0 else left
             tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
-            words = SHARES.get(key) or told.get(key) or any_label_in_words(key)
+            words = SHARES.get(key) or texts.get(key) or any_label_in_words(key)
             if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
                 words = "noise, all of it below the floor"
             segments.append(
@@ -112,8 +112,8 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
                 )
             )
             right, left = (right + share, left) if share >= 0 else (right, left + share)
-        found.append(Bar(joint, torque_unit(verdict, joint), tuple(segments)))
-    return found
+        rows.append(Bar(joint, torque_unit(verdict, joint), tuple(segments)))
+    return rows
 
 
 def falls(verdict: dict[str, Any]) -> list[Fall]:
@@ -173,14 +173,14 @@ def labels_in_words(text: str, labels: Iterable[str]) -> str:
     any_of = (
         re.compile(rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])") if known else None
     )
-    return any_of.sub(lambda found: any_label_in_words(found[0]), text) if any_of else text
+    return any_of.sub(lambda match: any_label_in_words(match[0]), text) if any_of else text
 
 
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
     """Return the causes of a verdict, most probable first, each with what cannot be told from
     it."""
-    told = [tied_in_words(cause) for cause in causes]
-    return (", and " if any(map(ties_of, causes)) else " and ").join(told)
+    words = [tied_in_words(cause) for cause in causes]
+    return (", and " if any(map(ties_of, causes)) else " and ").join(words)
 
 
 def tied_in_words(cause: dict[str, Any]) -> str:

@@ -34,17 +34,17 @@ def excitations(session: Session) -> list[Excitation]:
 
 def _excitation(session: Session, artifact: Artifact) -> Excitation:
     about = artifact.metadata
-    told = [
+    facts = [
         f"{words} {digits(about[key])}"
         for key, words in NUMBERS.items()
         if about.get(key) is not None
     ]
     if about.get("a") and about.get("omega_rad_s"):
         base_hz = about["omega_rad_s"] / (2 * pi)
-        told.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
+        facts.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
     return Excitation(
         session.shown(artifact.path),
-        ", ".join(told),
+        ", ".join(facts),
         tuple(about.get("margins") or ()),
         tuple(
             (name, error, unit(session, name))

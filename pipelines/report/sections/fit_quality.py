@@ -30,7 +30,7 @@ def run_names(session: Session) -> list[str]:
 def models_of(session: Session) -> dict[str, tuple[Role, str]]:
     """Return the models to be drawn: a diagnosis that names nothing has only one."""
     named = session.verdict is None or bool(session.verdict["causes"])
-    return {name: told for name, told in MODELS.items() if named or name == "baseline"}
+    return {name: title for name, title in MODELS.items() if named or name == "baseline"}
 
 
 def torque_charts(session: Session) -> Iterator[Chart]:
@@ -55,8 +55,8 @@ def _torque_chart(
         if len(rows) != len(first):
             continue
         torques.append(Series(words, rows[joint.column("predicted")].to_numpy(), role))
-        left = rows[joint.column("residual")].where(rows["scored"]).to_numpy()
-        errors.append(Series(words, left, role))
+        residual = rows[joint.column("residual")].where(rows["scored"]).to_numpy()
+        errors.append(Series(words, residual, role))
     torques.append(Series("measured", first[joint.column("torque")].to_numpy(), Role.MEASURED))
     return Chart(
         key=f"torque-{_stem(run)}-{joint.name}",
@@ -88,13 +88,13 @@ def angle_charts(session: Session) -> Iterator[Chart]:
 def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
     """Return the replays of a kind (see ``session.simulated``), by run and model that is to be
     drawn."""
-    found: dict[str, dict[str, Artifact]] = {}
+    results: dict[str, dict[str, Artifact]] = {}
     for model, replays in session.simulations_by_model(what).items():
         for one in replays if model in models_of(session) else ():
             source = session.recorded(one)
             run = source.path.name if source else one.inputs[-1]["name"]
-            found.setdefault(run, {}).setdefault(model, one)
-    return found
+            results.setdefault(run, {}).setdefault(model, one)
+    return results
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,12 @@ the unit."""
 def scores(session: Session, run: str) -> list[Score]:
     """Return how far off each model is in a run: its torque, and what the replays' files say, joint
     by joint."""
-    found = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
+    results = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
     for what, rows in SCORES.items():
         replays = replayed(session, what).get(run, {})
         for key, quantity, words, times, prefix in rows if replays else ():
             for joint in session.joints:
-                told = [
+                texts = [
                     (
                         replays[model].metadata.get(key, {}).get(joint.name)
                         if model in replays
@@ -142,11 +142,11 @@ def scores(session: Session, run: str) -> list[Score]:
                     f"{joint.name} {name}, {words.format(drive=joint.effort)},"
                     f" {prefix}{joint.unit(quantity)}"
                 )
-                values = tuple(None if value is None else times * value for value in told)
-                found.append(Score(where, values, LARGER if strays_further(*values) else ""))
+                values = tuple(None if value is None else times * value for value in texts)
+                results.append(Score(where, values, LARGER if strays_further(*values) else ""))
                 if what == "windows":
-                    found += _while_moving(session, replays, joint, where)
-    return [score for score in found if any(value is not None for value in score.values)]
+                    results += _while_moving(session, replays, joint, where)
+    return [score for score in results if any(value is not None for value in score.values)]
 
 
 def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
@@ -161,11 +161,11 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         ("away from reversals", rows[rows["scored"]]),
         ("reversals included", rows),
     ):
-        left = [
+        errors = [
             chosen.loc[chosen["model"] == model, joint.column("residual")]
             for model in models_of(session)
         ]
-        values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in left)
+        values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in errors)
         grew = floor is not None and torque_error_grew(*values, floor=floor)
         about = (
             ""

@@ -32,15 +32,15 @@ def tiles(session: Session) -> list[Tile]:
         return []
     # The tree of findings tells how probable each cause is; older verdicts have none.
     skipped = bool(verdict.get("findings"))
-    found = [
+    results = [
         tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]
     ]
     for fall in falls(verdict):
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
             big = f"{digits(fall.before / fall.floor)}{after}"
-            found.append(Tile(f"{fall.joint} error", big, "× floor", "1 would be noise alone"))
-    return [*found, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
+            results.append(Tile(f"{fall.joint} error", big, "× floor", "1 would be noise alone"))
+    return [*results, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
 
 
 def worst_joint(session: Session) -> Joint | None:
@@ -57,8 +57,8 @@ def worst_joint(session: Session) -> Joint | None:
 def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
     joint = cause["gain"]["joint"]
-    left = verdict["extended_rmse_nm"][joint]
-    beside = ", beside the other causes" if len(verdict["causes"]) > 1 else ""
+    remaining = verdict["extended_rmse_nm"][joint]
+    qualifier = ", beside the other causes" if len(verdict["causes"]) > 1 else ""
     unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
     words = cause_in_words(cause)
     return [
@@ -72,7 +72,7 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
             f"gain of {words}",
             digits(gain),
             unit,
-            f"{digits(left + gain)} → {digits(left)} {unit} at {the(joint)}{beside}; 95 %: "
+            f"{digits(remaining + gain)} → {digits(remaining)} {unit} at {the(joint)}{qualifier}; 95 %: "
             f"{digits(low)} … {digits(high)}",
         ),
     ]
@@ -106,7 +106,7 @@ def _loop_tiles(session: Session) -> list[Tile]:
         for one in replayed(session, "drives").values()
         if joint
         and len(one) == 2
-        and all(joint.name in made.metadata.get(key, {}) for made in one.values())
+        and all(joint.name in simulation.metadata.get(key, {}) for simulation in one.values())
     ]
     if not joint or not pairs:
         return []

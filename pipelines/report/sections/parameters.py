@@ -74,19 +74,19 @@ class Model:
 
 def models(session: Session) -> list[Model]:
     """Return every model of a session, those of ``exoid identify`` first."""
-    made = [
+    results = [
         (one, f"With {one.besides}" if one.besides else "Rigid body and friction")
         for one in session.identified
     ]
     if session.extended:
         named = bool(session.verdict and session.verdict["causes"])
-        made.append(
+        results.append(
             (
                 session.extended,
                 "Extended by the named causes" if named else "As the diagnosis fitted it",
             )
         )
-    return [_model(session, one, title) for one, title in made]
+    return [_model(session, one, title) for one, title in results]
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,8 @@ def side_by_side(shown: Sequence[Model]) -> list[Row]:
         for estimate in model.estimates:
             by_key.setdefault(estimate.key, {})[number] = estimate
     return [
-        Row(next(iter(found.values())), tuple(found.get(number) for number in range(len(shown))))
-        for found in by_key.values()
+        Row(next(iter(cells.values())), tuple(cells.get(number) for number in range(len(shown))))
+        for cells in by_key.values()
     ]
 
 

@@ -57,23 +57,23 @@ def origins(session: Session) -> list[Origin]:
             str(one.metadata.get("created_by") or "unknown"),
             str(one.metadata.get("created_at") or ""),
             one.sha256,
-            tuple(_input(session, told) for told in one.inputs),
+            tuple(_input(session, stated) for stated in one.inputs),
         )
         for one in session.artifacts
     ]
     return sorted(rows, key=lambda origin: (origin.created_at, origin.file))
 
 
-def _input(session: Session, told: dict[str, str]) -> Input:
-    if session.found(told["name"], told["sha256"]):
+def _input(session: Session, stated: dict[str, str]) -> Input:
+    if session.found(stated["name"], stated["sha256"]):
         state = "found"
     else:
         state = (
             "changed"
-            if any(one.path.name == told["name"] for one in session.artifacts)
+            if any(one.path.name == stated["name"] for one in session.artifacts)
             else "elsewhere"
         )
-    return Input(told["name"], told["sha256"], state)
+    return Input(stated["name"], stated["sha256"], state)
 
 
 @dataclass(frozen=True)
@@ -91,23 +91,23 @@ class Outside:
 
 def outside(session: Session) -> list[Outside]:
     """Return every file that the folders lack, once, however many were made of it."""
-    found: dict[str, Outside] = {}
+    results: dict[str, Outside] = {}
     for one in session.artifacts:
-        for told in one.inputs:
-            if _input(session, told).state != "elsewhere":
+        for stated in one.inputs:
+            if _input(session, stated).state != "elsewhere":
                 continue
-            name, role = _role(one, told["name"])
-            before = found.get(told["sha256"], Outside(name, role, told["sha256"], ()))
-            found[told["sha256"]] = replace(
+            name, role = _role(one, stated["name"])
+            before = results.get(stated["sha256"], Outside(name, role, stated["sha256"], ()))
+            results[stated["sha256"]] = replace(
                 before, made_of_it=(*before.made_of_it, session.shown(one.path))
             )
-    return list(found.values())
+    return list(results.values())
 
 
-def _role(made: Artifact, name: str) -> tuple[str, str]:
+def _role(artifact: Artifact, name: str) -> tuple[str, str]:
     """Return what a file that another was made of is called, with its path where that is told, and
     what it is."""
-    imported = made.metadata.get("imported")
+    imported = artifact.metadata.get("imported")
     if isinstance(imported, dict):
         which = "map" if name.endswith(".toml") else "source"
         given = (imported.get("given") or {}).get(which, name)
@@ -115,8 +115,8 @@ def _role(made: Artifact, name: str) -> tuple[str, str]:
             "map": "the log's map",
             "source": "a log",
         }[which]
-    config = made.metadata.get("config") or {}
-    if made.kind == "recording" and "rig" in config and name.endswith(".toml"):
+    config = artifact.metadata.get("config") or {}
+    if artifact.kind == "recording" and "rig" in config and name.endswith(".toml"):
         return name, "the rig's file"
     return name, ""
 
@@ -124,15 +124,15 @@ def _role(made: Artifact, name: str) -> tuple[str, str]:
 def stale(session: Session) -> list[str]:
     """Return a sentence for each file of which other files were made when it was not yet as it is
     here."""
-    made: dict[str, list[str]] = {}
+    by_file: dict[str, list[str]] = {}
     for origin in origins(session):
         for one in origin.inputs:
             if one.state == "changed":
-                made.setdefault(one.name, []).append(origin.file)
+                by_file.setdefault(one.name, []).append(origin.file)
     return [
         f"{name} has changed since {_few(files)} {'was' if len(files) == 1 else 'were'} made of it;"
         f" {AGAIN}"
-        for name, files in made.items()
+        for name, files in by_file.items()
     ]
 
 
@@ -146,24 +146,24 @@ def _few(files: Sequence[str]) -> str:
 def software(session: Session) -> list[tuple[str, list[str]]]:
     """Return each set of versions that files were made with, in words, and these files; nothing
     where none tells."""
-    found: dict[str, list[str]] = {}
+    versions: dict[str, list[str]] = {}
     for one in session.artifacts:
-        told = one.metadata.get("software")
-        if isinstance(told, dict) and told:
+        stated = one.metadata.get("software")
+        if isinstance(stated, dict) and stated:
             words = ", ".join(
                 f"{'Python' if name == 'python' else name} {version}"
-                for name, version in told.items()
+                for name, version in stated.items()
             )
-            found.setdefault(words, []).append(session.shown(one.path))
-    return list(found.items())
+            versions.setdefault(words, []).append(session.shown(one.path))
+    return list(versions.items())
 
 
 def settings(session: Session) -> dict[str, dict[str, Any]]:
     """Return every section of the settings that the files were made with, as they were resolved."""
-    found: dict[str, dict[str, Any]] = {}
+    values: dict[str, dict[str, Any]] = {}
     for artifact in session.artifacts:
-        found |= resolved(artifact)
-    return {name: found[name] for name in SECTIONS if name in found}
+        values |= resolved(artifact)
+    return {name: values[name] for name in SECTIONS if name in values}
 
 
 def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
@@ -179,16 +179,16 @@ def changed_settings(session: Session) -> list[str]:
     if session.config is None:
         return []
     now = Experiment.load(session.config)
-    made: dict[str, list[str]] = {}
+    by_value: dict[str, list[str]] = {}
     for one in session.artifacts:
-        for name, told in resolved(one).items():
+        for name, setting in resolved(one).items():
             is_now = getattr(now, name).model_dump(mode="json")
-            if any(told[key] != value for key, value in is_now.items() if key in told):
-                made.setdefault(name, []).append(session.shown(one.path))
+            if any(setting[key] != value for key, value in is_now.items() if key in setting):
+                by_value.setdefault(name, []).append(session.shown(one.path))
     return [
         f"{_few(files)} {'was' if len(files) == 1 else 'were'} made with another [{name}] than"
         f" {session.config.name} has now; {AGAIN}"
-        for name, files in made.items()
+        for name, files in by_value.items()
     ]
 
 
@@ -207,11 +207,11 @@ def commands(
     """Return the command lines that make the session's files again, in their order, and then the
     page."""
     named = session.config and session.config.parent not in session.folders
-    found = [
-        made
+    results = [
+        command
         for kind in _MADE_BY
         for one in session.of_kind(kind)
-        if (made := _MADE_BY[kind](session, one))
+        if (command := _MADE_BY[kind](session, one))
     ]
     page = [
         "report",
@@ -219,8 +219,8 @@ def commands(
         *(["--config", str(session.config)] if named else []),
     ]
     page += ["--title", title] if title else []
-    found.append((page + (["-o", str(output)] if output else []), False))
-    lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in found)
+    results.append((page + (["-o", str(output)] if output else []), False))
+    lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in results)
     return [Command(line, needs) for line, needs in lines]
 
 
@@ -233,18 +233,18 @@ def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Wo
         return ["--config", str(session.config)], False
     defaults = Experiment()
     usual = all(
-        told == getattr(defaults, name).model_dump(mode="json")
-        for name, told in resolved(artifact).items()
+        value == getattr(defaults, name).model_dump(mode="json")
+        for name, value in resolved(artifact).items()
     )
     return ([], False) if usual and not always else (["--config", "exoid.toml"], True)
 
 
-def _path_of(session: Session, told: dict[str, str]) -> str:
-    return str(session.found(told["name"], told["sha256"]) or told["name"])
+def _path_of(session: Session, stated: dict[str, str]) -> str:
+    return str(session.found(stated["name"], stated["sha256"]) or stated["name"])
 
 
 def _inputs(session: Session, artifact: Artifact) -> list[str]:
-    return [_path_of(session, told) for told in artifact.inputs]
+    return [_path_of(session, stated) for stated in artifact.inputs]
 
 
 def _folder(path: Path) -> str:
@@ -279,9 +279,9 @@ def _record(session: Session, artifact: Artifact) -> Words | None:
 def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str]:
     """Return the words that import a log: where it lies in these folders, else where the command
     had it."""
-    told, given = artifact.inputs, artifact.metadata["imported"].get("given") or {}
+    log, given = artifact.inputs, artifact.metadata["imported"].get("given") or {}
     # Not in these folders.
-    names = [name for name, one in zip(inputs, told, strict=True) if name == one["name"]]
+    names = [name for name, one in zip(inputs, log, strict=True) if name == one["name"]]
     maps = [name for name in inputs if name.endswith(".toml")]
     sources = [name for name in inputs if name not in maps]
     if any(name in names for name in sources) and given:
@@ -302,13 +302,13 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
     causes = [_path_of(session, artifact.causes)] if artifact.causes else []
     runs = [path for path in _inputs(session, artifact) if path not in causes]
-    told = [word for path in causes for word in ("--causes", path)]
-    told += [word for label in artifact.effects for word in ("--effect", label)]
+    words = [word for path in causes for word in ("--causes", path)]
+    words += [word for label in artifact.effects for word in ("--effect", label)]
     asked = resolved(artifact).get("identify") or {}
     if asked.get("method", IdentifySettings().method) != IdentifySettings().method:
-        told += ["--method", asked["method"]]
-    told += ["--reversals"] * bool(asked.get("reversals"))
-    return ["identify", *runs, *told, *config, "-o", _folder(artifact.path)], needs
+        words += ["--method", asked["method"]]
+    words += ["--reversals"] * bool(asked.get("reversals"))
+    return ["identify", *runs, *words, *config, "-o", _folder(artifact.path)], needs
 
 
 def _diagnose(session: Session, artifact: Artifact) -> Words | None:

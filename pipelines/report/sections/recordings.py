@@ -53,12 +53,12 @@ class Run:
     @property
     def notes(self) -> list[str]:
         """Return what else is to be said of it."""
-        told = {
+        texts = {
             "imported from": self.imported,
             "clocks": "; ".join(self.clocks),
             "filtered by": self.filter,
         }
-        return [f"{words} {what}" for words, what in told.items() if what]
+        return [f"{words} {what}" for words, what in texts.items() if what]
 
 
 def runs(session: Session) -> list[Run]:
@@ -122,5 +122,5 @@ def _imported(about: Any) -> str:
 def _filter(about: Any) -> str:
     if not isinstance(about, dict):
         return ""
-    told = f"{about.get('kind', 'filter')}, {about.get('cutoff_hz', 0):.3g} Hz".replace("_", " ")
-    return f"{told}: {about['why']}" if about.get("why") else told
+    text = f"{about.get('kind', 'filter')}, {about.get('cutoff_hz', 0):.3g} Hz".replace("_", " ")
+    return f"{text}: {about['why']}" if about.get("why") else text

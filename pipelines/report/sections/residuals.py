@@ -42,15 +42,15 @@ class Against:
 def against(session: Session, joint: Joint) -> list[Against]:
     """Return what a joint's residuals can be drawn against; the other joint's motion too where
     there is one."""
-    found = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
+    charts = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
-            found += [
+            charts += [
                 _along(other, quantity, f"other_{variable}")
                 for quantity, variable in DEPENDENCES.items()
                 if variable != "acceleration"
             ]
-    return [*found, Against("time", "time", "time, s", "time_s")]
+    return [*charts, Against("time", "time", "time, s", "time_s")]
 
 
 def _along(joint: Joint, quantity: str, variable: str) -> Against:

@@ -37,13 +37,13 @@ def settings_apart(first: Session, second: Session) -> list[SettingApart]:
 
 
 def _told(session: Session) -> dict[str, list[str]]:
-    found: dict[str, dict[str, None]] = {}
+    by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}
         for section in SECTIONS:
             for name, value in _flat(section, config.get(section)):
-                found.setdefault(name, {})[value] = None
-    return {name: list(values) for name, values in found.items()}
+                by_setting.setdefault(name, {})[value] = None
+    return {name: list(values) for name, values in by_setting.items()}
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:

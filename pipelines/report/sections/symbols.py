@@ -29,12 +29,12 @@ def terms(session: Session) -> list[Explained]:
         for one in session.of_kind("parameters")
         for row in session.table(one).frame[["effect", "joint"]].to_dict("records")
     ]
-    found: dict[str, Explained] = {}
+    results: dict[str, Explained] = {}
     for name, joint in rows:
         effect = bound(session, name, joint)
-        if effect and name not in found:
-            found[name] = Explained(effect.title, effect.equation, parameters(effect))
-    return list(found.values())
+        if effect and name not in results:
+            results[name] = Explained(effect.title, effect.equation, parameters(effect))
+    return list(results.values())
 
 
 def meaning(session: Session, effect: str, joint: str, name: str) -> str:
@@ -70,7 +70,7 @@ def bound(session: Session, name: str, joint: str | None) -> Effect | None:
 
 
 def _machine(joints: tuple[Joint, ...], session: Session) -> Machine:
-    told = (one.metadata.get("geometry") for one in session.of_kind("parameters"))
-    geometry = next((one for one in told if isinstance(one, dict)), {})
+    geometries = (one.metadata.get("geometry") for one in session.of_kind("parameters"))
+    geometry = next((one for one in geometries if isinstance(one, dict)), {})
     known = {key: geometry[key] for key in ("thigh_length_m", "gravity_m_s2") if key in geometry}
     return machine_of(joints, Geometry(**known))

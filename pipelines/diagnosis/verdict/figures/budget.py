@@ -25,11 +25,11 @@ NEGLIGIBLE = 0.005
 """Share of a bar that is not worth a line."""
 
 
-def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     """Draw a bar for each joint, and beside it every share in N·m, at a prismatic joint in N."""
     budget, units = (
-        said["error_budget"],
-        {joint: of["torque"] for joint, of in said["units"].items()},
+        verdict["error_budget"],
+        {joint: of["torque"] for joint, of in verdict["units"].items()},
     )
     drawn, axes = plt.subplots(len(budget), 1, figsize=(9, 0.6 + 1.5 * len(budget)), squeeze=False)
     colours = colours_of(budget)

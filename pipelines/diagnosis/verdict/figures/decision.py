@@ -67,34 +67,34 @@ BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
 AGAINST = " (validation runs against it)"
 
 
-def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     """Draw the residual's shares on the left, and the posterior over sets on the right."""
     bars = _bars(d)
     lines = sum(_height(bar) for bar in bars)
     drawn = plt.figure(figsize=(11, max(SMALLEST_IN, LINE_IN * lines + 1.3)), layout="constrained")
     grid = drawn.add_gridspec(2, 2, width_ratios=[1, 1.1], height_ratios=[1.25, 1])
-    _shares(drawn.add_subplot(grid[0, 0]), said)
-    _dependence(drawn.add_subplot(grid[1, 0]), said)
+    _shares(drawn.add_subplot(grid[0, 0]), verdict)
+    _dependence(drawn.add_subplot(grid[1, 0]), verdict)
     _sets(drawn.add_subplot(grid[:, 1]), bars)
     drawn.draw_without_rendering()  # lays out, which whoever measures the figure relies on
     return drawn
 
 
-def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
+def _shares(axis: Axes, verdict: Mapping[str, Any]) -> None:
     """Draw a bar for each joint, cut into what its residual is made of."""
     seen: dict[str, Patch] = {}
-    router = said["router"]
-    for row, told in enumerate(router.values()):
+    router = verdict["router"]
+    for row, shares in enumerate(router.values()):
         start = 0.0
         for part in ORDER:
-            share = told[part] or 0.0
+            share = shares[part] or 0.0
             axis.barh(row, share, left=start, color=COLOURS[part], **BAR)
             if share > TEXT:
                 _number(axis, row, start, share, part)
             if share > NEGLIGIBLE:
                 seen[PARTS[part]] = Patch(color=COLOURS[part])
             start += share
-            person = min(told["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
+            person = min(shares["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
             if person > NEGLIGIBLE:
                 axis.barh(
                     row,
@@ -107,14 +107,16 @@ def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
                     lw=0,
                 )
                 seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
-    units = {joint: of["torque"] for joint, of in said["units"].items()}
+    units = {joint: of["torque"] for joint, of in verdict["units"].items()}
     names = [f"{j}\n{router[j]['rms_nm']:.3g} {units[j]} rms" for j in router]
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlim(0.0, 1.0)
     axis.grid(visible=False)
     axis.xaxis.set_major_formatter(lambda x, _: f"{x:.0%}")
-    axis.set_xlabel(f"share of the mean square, 0.1 s averages, {searched_runs(said)}", fontsize=8)
+    axis.set_xlabel(
+        f"share of the mean square, 0.1 s averages, {searched_runs(verdict)}", fontsize=8
+    )
     words = [one for one in (*map(PARTS.get, ORDER), PERSON) if one in seen]
     axis.legend(
         [seen[one] for one in words],
@@ -141,11 +143,11 @@ def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None
     )
 
 
-def _dependence(axis: Axes, said: Mapping[str, Any]) -> None:
+def _dependence(axis: Axes, verdict: Mapping[str, Any]) -> None:
     """Draw a field for each joint and variable: how much of the error a curve of it predicts."""
     ranked = {
         joint: {one["variable"]: one["share_before"] for one in ranking}
-        for joint, ranking in said["depends_on"].items()
+        for joint, ranking in verdict["depends_on"].items()
     }
     variables = _variables(ranked)
     shares = np.array([[of.get(name, np.nan) for name in variables] for of in ranked.values()])

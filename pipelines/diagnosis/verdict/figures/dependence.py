@@ -20,9 +20,9 @@ EXPLAINED = (
 )
 
 
-def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     """Draw a row for each joint and a column for each rank."""
-    ranked = {joint: _shown(ranking) for joint, ranking in said["depends_on"].items()}
+    ranked = {joint: _shown(ranking) for joint, ranking in verdict["depends_on"].items()}
     columns = max(len(ranking) for ranking in ranked.values())
     drawn, axes = plt.subplots(
         len(ranked),
@@ -32,14 +32,14 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         sharey="row",
     )
     for j, (row, (joint, ranking)) in enumerate(zip(axes, ranked.items(), strict=True)):
-        seen = [against(one["variable"], d, joint, said["runs"]) for one in ranking]
+        seen = [against(one["variable"], d, joint, verdict["runs"]) for one in ranking]
         height = max(reach(s.before, s.after) for s in seen)
         for axis, one, values in zip(row, ranking, seen, strict=False):
             draw(axis, values, float(d.floor.rms[j]), height, bool(d.causes))
             axis.set_title(_predicted(one, bool(d.causes)), fontsize=8)
         for axis in row[len(ranking) :]:
             axis.set_axis_off()
-        row[0].set_ylabel(f"{joint} residual, {said['units'][joint]['torque']}")
+        row[0].set_ylabel(f"{joint} residual, {verdict['units'][joint]['torque']}")
     names = ["before"] + ["after"] * bool(d.causes)
     lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)

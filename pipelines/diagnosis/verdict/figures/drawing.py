@@ -22,9 +22,11 @@ ON_SCREEN = ("simulation", "dependence")
 """Many panels to look at, not to print: a PDF of each would take as long as all the rest."""
 
 
-def draw(d: Diagnosis, said: dict[str, Any], folder: Path) -> None:
+def draw(d: Diagnosis, verdict: dict[str, Any], folder: Path) -> None:
     """Write every figure as PNG, and what is to be printed as PDF too; ``said`` is the diagnosis's
     verdict."""
     with plt.rc_context(STYLE):
         for name, figure in DRAWN_BY.items():
-            save(figure(d, said), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf"))
+            save(
+                figure(d, verdict), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf")
+            )

@@ -21,7 +21,7 @@ FAR_MRAD = 500.0
 """Error beyond which a window has nothing more to show."""
 
 
-def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     """Draw angle, angle error, torque and torque error of each joint, a column each."""
     joints, stretch = d.baseline.joints, worst_stretch(d)
     drawn, axes = plt.subplots(
@@ -41,22 +41,22 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
             -d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor"
         )
         column[0].set_title(
-            f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9
+            f"{joint}: 1 s simulations stray {_strayed(verdict, joint)}", loc="left", fontsize=9
         )
         column[2].set_title(
-            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by {_off(d, said, joint)}",
+            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by {_off(d, verdict, joint)}",
             loc="left",
             fontsize=9,
         )
         column[-1].set_xlabel("time, s")
-    for name, colour, made in models:
-        _angles(axes[0], axes[1], made, d, stretch, name, colour)
-        _torques(axes[2], axes[3], made, d, stretch, colour)
+    for name, colour, validated in models:
+        _angles(axes[0], axes[1], validated, d, stretch, name, colour)
+        _torques(axes[2], axes[3], validated, d, stretch, colour)
     for error in axes[1]:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
     angle, torque = (
-        either(said["units"][joint][quantity] for joint in joints)
+        either(verdict["units"][joint][quantity] for joint in joints)
         for quantity in ("angle", "torque")
     )
     where = either(joint.place for joint in d.baseline.machine.joints)
@@ -90,26 +90,26 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _strayed(said: dict[str, Any], joint: str) -> str:
+def _strayed(verdict: dict[str, Any], joint: str) -> str:
     before, after = (
-        said[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended")
+        verdict[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended")
     )
     if before is None:
         return "no one can tell: these parameters move no leg"
     words = f"{1e3 * before:.1f}"
-    if said["causes"]:
+    if verdict["causes"]:
         words += (
             f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
         )
-    return f"{words} m{said['units'][joint]['angle']} rms"
+    return f"{words} m{verdict['units'][joint]['angle']} rms"
 
 
-def _off(d: Diagnosis, said: dict[str, Any], joint: str) -> str:
+def _off(d: Diagnosis, verdict: dict[str, Any], joint: str) -> str:
     machine = d.baseline.machine
-    words = number(machine, said["baseline_rmse_nm"][joint])
-    if said["causes"]:
-        words += f" → {number(machine, said['extended_rmse_nm'][joint])}"
-    floor = number(machine, said["noise_floor_nm"][joint])
+    words = number(machine, verdict["baseline_rmse_nm"][joint])
+    if verdict["causes"]:
+        words += f" → {number(machine, verdict['extended_rmse_nm'][joint])}"
+    floor = number(machine, verdict["noise_floor_nm"][joint])
     return f"{words} {machine.joint(joint).unit('torque')} rms, noise floor {floor}"
 
 
@@ -131,13 +131,13 @@ def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int)
 def _angles(
     angles: list[Axes],
     errors: list[Axes],
-    made: Validated,
+    validated: Validated,
     d: Diagnosis,
     stretch: Stretch,
     name: str,
     colour: str,
 ) -> None:
-    simulated = simulated_error(made, d, stretch)
+    simulated = simulated_error(validated, d, stretch)
     motion = d.validate[stretch.run].motion
     for j, (angle, error) in enumerate(zip(angles, errors, strict=True)):
         if simulated is None:
@@ -152,7 +152,7 @@ def _angles(
 def _torques(
     torques: list[Axes],
     errors: list[Axes],
-    made: Validated,
+    validated: Validated,
     d: Diagnosis,
     stretch: Stretch,
     colour: str,
@@ -161,6 +161,6 @@ def _torques(
     blocks = stretch.within(run.time)
     for j, (torque, error) in enumerate(zip(torques, errors, strict=True)):
         known = run.usable[blocks, j]
-        left = np.where(known, made.residuals[stretch.run][blocks, j], np.nan)
-        torque.plot(run.time[blocks], run.measured[blocks, j] - left, color=colour, lw=2)
-        error.plot(run.time[blocks], left, color=colour, lw=1.1)
+        residual = np.where(known, validated.residuals[stretch.run][blocks, j], np.nan)
+        torque.plot(run.time[blocks], run.measured[blocks, j] - residual, color=colour, lw=2)
+        error.plot(run.time[blocks], residual, color=colour, lw=1.1)

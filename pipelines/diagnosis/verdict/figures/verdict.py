@@ -33,23 +33,23 @@ LINE_IN, BODY_IN = 0.19, 3.5
 """Heights of a line of the summary and of what is beneath it."""
 
 
-def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     """Draw the error budget, and the residual against the variable that shows best what is
     wrong."""
-    summary = textwrap.wrap(said["summary"], WIDTH)
+    summary = textwrap.wrap(verdict["summary"], WIDTH)
     head = 0.1 + LINE_IN * len(summary)
     height = head + BODY_IN
     drawn, (left, right) = plt.subplots(1, 2, figsize=(10, height), width_ratios=[1, 1.1])
-    _budget(left, d, said)
-    _shape(right, d, said)
+    _budget(left, d, verdict)
+    _shape(right, d, verdict)
     drawn.text(0.01, 1.0, "\n".join(summary), ha="left", va="top", fontsize=9.5, fontweight="bold")
     drawn.tight_layout(rect=(0, 0, 1, 1 - head / height))
     return drawn
 
 
-def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
+def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     """Draw each joint's bar to its own scale: its baseline's mean square is 100 %."""
-    budget = said["error_budget"]
+    budget = verdict["error_budget"]
     colours = colours_of(budget)
     totals = {joint: sum(shares.values()) for joint, shares in budget.items()}
     for row, (joint, shares) in enumerate(budget.items()):
@@ -57,7 +57,7 @@ def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     axis.set_yticks(
         range(len(budget)),
         [
-            f"{joint}\n{rms(total)} {said['units'][joint]['torque']}"
+            f"{joint}\n{rms(total)} {verdict['units'][joint]['torque']}"
             for joint, total in totals.items()
         ],
         fontsize=9,
@@ -68,7 +68,7 @@ def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
         for joint, shares in budget.items()
     ]
     axis.set_xlim(min(low for low, _ in ends), max(high for _, high in ends))
-    units = " and ".join(dict.fromkeys(of["torque"] for of in said["units"].values()))
+    units = " and ".join(dict.fromkeys(of["torque"] for of in verdict["units"].values()))
     axis.set_xlabel(f"share of the mean square error, %; numbers: {units} rms")
     there = [
         key
@@ -85,18 +85,18 @@ def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     )
 
 
-def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
+def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     """Draw the residual where the first cause shows best, or where the unexplained does."""
     if d.causes:
-        joint, variable, kinds = _shown_best(d, said)
+        joint, variable, kinds = _shown_best(d, verdict)
     else:
         joint = max(
-            said["noise_floor_nm"],
-            key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j],
+            verdict["noise_floor_nm"],
+            key=lambda j: verdict["baseline_rmse_nm"][j] / verdict["noise_floor_nm"][j],
         )
         # When a fault of acquisition sets in tells more than what it goes with.
         variable, kinds = (
-            "time" if d.data.spoilt else said["depends_on"][joint][0]["variable"],
+            "time" if d.data.spoilt else verdict["depends_on"][joint][0]["variable"],
             RUNS,
         )
     j = d.baseline.joints.index(joint)
@@ -104,7 +104,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(
-        f"{joint} {d.baseline.machine.joint(joint).effort} error, {said['units'][joint]['torque']}"
+        f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict['units'][joint]['torque']}"
     )
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
@@ -121,10 +121,10 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     )
 
 
-def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
+def _shown_best(d: Diagnosis, verdict: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
     """Return joint, variable and kinds of run: what the first cause adds goes with the variable
     most."""
-    first = said["causes"][0]
+    first = verdict["causes"][0]
     joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
     runs = [
         (run, b - a)
