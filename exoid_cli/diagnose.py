@@ -101,7 +101,7 @@ def diagnose(
     model = {
         "covariance": diagnosis.covariance.tolist(),
         "mechanism": machine.mechanism.name,
-        "geometry": machine.told(geometry),
+        "geometry": machine.metadata(geometry),
         "method": {"name": "joint fit of baseline and named causes", "status": diagnosis.status},
         "collinear": diagnosis.collinear,
         "unrealizable": diagnosis.unrealizable,

@@ -168,7 +168,7 @@ def _write(
     described = {
         "covariance": model.covariance.tolist(),
         "mechanism": run.machine.mechanism.name,
-        "geometry": run.machine.told(run.geometry),
+        "geometry": run.machine.metadata(run.geometry),
         "one_step": model.one_step.tolist(),
         "validation": model.validation.as_json(),
         "collinear": model.collinear,

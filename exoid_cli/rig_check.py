@@ -65,7 +65,7 @@ def check(
       exoid rig check rigs/real_time.toml --rate-hz 200
       exoid rig check rig.toml --by-hand
     """
-    from pipelines.acquisition.check.check import check_rig, refuse_to_move_somebody
+    from pipelines.acquisition.check.check import check_rig, refuse_to_move_a_person
     from pipelines.errors import DeviceError
 
     if file is None:
@@ -76,7 +76,7 @@ def check(
     if rate_hz is None and (config or in_experiment_folder()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":
-        refuse_to_move_somebody(by_hand=by_hand, move=move)
+        refuse_to_move_a_person(by_hand=by_hand, move=move)
     console.say(f"{file}: asking every device")
     if move and not yes:
         confirm_move()

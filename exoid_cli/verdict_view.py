@@ -171,7 +171,7 @@ def _show_known(known: Mapping[str, Any]) -> None:
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
     from pipelines.contracts.joints import the
-    from pipelines.wording.label import effect_told, in_words
+    from pipelines.wording.label import effect_of_cause, in_words
 
     where = f" at {the(cause['joint'])}" if cause["joint"] else ""
     likely = f"probability {cause['probability']:.2f}"
@@ -183,7 +183,7 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
     for sentence in cause["evidence"]:
         console.note(f"- {sentence}")
     for tie in cause["indistinguishable_from"]:
-        console.note(f"or {in_words(effect_told(tie))}: {tie['why']}; {tie['how_to_separate']}")
+        console.note(f"or {in_words(effect_of_cause(tie))}: {tie['why']}; {tie['how_to_separate']}")
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:

@@ -40,14 +40,14 @@ from pipelines.contracts.provenance import describe
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
-from pipelines.process.termination import ENDING, heard, known
+from pipelines.process.termination import ENDING, handled, known
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
 Begin = Callable[[RigSettings, Trajectory], None]
 T = TypeVar("T")
-HEED_S = 0.05
+SIGNAL_POLL_S = 0.05
 """How often it is looked for signals while devices are waited for before anything moves."""
 
 
@@ -172,9 +172,9 @@ async def _record(
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.load_plan(plan, start)
         if rig.clock == "real_time":
-            await _heeding(refuse_unkept_rate(machine, supervisor.rate), stopped_by)
+            await _until_signal(refuse_unkept_rate(machine, supervisor.rate), stopped_by)
         sampling = sampling_of(machine, supervisor.rate, supervisor.check_records)
-        await _heeding(machine.empty_records(), stopped_by)
+        await _until_signal(machine.empty_records(), stopped_by)
         try:
             with _opened(path, ["time_s", *columns_of(machine)], metadata) as journal:
                 claim()
@@ -182,10 +182,11 @@ async def _record(
                 await loop.run()
                 journal.end(supervisor.why, loop.metadata())
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
+            why = supervisor.why
+            state = f". {_with_drive_state(supervisor, why)}" if why else ""
             raise DeviceError(
                 f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes"
-                " a recording of what is in"
-                f" it{f'. {_left(supervisor, supervisor.why)}' if supervisor.why else ''}"
+                f" a recording of its rows{state}"
             ) from error
     finally:
         machine.close()
@@ -204,27 +205,27 @@ async def _ready(
     machine: Machine, rate_hz: float, reset_faults: bool, stopped_by: Sequence[str]
 ) -> NDArray:
     """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
-    await _heeding(machine.connect(), stopped_by)
-    await _heeding(machine.refuse_driven(), stopped_by)
-    # Whatever comes meanwhile: each drive is to hear that it shall be idle, and no fault reset is
+    await _until_signal(machine.connect(), stopped_by)
+    await _until_signal(machine.refuse_driven(), stopped_by)
+    # Whatever comes meanwhile: each drive is to note that it shall be idle, and no fault reset is
     # left half way.
     if reset_faults:
         await machine.reset_faults()
     await machine.make_idle()
-    await _heeding(machine.refuse_other_rate(rate_hz), stopped_by)
-    start = np.array((await _heeding(machine.look(), stopped_by)).angle)
+    await _until_signal(machine.refuse_other_rate(rate_hz), stopped_by)
+    start = np.array((await _until_signal(machine.look(), stopped_by)).angle)
     if why := check_start(machine.rig, start):
         raise DeviceError(why)
     return start
 
 
-async def _heeding(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T:
+async def _until_signal(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T:
     """Return what work comes to that only asks, and leave off at a signal however long a device is
     waited for."""
     task = asyncio.ensure_future(work)
     try:
         while not task.done():
-            await asyncio.wait([task], timeout=HEED_S)
+            await asyncio.wait([task], timeout=SIGNAL_POLL_S)
             if stopped_by:
                 raise DeviceError(
                     f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved"
@@ -248,11 +249,11 @@ def _signals() -> Iterator[list[str]]:
     names = known({**ENDING, "SIGTSTP": "Ctrl-Z"})
     came, late = list[str](), list[signal.Signals]()
 
-    def hear(number: int, frame: FrameType | None) -> None:
+    def note(number: int, frame: FrameType | None) -> None:
         late.append(signal.Signals(number))
         came.append(names[late[-1]])
 
-    with heard(names, hear):
+    with handled(names, note):
         yield came
     for number in late[:1]:
         signal.raise_signal(number)
@@ -262,9 +263,11 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
     """Return whose fault the end of a run is, and in words how it ended and how it left the leg."""
     if supervisor.fault:
         log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
-        return ExoidError, _left(supervisor, f"{supervisor.why}; please report it with {log}")
+        return ExoidError, _with_drive_state(
+            supervisor, f"{supervisor.why}; please report it with {log}"
+        )
     return DeviceError, (
-        _left(supervisor, supervisor.why) if supervisor.why else "the run is complete"
+        _with_drive_state(supervisor, supervisor.why) if supervisor.why else "the run is complete"
     )
 
 
@@ -306,8 +309,8 @@ def _recorded(
             else "no sample of it can be read, since"
         )
         raise kind(
-            f"{text}; {state_of_drives} the disk did not give back all that was written; check the disk,"
-            f" {path} is kept"
+            f"{text}; {state_of_drives} the disk did not give back all that was written; check the"
+            f" disk, {path} is kept"
         ) from fault
     lock.remove()
     if account.abort:
@@ -322,7 +325,7 @@ def _recorded(
     )
 
 
-def _left(supervisor: Supervisor, why: str) -> str:
+def _with_drive_state(supervisor: Supervisor, why: str) -> str:
     """Return why a run was stopped, with how that has left the leg; what somebody must do at once
     comes first."""
     return (

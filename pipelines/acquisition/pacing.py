@@ -71,7 +71,7 @@ class PhaseLock:
         self._counter = counter
         self._patience_s = patience_s
         self._due = time.perf_counter()
-        self._found: int | None = None
+        self._count: int | None = None
         self._early: tuple[float, int] | None = None
         """When a look came too early, and which sample it found: the one after it was latched later
         than that."""
@@ -83,7 +83,7 @@ class PhaseLock:
         What was waited for and not brought by an exchange has had its time all the same.
         """
         began = time.perf_counter()
-        looked = last if self._found is None else self._found
+        looked = last if self._count is None else self._count
         before = max(last, looked)  # an exchange may have found a later one than the look before it
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
@@ -93,7 +93,7 @@ class PhaseLock:
                 continue  # by now another sample may be latched
             if count != before:
                 self._due += (count - looked - LEAN) * self._period
-                self._found = count
+                self._count = count
                 return count
             if now - began > self._patience_s:
                 return last

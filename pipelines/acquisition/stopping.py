@@ -35,7 +35,7 @@ class Stopping:
 
     async def run(self) -> None:
         """Bring every drive to rest and take its torque away."""
-        joints = [j for j, drive in enumerate(self._drives) if drive.was_told]
+        joints = [j for j, drive in enumerate(self._drives) if drive.was_sent]
         self._moving = set(joints)
         stops = [asyncio.ensure_future(self._stop(joint)) for joint in joints]
         for joint, stop in zip(joints, stops, strict=True):
@@ -155,7 +155,7 @@ class Stopping:
         """Watch the cuffs while the drives slow down: nobody is held where cuffs press."""
         try:
             while not self._supervisor.pressing:
-                self._supervisor.safe_stop.check_cuffs(await self._exchange.machine.felt())
+                self._supervisor.safe_stop.check_cuffs(await self._exchange.machine.cuff_forces())
                 await asyncio.sleep(1.0 / self._supervisor.rate)
         except BaseException as error:
             # Else it was cancelled.

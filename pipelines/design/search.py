@@ -38,7 +38,7 @@ Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """The outcome of a search."""
 
     trajectory: FourierTrajectory
@@ -49,7 +49,7 @@ class Found:
 
 def search(
     settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None
-) -> Found:
+) -> SearchResult:
     """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen
     criterion.
 
@@ -94,7 +94,9 @@ def search(
             "no excitation within the bounds tells the parameters apart; widen [design.bounds] or"
             " add harmonics"
         )
-    return Found(_trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by)
+    return SearchResult(
+        _trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by
+    )
 
 
 def _problem(

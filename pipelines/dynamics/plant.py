@@ -52,7 +52,11 @@ class Plant:
             }
             for term in self.model
         ]
-        return {"run": self.run, "geometry": self.machine.told(self.geometry), "effects": effects}
+        return {
+            "run": self.run,
+            "geometry": self.machine.metadata(self.geometry),
+            "effects": effects,
+        }
 
 
 def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:

@@ -87,7 +87,7 @@ class Cogging(Effect):
             angle = values[2 * lines + i] * at.q[joint]
             out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
 
-    def told_by(self, names: Collection[str]) -> "Cogging":
+    def with_parts_named(self, names: Collection[str]) -> "Cogging":
         """Return the effect with as many lines as the names of values tell of."""
         numbers = range(2, MOST_LINES + 1)
         present = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]

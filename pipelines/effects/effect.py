@@ -438,7 +438,7 @@ class Effect(ABC):
         behind = np.array([self.physical(values - step) for step in steps])
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
 
-    def told_by(self, names: Collection[str]) -> "Effect":
+    def with_parts_named(self, names: Collection[str]) -> "Effect":
         """Return the effect with as many parts as the names of some values tell of; of most effects
         there is one."""
         return self

@@ -33,7 +33,7 @@ class Fit:
     weights: NDArray
     """(J,) of the joints: inverse variance of what is left there."""
     scores: Scores
-    told: dict[str, Any] = field(default_factory=dict)
+    about: dict[str, Any] = field(default_factory=dict)
     """What the method says of itself, for the file's metadata."""
     remarks: tuple[str, ...] = ()
     """What the user should know, a sentence each."""

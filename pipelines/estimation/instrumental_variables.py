@@ -72,7 +72,7 @@ class InstrumentalVariables(Estimator):
             *distrust(settled, f"{ITERATIONS} iterations"),
             _sentence(test, problem.names, solution),
         )
-        return replace(solution, told=about, remarks=remarks)
+        return replace(solution, about=about, remarks=remarks)
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,9 @@ class OutputError(Estimator):
             values, more, settled = _searched(problem, values, size, weights)
             simulations += more
         fit = _fit(problem, values, size, weights)
-        about = fit.told | {"simulations": simulations, "settled": settled}
+        about = fit.about | {"simulations": simulations, "settled": settled}
         return replace(
-            fit, told=about, remarks=distrust(settled, f"{simulations} simulations of all runs")
+            fit, about=about, remarks=distrust(settled, f"{simulations} simulations of all runs")
         )
 
 

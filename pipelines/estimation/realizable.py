@@ -44,7 +44,7 @@ class Realizable(Estimator):
         values = nearest(problem, free.values, free.normal)
         moved = np.abs(values - free.values) > MOVED * np.sqrt(np.diag(free.sensitivity))
         if not moved.any():
-            return replace(free, told={**free.told, "constrained": False})
+            return replace(free, about={**free.about, "constrained": False})
         rises = [residual_rms(problem.rows, problem.completed(v)) for v in (free.values, values)]
         raised = ", ".join(
             f"{joint} {before:.4g} to {after:.4g} N·m"
@@ -55,8 +55,8 @@ class Realizable(Estimator):
             f" torque: {raised}. That is evidence of an effect that the model lacks: `exoid"
             " diagnose` looks for it"
         )
-        about = {**free.told, "constrained": True, "least_squares_values": free.values.tolist()}
-        return replace(free, values=values, told=about, remarks=(remark,))
+        about = {**free.about, "constrained": True, "least_squares_values": free.values.tolist()}
+        return replace(free, values=values, about=about, remarks=(remark,))
 
 
 def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:

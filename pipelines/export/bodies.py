@@ -90,12 +90,12 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
         alone. And where it is not known how a mechanism's bodies are chosen.
     """
     mechanism = exported.machine.mechanism
-    if mechanism not in MADE:
+    if mechanism not in BODIES_OF:
         raise InputError(
             f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose"
             " masses for; export to c, matlab or json, which need no bodies"
         )
-    return MADE[exported.machine.mechanism](exported)
+    return BODIES_OF[exported.machine.mechanism](exported)
 
 
 def _leg(exported: Exported) -> tuple[Body, ...]:
@@ -172,7 +172,7 @@ def _moment_across(exported: Exported, joint: Joint) -> float:
     return float(term.values[0]) if term else 0.0
 
 
-MADE: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
+BODIES_OF: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
     LEG: _leg,
     LEVEL_LEG: _level_leg,
     PENDULUM: _pendulum,

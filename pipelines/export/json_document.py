@@ -59,7 +59,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
             }
             for joint in exported.joints
         ],
-        "geometry": exported.machine.told(exported.geometry),
+        "geometry": exported.machine.metadata(exported.geometry),
         "conventions": CONVENTIONS,
         "parameters": [_plain(row) for row in table.frame.to_dict("records")],
         "covariance": table.metadata.get("covariance"),

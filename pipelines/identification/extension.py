@@ -20,7 +20,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run
-from pipelines.model import BASELINE, Term, terms_beside_bodies
+from pipelines.model import BASELINE, Term, terms_next_to_bodies
 from pipelines.model.per_run import guess, own_term
 from pipelines.wording.label import effect_at
 
@@ -141,7 +141,7 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     _refuse_another_machine(table, runs[0])
     kinds = {run.run for run in runs if run.purpose == "train"}
     with about(table.path):
-        others = terms_beside_bodies(table.frame, runs[0].machine)
+        others = terms_next_to_bodies(table.frame, runs[0].machine)
     causes = [one for one in others if one[0].effect.name not in BASELINE]
     acting = [one for one in causes if any(one[0].effect.acts(kind) for kind in kinds)]
     remarks = [
@@ -187,7 +187,7 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
             f" of a {run.machine.mechanism.name} with {', '.join(ours)}; {remedy}"
         )
     geometry = table.metadata.get("geometry") or {}
-    for name, length in run.machine.told(run.geometry).items():
+    for name, length in run.machine.metadata(run.geometry).items():
         if not np.isclose(geometry.get(name, length), length):
             raise InputError(
                 f"{table.path}: has {name} {geometry[name]:g}, the runs have {length:g}; {remedy}"

@@ -47,7 +47,7 @@ RESTLESS = (
     " with these runs"
 )
 
-Found = TypeVar("Found", bound=Fit, covariant=True)
+FitT = TypeVar("FitT", bound=Fit, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Identified:
 
     def model_of(self, run: Run) -> Model | None:
         """Return what was found, as it is in a run; None where none of its kind was trained on."""
-        return _found(self.training, self.values, run)
+        return _as_model(self.training, self.values, run)
 
     @property
     def models(self) -> dict[str, Model]:
@@ -167,7 +167,9 @@ def identify(
         parameters=table,
         covariance=covariance,
         one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),
-        validation=validate(judged, lambda run: _found(training, values, run), training.cutoff_hz),
+        validation=validate(
+            judged, lambda run: _as_model(training, values, run), training.cutoff_hz
+        ),
         runs=(*training.runs, *judged),
         training=training,
         values=values,
@@ -259,18 +261,18 @@ def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
     return bodies | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
 
 
-def _found(training: Training, values: NDArray, run: Run) -> Model | None:
+def _as_model(training: Training, values: NDArray, run: Run) -> Model | None:
     if run.run not in training.kinds:
         return None
     return training.model_of(run, values).for_run(run.run)
 
 
 @dataclass(frozen=True)
-class Step(Generic[Found]):
+class Step(Generic[FitT]):
     """One of the two steps."""
 
     problem: Problem
-    fit: Found
+    fit: FitT
 
 
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
@@ -303,7 +305,7 @@ def _method(
         "samples": "all" if training.reversals or not estimator.masks else away,
         "covariance": "sandwich with Bartlett-weighted long-run scores, Andrews' lag",
         "interval": "95 %, critical value after Kiefer and Vogelsang",
-        "steps": {kind: step.fit.told for kind, step in steps.items()},
+        "steps": {kind: step.fit.about for kind, step in steps.items()},
     }
 
 

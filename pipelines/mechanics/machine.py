@@ -90,7 +90,7 @@ class Machine:
         slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
         return seconds * min(1.0, slowest)
 
-    def told(self, geometry: Geometry) -> dict[str, float]:
+    def metadata(self, geometry: Geometry) -> dict[str, float]:
         """Return what a file says of the machine's geometry: no length where none is in its
         equations."""
         stated = geometry.metadata()

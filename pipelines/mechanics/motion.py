@@ -121,7 +121,7 @@ class Motion:
             yield slice(int(start), int(stop))
 
     @cached_property
-    def felt(self) -> NDArray | None:
+    def held_forces(self) -> NDArray | None:
         """Cuff forces at every sample, (n, 4, 3) N, for sensors are often read less often than
         drives.
 
@@ -155,7 +155,9 @@ class Motion:
     def on_segments(self) -> NDArray | None:
         """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there
         are none."""
-        return None if self.felt is None else self.felt.reshape(-1, 2, 2, 3).sum(axis=2)
+        return (
+            None if self.held_forces is None else self.held_forces.reshape(-1, 2, 2, 3).sum(axis=2)
+        )
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
         """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not

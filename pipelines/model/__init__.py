@@ -5,7 +5,7 @@ from pipelines.model.model import BY_NAME, Model, Motions, Term, effect_named, t
 from pipelines.model.parameter_layout import Column, ParameterLayout, TermColumns
 from pipelines.model.parameters_table import (
     model_from_parameters,
-    terms_beside_bodies,
+    terms_next_to_bodies,
     unrealizable,
     upside_down,
 )
@@ -23,7 +23,7 @@ __all__ = [
     "effect_named",
     "model_from_parameters",
     "term_from",
-    "terms_beside_bodies",
+    "terms_next_to_bodies",
     "unrealizable",
     "upside_down",
 ]

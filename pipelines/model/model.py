@@ -231,7 +231,7 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     InputError
         Where values are missing, or others than the effect's.
     """
-    effect = effect.told_by(values)
+    effect = effect.with_parts_named(values)
     known = {parameter.name: parameter for parameter in effect.parameters}
     missing = [
         name

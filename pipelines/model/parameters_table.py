@@ -26,7 +26,7 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
         known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
     terms = [
-        term for term, _ in terms_beside_bodies(frame, machine) if term.effect.run in (None, run)
+        term for term, _ in terms_next_to_bodies(frame, machine) if term.effect.run in (None, run)
     ]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
@@ -40,7 +40,7 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
 
 
-def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
+def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
     """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the
     rows that tell it.
 

@@ -30,7 +30,7 @@ def with_own_values(
 def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
     """Return a term as the recording of a hash has it; as it is where the table tells none, None if
     it never came."""
-    values = _told(term, table, sha256)
+    values = _stated(term, table, sha256)
     if values is None:
         return term
     return None if None in values.values() else _with(term, values)
@@ -40,7 +40,7 @@ def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) 
     """Say what ``own_term`` had to take in the place of a recording's own values; None where it had
     not."""
     own = [p.name for p in term.effect.parameters if p.per_run]
-    if not own or _told(term, table, sha256) is not None:
+    if not own or _stated(term, table, sha256) is not None:
         return None
     label, runs = term.effect.label, _runs(term, table)
     of = f"that of {runs[0]['name']}, the first run it tells of" if runs else "that of its rows"
@@ -52,7 +52,7 @@ def _runs(term: Term, table: Table) -> list[dict[str, Any]]:
     return (table.metadata.get("each_run") or {}).get(term.effect.label, [])
 
 
-def _told(term: Term, table: Table, sha256: str | None) -> dict[str, float | None] | None:
+def _stated(term: Term, table: Table, sha256: str | None) -> dict[str, float | None] | None:
     return next((one["values"] for one in _runs(term, table) if one["sha256"] == sha256), None)
 
 

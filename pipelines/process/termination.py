@@ -26,16 +26,16 @@ def not_ignored(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
 
 
 @contextmanager
-def heard(
-    numbers: Iterable[signal.Signals], hear: Callable[[int, FrameType | None], None]
+def handled(
+    numbers: Iterable[signal.Signals], handle: Callable[[int, FrameType | None], None]
 ) -> Iterator[None]:
-    """Let ``hear`` be told of signals for as long as a block lasts, and whoever was before it
+    """Let ``handle`` be told of signals for as long as a block lasts, and whoever was before it
     afterwards."""
     before = {}
     # Outside a process's main thread nobody can catch signals, and nobody is sent them.
     with suppress(ValueError):
         for number in numbers:
-            before[number] = signal.signal(number, hear)
+            before[number] = signal.signal(number, handle)
     try:
         yield
     finally:

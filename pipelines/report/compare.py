@@ -128,7 +128,7 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
         "headlines": [headline(session) for session in pair],
         "models": models,
         "settings": settings_apart(first, second),
-        "beside_floor": _beside_floor(pair),
+        "beside_floor": _next_to_floor(pair),
         # A parameter that both models have is counted once, in the one that is told last and knows
         # most.
         "beyond": models[-1].beyond if models else 0,
@@ -177,7 +177,7 @@ def _verdict_changed(pair: tuple[Session, Session]) -> str:
 
 
 @dataclass(frozen=True)
-class BesideFloor:
+class NextToFloor:
     """One error of a joint in both sessions, each beside its session's floor."""
 
     joint: str
@@ -201,7 +201,7 @@ class BesideFloor:
         return f"{self.joint}, {self.model}: {parts[0]} → {parts[1]}"
 
 
-def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
+def _next_to_floor(pair: tuple[Session, Session]) -> list[NextToFloor]:
     """Return each joint's error without causes and, where either names any, with them."""
     first, second = (session.verdict for session in pair)
     if not first or not second:
@@ -210,7 +210,7 @@ def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
     if first["causes"] or second["causes"]:
         kinds.append(("with what each names", "extended_rmse_nm"))
     return [
-        BesideFloor(
+        NextToFloor(
             joint,
             words,
             torque_unit(first, joint),
@@ -335,9 +335,9 @@ def _cause_cell(session: Session, cause: dict[str, Any] | None) -> dict[str, Any
     }
 
 
-def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[BesideFloor]]]:
+def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[NextToFloor]]]:
     """Return for each error, without causes and with them, a pair of bars for each joint."""
-    rows = _beside_floor(pair)
+    rows = _next_to_floor(pair)
     models = dict.fromkeys(row.model for row in rows)
     return [
         (model[:1].upper() + model[1:], [row for row in rows if row.model == model])

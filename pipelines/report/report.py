@@ -23,8 +23,8 @@ from pipelines.report.sections.error_budget import (
     causes_in_words,
     falls,
     labels_in_words,
+    shares_in_words,
     ties_of,
-    told_in_words,
 )
 from pipelines.report.sections.excitation import excitations
 from pipelines.report.sections.fit_quality import (
@@ -334,7 +334,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     # What another set's zeros would be, one for all runs or each run's own, the table does not
     # tell.
     reasons = dict.fromkeys(
-        ("named", "indistinguishable"), told_in_words(session.verdict or {"causes": []})
+        ("named", "indistinguishable"), shares_in_words(session.verdict or {"causes": []})
     )
     return [
         {

@@ -86,7 +86,7 @@ class Session:
         """Return the files of one contract, in the order of their paths."""
         return [one for one in self.artifacts if one.kind == kind]
 
-    def found(self, name: str, digest: str) -> Path | None:
+    def file_of(self, name: str, digest: str) -> Path | None:
         """Return the file of these bytes, whoever made it; None where the folders hold none of them
         under that name."""
         ours = (one.path for one in self.artifacts if one.sha256 == digest)
@@ -166,7 +166,7 @@ class Session:
     @cached_property
     def extended(self) -> Artifact | None:
         """The parameters of the model with the named causes: those beside the verdict."""
-        return self._beside_verdict("parameters")
+        return self._next_to_verdict("parameters")
 
     @cached_property
     def identified(self) -> list[Artifact]:
@@ -184,13 +184,13 @@ class Session:
     def residuals(self) -> Table | None:
         """What is left before and after; of the identification alone where no diagnosis was
         made."""
-        file = self._beside_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
+        file = self._next_to_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
         return self.table(file) if file else None
 
     @cached_property
     def candidates(self) -> Table | None:
         """Every cause that was tried."""
-        file = self._beside_verdict("candidates")
+        file = self._next_to_verdict("candidates")
         return self.table(file) if file else None
 
     def table(self, artifact: Artifact) -> Table:
@@ -224,7 +224,7 @@ class Session:
             None,
         )
 
-    def _beside_verdict(self, kind: str) -> Artifact | None:
+    def _next_to_verdict(self, kind: str) -> Artifact | None:
         if self.verdict_file is None:
             return None
         folder = self.verdict_file.path.parent

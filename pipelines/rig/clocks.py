@@ -25,7 +25,7 @@ class OwnClock:
         self._plant_rate = plant_rate_hz
         self._gain = 1.0 + 1e-6 * ppm
         self._offset_s = offset_s
-        self._told = 0
+        self._sampled = 0
         self._seen: list[Samples] = []
 
     def sampled(self, chunk: Samples) -> Samples:
@@ -34,9 +34,9 @@ class OwnClock:
         self._seen.append(chunk)
         latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
-        if count <= self._told:
+        if count <= self._sampled:
             return _last(chunk, 0)
-        numbers, self._told = np.arange(self._told, count), count
+        numbers, self._sampled = np.arange(self._sampled, count), count
         seen = _joined(self._seen)
         self._seen = [_last(seen, KEPT)]
         instants = (numbers + 0.5) / (self._rate * self._gain)

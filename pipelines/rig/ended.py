@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from pipelines.process.termination import ENDING, heard, known, not_ignored
+from pipelines.process.termination import ENDING, handled, known, not_ignored
 
 
 @contextmanager
@@ -15,9 +15,9 @@ def ended_by_signals(until: asyncio.Event) -> Iterator[list[int]]:
     came."""
     loop, came = asyncio.get_running_loop(), list[int]()
 
-    def hear(number: int, frame: FrameType | None) -> None:
+    def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
         loop.call_soon_threadsafe(until.set)  # which wakes a loop that waits
 
-    with heard(not_ignored(known(ENDING)), hear):
+    with handled(not_ignored(known(ENDING)), note):
         yield came

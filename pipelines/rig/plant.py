@@ -147,7 +147,7 @@ class Plant:
             torque=torque,
             temperature=temperature,
             reference=reference,
-            forces=self._felt(human, truth) if self.has_human else self._noise_alone(n),
+            forces=self._cuff_forces(human, truth) if self.has_human else self._noise_alone(n),
             truth=truth,
         )
 
@@ -162,7 +162,7 @@ class Plant:
             np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple
         )
 
-    def _felt(self, human_torque: NDArray, truth: NDArray) -> NDArray:
+    def _cuff_forces(self, human_torque: NDArray, truth: NDArray) -> NDArray:
         forces = cuff_forces(human_torque, truth[:, Q], self.settings)
         return (
             forces + self._zeros + self._noise.normal(0.0, self.settings.cuff.noise_n, forces.shape)

@@ -183,7 +183,7 @@ class Drive(Device):
             and address + count <= self.write.address + self.write.count
         )
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Let the servo take what was written since it was last heard."""
         if not self.written:
             return
@@ -193,7 +193,7 @@ class Drive(Device):
         # Where there is a counter for that, only a new count tells that the host lives.
         beat, self._beat = self._beat, values.get("heartbeat")
         if beat is None or beat != self._beat:
-            self.servo.hear(values["reference"], int(values["control"]))
+            self.servo.receive(values["reference"], int(values["control"]))
 
     def record(self, samples: Samples) -> None:
         """Take in what the plant did since the last time."""
@@ -211,7 +211,7 @@ class Drive(Device):
 
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
-        self.hear()
+        self.receive()
         self._put(self.read, self._values(sample))
 
     def show_records(self, address: int, count: int) -> None:
@@ -339,7 +339,7 @@ class VirtualRig:
         """Go on by some samples, during which the drives are told nothing new, from measured angles
         (J,) rad."""
         for drive in self.drives:
-            drive.hear()
+            drive.receive()
         set_points = [
             [drive.servo.next(float(angle[drive.joint])) for drive in self.drives]
             for _ in range(count)

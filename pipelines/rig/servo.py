@@ -53,7 +53,7 @@ class Servo:
         self._limits = angle_rad
         self._slowing = deceleration_rad_s2 / sample_rate_hz**2
         self._patience = None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
-        self._told, self._control = rest, registers.disable
+        self._set_point, self._control = rest, registers.disable
         self._last, self._step, self._unheard = rest, 0.0, 0
         self._pace = 0.0
         self._from, self._way = rest, float(samples_per_cycle)
@@ -75,21 +75,23 @@ class Servo:
         # The lowest bit that means a fault: which of them it is, the map does not tell.
         return word | (self._map.fault_mask & -self._map.fault_mask if self.fault else 0)
 
-    def hear(self, reference: float, control: int) -> None:
+    def receive(self, reference: float, control: int) -> None:
         """Take a set-point (rad) and a control word."""
         # It holds where it is told no number: arithmetic would carry that on for ever.
         set_point = reference if isfinite(reference) else self._last
         cycles = self._cycles_to(set_point)
         # The set-points' own speed: the way back from having gone on too far is none to go on at.
         if cycles:
-            self._pace = (set_point - self._told) / (cycles * self._cycle) if self.enabled else 0.0
+            self._pace = (
+                (set_point - self._set_point) / (cycles * self._cycle) if self.enabled else 0.0
+            )
         # A cycle after the one before was to be reached; by and by a cycle after it comes.
         way = self._way - self._unheard + cycles * self._cycle
         self._from, self._way = self._last, max(way + CATCH * (self._cycle - way), 1.0)
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
-        self._told, self._control = set_point, control
+        self._set_point, self._control = set_point, control
 
     def _cycles_to(self, set_point: float) -> int:
         """Return how many set-points a new one (rad) is after the last one; 0 where it corrects
@@ -103,7 +105,7 @@ class Servo:
         return min(
             max(floor(waited), 0),
             ceil(waited),
-            key=lambda n: abs(set_point - self._told - n * self._cycle * self._pace),
+            key=lambda n: abs(set_point - self._set_point - n * self._cycle * self._pace),
         )
 
     def next(self, angle: float) -> tuple[float, bool]:
@@ -128,8 +130,8 @@ class Servo:
         if self._control == self._map.halt:
             return self._last
         if (after := self._unheard + 1) <= self._way:
-            return self._from + (self._told - self._from) * after / self._way
-        reference = self._told + self._pace * (after - self._way)
+            return self._from + (self._set_point - self._from) * after / self._way
+        reference = self._set_point + self._pace * (after - self._way)
         if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
             slower = max(abs(self._step) - self._slowing, 0.0)
             reference = self._last + (slower if self._step > 0 else -slower)

@@ -64,7 +64,7 @@ def effect_at(
     )
 
 
-def effect_told(cause: Mapping[str, Any]) -> Effect:
+def effect_of_cause(cause: Mapping[str, Any]) -> Effect:
     """Return the effect of a cause, or of a rival, as a verdict tells it."""
     effect = effect_named(cause["effect"])
     differs = cause.get("each_run") or cause.get("per_run")

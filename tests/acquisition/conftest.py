@@ -101,7 +101,7 @@ class Served:
     def enabled(self) -> list[bool]:
         """Whether each drive has been told to follow its set-point."""
         for drive in self.rig.drives:
-            drive.hear()
+            drive.receive()
         return [drive.servo.enabled for drive in self.rig.drives]
 
     def stop_soon(self) -> None:

@@ -21,7 +21,7 @@ ENABLE, DISABLE, HALT, RESET = 0x000F, 0x0000, 0x010F, 0x0080
 @pytest.fixture
 def heard(monkeypatch):
     """Control words that drives heard, each once in a row, by drive."""
-    words, hear = {}, Servo.hear
+    words, hear = {}, Servo.receive
 
     def remember(servo, reference, control):
         mine = words.setdefault(id(servo), [])
@@ -29,7 +29,7 @@ def heard(monkeypatch):
             mine.append(control)
         hear(servo, reference, control)
 
-    monkeypatch.setattr(Servo, "hear", remember)
+    monkeypatch.setattr(Servo, "receive", remember)
     return lambda: list(words.values())
 
 
@@ -64,14 +64,14 @@ def test_a_drive_that_knows_no_halt_is_held_by_its_set_point(record, heard):
 
 
 def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monkeypatch):
-    moved, served, hear = [], [], Servo.hear
+    moved, served, hear = [], [], Servo.receive
 
     def remember(servo, reference, control):
         moved.append(reference)
         hear(servo, reference, control)
 
     monkeypatch.setattr(Servo, "status", 0)
-    monkeypatch.setattr(Servo, "hear", remember)
+    monkeypatch.setattr(Servo, "receive", remember)
     with pytest.raises(DeviceError) as caught:
         record(served_as=served, control_s=0.5)
     assert str(caught.value).startswith(
@@ -85,8 +85,8 @@ def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monke
 def test_a_drive_that_says_it_is_no_longer_enabled_ends_the_run(record):
     def press(device, function, written):
         if isinstance(device, Drive) and device.rig.sample.sequence[0] > 300:
-            device.servo.hear(0.0, DISABLE)
-            device.servo.hear = lambda reference, control: None
+            device.servo.receive(0.0, DISABLE)
+            device.servo.receive = lambda reference, control: None
 
     with pytest.raises(DeviceError, match="is no longer enabled; was the emergency stop pressed"):
         record(fault=press)
@@ -206,7 +206,7 @@ def test_a_fault_that_the_rig_file_knows_no_word_for_is_not_cleared(
 
 
 def test_a_drive_is_told_with_every_write_that_the_host_lives(record, monkeypatch):
-    beats, hear = [], Drive.hear
+    beats, hear = [], Drive.receive
 
     def remember(drive):
         if drive.written and drive.joint == 0:

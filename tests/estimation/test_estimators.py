@@ -96,7 +96,7 @@ def test_outliers_that_shift_least_squares_leave_the_robust_fit_where_it_was(cle
     # It costs the blocks that are struck, a tenth of them, and little more.
     assert np.all(error(robust) < 1.5 * error(before))
     assert np.all(error(robust) < 0.6 * error(least_squares))
-    share = robust.told["rejected_share"]["joint"]
+    share = robust.about["rejected_share"]["joint"]
     assert 0.5 * 0.096 < share < 1.5 * 0.096, (
         "a block has five samples, each of which may be struck"
     )
@@ -141,7 +141,7 @@ def false_alarms(sessions):
     for seed in range(sessions):
         noise = Disturbed(correlation_s=(0.0005, 0.02, 0.2)[seed % 3])
         fit = InstrumentalVariables().fit(problem(motion(noise, seed)))
-        told.append(fit.told["durbin_wu_hausman"]["p_value"])
+        told.append(fit.about["durbin_wu_hausman"]["p_value"])
     return np.array(told)
 
 

@@ -90,7 +90,7 @@ def test_the_realizable_fit_of_unreal_data_is_the_nearest_on_the_boundary_by_bru
     ]
     assert min(np.abs(on_boundary)) < 1e-5
     assert (
-        fit.told["constrained"]
+        fit.about["constrained"]
         and "least squares alone finds no machine that can exist" in fit.remarks[0]
     )
 
@@ -133,7 +133,7 @@ def test_a_fit_that_can_exist_is_left_as_it_is():
     problem = problem_of(swing(np.array([1.0, 0.22, 0.55, 2.3])))
     free, fit = WeightedLeastSquares().fit(problem), Realizable().fit(problem)
     assert_allclose(fit.values, free.values, rtol=1e-9)
-    assert not fit.told["constrained"] and not fit.remarks
+    assert not fit.about["constrained"] and not fit.remarks
 
 
 def test_the_wearer_is_made_realizable_too():
@@ -160,7 +160,7 @@ def test_intervals_cover_a_truth_on_the_boundary():
     for seed in range(100):
         noise = np.random.default_rng(seed).normal(0.0, [0.5, 0.3], clean.torque.shape)
         found = estimated(Realizable().fit(problem_of(replace(clean, torque=clean.torque + noise))))
-        pushed += found.told["constrained"]
+        pushed += found.about["constrained"]
         half = found.critical * np.sqrt(np.diag(found.covariance))
         inside.append(np.abs(found.values - truth) <= half)
     print(f"\npushed back {pushed} of 100, covered {np.mean(inside):.3f}")

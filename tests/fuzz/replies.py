@@ -245,7 +245,7 @@ class Client:
             await self.machine.cycle(number, lambda drive: drive.exchange(0.1))
 
     async def _felt(self, rng: Random) -> None:
-        await self.machine.felt()
+        await self.machine.cuff_forces()
 
     async def _count(self, rng: Random) -> None:
         await self.machine.drives[0].count()

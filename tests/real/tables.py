@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.mechanics.motion import Motion
-from pipelines.wording.label import cause_label, effect_told
+from pipelines.wording.label import cause_label, effect_of_cause
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.real.relative_error import (
@@ -65,7 +65,7 @@ def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
 
 def _label(cause: Mapping[str, Any]) -> str:
     """Return a cause's label and those of what could stand in its place."""
-    effects = [effect_told(one) for one in (cause, *cause["indistinguishable_from"])]
+    effects = [effect_of_cause(one) for one in (cause, *cause["indistinguishable_from"])]
     return " or ".join("per-run " * effect.each_run + effect.label for effect in effects)
 
 

@@ -20,7 +20,7 @@ def servo():
 def moving(servo, speed=1.6, samples=100):
     """Lead a servo along a ramp; return where it is."""
     for k in range(samples):
-        servo.hear(k * speed / RATE, ENABLE)
+        servo.receive(k * speed / RATE, ENABLE)
         servo.next(0.0)
     return (samples - 1) * speed / RATE
 
@@ -44,7 +44,7 @@ def test_a_drive_that_is_told_something_in_time_goes_on(servo):
     moving(servo)
     for _ in range(round(HEARTBEAT_S * RATE) - 1):
         servo.next(0.0)
-    servo.hear(0.7, ENABLE)
+    servo.receive(0.7, ENABLE)
     assert servo.next(0.0) == (0.7, True)
 
 
@@ -61,21 +61,21 @@ def test_a_drive_that_goes_on_by_itself_stays_within_its_joints_limits(servo):
 
 
 def test_a_fault_is_latched_until_it_is_reset_and_a_reset_alone_does_not_enable(servo):
-    servo.hear(0.0, ENABLE)
+    servo.receive(0.0, ENABLE)
     servo.fault = True
     assert not servo.enabled
-    servo.hear(0.0, DISABLE)
-    servo.hear(0.0, ENABLE)
+    servo.receive(0.0, DISABLE)
+    servo.receive(0.0, ENABLE)
     assert (servo.enabled, servo.status) == (False, 0x0008)
-    servo.hear(0.0, RESET)
+    servo.receive(0.0, RESET)
     assert (servo.enabled, servo.status) == (False, 0x0000)
-    servo.hear(0.0, ENABLE)
+    servo.receive(0.0, ENABLE)
     assert (servo.enabled, servo.status) == (True, 0x0001)
 
 
 def test_a_halted_drive_stands_whatever_set_point_it_is_told(servo):
     last = moving(servo)
-    servo.hear(last + 0.3, HALT)
+    servo.receive(last + 0.3, HALT)
     assert servo.next(0.0) == (last, True)
 
 

@@ -24,10 +24,10 @@ def servo():
 @pytest.mark.parametrize("cycle", [1, 5, 20])
 def test_a_set_point_is_reached_in_a_straight_line_within_its_cycle(servo, cycle):
     drive, enable = servo(cycle)
-    drive.hear(0.0, enable)
+    drive.receive(0.0, enable)
     for _ in range(cycle):
         drive.next(0.0)
-    drive.hear(0.1, enable)
+    drive.receive(0.1, enable)
     path = [drive.next(0.0)[0] for _ in range(cycle)]
     np.testing.assert_allclose(path, 0.1 * np.arange(1, cycle + 1) / cycle)
 
@@ -38,7 +38,7 @@ def speeds(drive, enable, came):
     for number, sample in enumerate(came):
         if sample is not None:
             path += [drive.next(0.0)[0] for _ in range(sample - now)]
-            drive.hear(0.005 * number, enable)
+            drive.receive(0.005 * number, enable)
             now = sample
     return np.diff(path)
 
@@ -69,7 +69,7 @@ def test_set_points_that_come_irregularly_do_not_swing_the_drive_up(servo, cycle
     drive, enable = servo(cycle)
     draw, now, path = np.random.default_rng(0), 0, []
     for _ in range(400):
-        drive.hear(0.02 * np.sin(2 * np.pi * now / RATE), enable)
+        drive.receive(0.02 * np.sin(2 * np.pi * now / RATE), enable)
         late = int(draw.choice([cycle, max(cycle - 2, 1), cycle + 3, 7 * cycle, 20 * cycle]))
         path += [drive.next(0.0)[0] for _ in range(late)]
         now += late
@@ -83,10 +83,10 @@ def test_a_drive_of_the_shipped_template_reports_no_fault_while_it_is_merely_dis
     registers = load_rig(datasets() / "rigs" / "lab.toml").map.drive["servo"]
     assert registers.enabled_mask & registers.fault_mask  # as CiA 402 has it
     drive = Servo(registers, 0.0, (-3.0, 3.0), RATE, 8.0, None)
-    drive.hear(0.0, registers.disable)
+    drive.receive(0.0, registers.disable)
     assert not drive.status & registers.fault_mask
     assert drive.status & registers.enabled_mask != registers.enabled_value
-    drive.hear(0.0, registers.enable)
+    drive.receive(0.0, registers.enable)
     assert drive.status & registers.enabled_mask == registers.enabled_value
     drive.fault = True
     assert drive.status & registers.fault_mask

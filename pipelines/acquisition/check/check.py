@@ -55,7 +55,7 @@ def check_rig(
         Where another process holds one of the lines: nothing is connected then.
     """
     if run == "with_human":
-        refuse_to_move_somebody(by_hand=operator is not None, move=move)
+        refuse_to_move_a_person(by_hand=operator is not None, move=move)
     rig = load_rig(path)
     if rate_hz is None and rig.plant:
         rate_hz = rig.plant.sample_rate_hz
@@ -84,7 +84,7 @@ def check_rig(
         return report
 
 
-def refuse_to_move_somebody(*, by_hand: bool, move: bool) -> None:
+def refuse_to_move_a_person(*, by_hand: bool, move: bool) -> None:
     """Refuse to move a leg of unverified signs with somebody in it, or to take its torque away."""
     for option, given in (("--by-hand", by_hand), ("--move", move)):
         if given:

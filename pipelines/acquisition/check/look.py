@@ -117,7 +117,7 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     lost = await _connect(probes)
     for line, why in lost.items():
         report.findings.append(
-            _told_by(why, [probe for probe in probes if probe.part.device.line is line])
+            _finding_of(why, [probe for probe in probes if probe.part.device.line is line])
         )
     for probe in probes:
         device = DeviceReport(probe.name, probe.part.device.label)
@@ -127,7 +127,7 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
         try:
             await _meet(probe, device)
         except DeviceError as error:
-            finding = _told_by(error, [probe])
+            finding = _finding_of(error, [probe])
             if finding not in report.findings:  # a line that is lost says so of all its devices
                 report.findings.append(finding)
         else:
@@ -185,13 +185,13 @@ async def _ask_together(present: Sequence[Probe], report: RigReport) -> list[Fin
         report.together = await cycles(present, TOGETHER_S, report.rate_hz)
         report.drives_alone = await cycles(drives, DRIVES_S, report.rate_hz)
     except DeviceError as error:
-        return [_told_by(error, present)]
+        return [_finding_of(error, present)]
     if drives[0].in_lockstep or report.rate_hz is None:
         return []
     return list(check_rate(report.together, report.drives_alone, report.rate_hz))
 
 
-def _told_by(error: DeviceError, probes: Sequence[Probe]) -> Finding:
+def _finding_of(error: DeviceError, probes: Sequence[Probe]) -> Finding:
     """Return the complaint of one of the devices as a finding."""
     for probe in probes:
         if str(error).startswith(probe.part.device.label):

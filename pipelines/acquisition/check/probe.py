@@ -94,7 +94,10 @@ class Probe:
             return await self.read()
         asked = time.perf_counter()
         words = await self.part.idle_words(self.part.map.disable, self.last()["angle"])
-        self._keep(asked, await self.part.device.exchange(self.part.tell, words, self.part.told))
+        self._keep(
+            asked,
+            await self.part.device.exchange(self.part.write_block, words, self.part.read_block),
+        )
 
     async def count(self) -> None:
         """Read the sample counter alone, as a run does before each sample."""

@@ -32,7 +32,7 @@ class Bounds:
         self._latest, self._earliest = np.inf, -np.inf
         self._last: tuple[float, float] | None = None
 
-    def told(self, sequence: int, sent: float, received: float) -> None:
+    def add(self, sequence: int, sent: float, received: float) -> None:
         """Note that a request sent and answered then (s) found this sample the newest."""
         self._latest = min(self._latest, received - sequence * self._period_s)
         self._earliest = max(self._earliest, sent - (sequence + 1) * self._period_s)

@@ -76,17 +76,17 @@ class Drive:
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
         self.device = Device(f"drive {settings.joint}", settings.unit, line, rig.safety)
-        self.told = Block(registers_of(self.map.read))
-        self.tell = Block(registers_of(self.map.write))
+        self.read_block = Block(registers_of(self.map.read))
+        self.write_block = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
         self._status = Block({"status": self.map.read.status or self.map.read.sequence})
         self._beats, self._beats_span = (
             0,
-            int(self.tell.span("heartbeat")) if self.map.write.heartbeat else 1,
+            int(self.write_block.span("heartbeat")) if self.map.write.heartbeat else 1,
         )
         self._control_s = rig.safety.control_s
-        self._sequence = Counter(self.told.span("sequence"))
-        self._time = Counter(self.told.span("time"))
+        self._sequence = Counter(self.read_block.span("sequence"))
+        self._time = Counter(self.read_block.span("time"))
         self.bounds: Bounds | None = None
         """Told of every reply, where somebody wants to know when the drive samples."""
         self.ring = self._its_ring(samples_per_cycle) if rig.sampling == "recorder" else None
@@ -95,9 +95,9 @@ class Drive:
         self._temperature = np.nan
         self._sent = np.nan
         self._counted = 0
-        self.was_told = False
+        self.was_sent = False
         """Whether any set-point was on its way to it; else it need not be disabled."""
-        self.told_at = 0.0
+        self.sent_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be
         late."""
         self.conditions: list[Condition] = []
@@ -114,17 +114,20 @@ class Drive:
 
     def _recorded(self) -> frozenset[str]:
         if self.ring is None or self.map.ring is None:
-            return frozenset({"angle", "torque", "current", "reference", *self.told.names})
+            return frozenset({"angle", "torque", "current", "reference", *self.read_block.names})
         ring = registers_of(self.map.ring.record)
         return frozenset(
-            {"angle", "torque", "current", *ring, *({"temperature"} & set(self.told.names))}
+            {"angle", "torque", "current", *ring, *({"temperature"} & set(self.read_block.names))}
         )
 
     async def look(self, *, in_motion: bool = False) -> Reading:
         """Read without telling the drive anything."""
         sent = time.perf_counter()
         return self._reading(
-            await self.device.read(self.told.address, self.told.count, in_motion=in_motion), sent
+            await self.device.read(
+                self.read_block.address, self.read_block.count, in_motion=in_motion
+            ),
+            sent,
         )
 
     async def count(self) -> int:
@@ -206,7 +209,7 @@ class Drive:
         number = int(self._sequence(sequence))
         if sent is not None:
             if self.bounds:
-                self.bounds.told(number, sent, time.perf_counter())
+                self.bounds.add(number, sent, time.perf_counter())
             self._counted = number
         return number
 
@@ -215,12 +218,12 @@ class Drive:
         to stand there."""
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
-        self.was_told = True
+        self.was_sent = True
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
-        answer = await self.device.exchange(self.tell, words, self.told)
-        self._sent, self.told_at = before, time.monotonic()
+        answer = await self.device.exchange(self.write_block, words, self.read_block)
+        self._sent, self.sent_at = before, time.monotonic()
         reading = self._reading(answer, sent)
         self._sent = reference
         return reading
@@ -228,14 +231,14 @@ class Drive:
     async def disable(self, angle: float, *, in_motion: bool = False) -> None:
         """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was
         sent."""
-        await self._tell_idle(self.map.disable, angle, in_motion=in_motion)
+        await self._write_idle(self.map.disable, angle, in_motion=in_motion)
         if self.map.enabled_mask:
             await self._until(
                 lambda status: not self._is_enabled(status), "to disable", "see its manual"
             )
 
     async def is_driven(self) -> bool:
-        """Tell whether somebody else drives it, by watching it for a while; one that says it is
+        """Send whether somebody else drives it, by watching it for a while; one that says it is
         disabled nobody does.
 
         Nothing is written: a torque that is taken away comes back with the other's next set-point.
@@ -243,23 +246,27 @@ class Drive:
         at_first = await self._asked()
         if self.map.enabled_mask and not self._is_enabled(int(at_first["status"])):
             return False
-        until, first = time.monotonic() + WATCH_S, await self._all_told()
+        until, first = time.monotonic() + WATCH_S, await self._asked_values()
         while time.monotonic() < until:
             await asyncio.sleep(WATCH_PAUSE_S)
-            now = await self._all_told()
+            now = await self._asked_values()
             if now[0] != first[0] or not abs(now[1] - first[1]) <= DRIVEN_RAD:
                 return True
         return False
 
     async def _asked(self) -> Mapping[str, float]:
         """Read what the drive tells, outside any exchange."""
-        return self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        return self._decoded(
+            self.read_block, await self.device.read(self.read_block.address, self.read_block.count)
+        )
 
-    async def _all_told(self) -> tuple[object, float]:
+    async def _asked_values(self) -> tuple[object, float]:
         """Return what the drive has been told, as far as it tells, and its angle (rad)."""
         values = await self._asked()
         try:
-            written: object = await self.device.read(self.tell.address, self.tell.count)
+            written: object = await self.device.read(
+                self.write_block.address, self.write_block.count
+            )
         except Refused:  # not every drive lets what is written be read; then its angle must tell
             written = None
         return written, values["angle"]
@@ -292,7 +299,7 @@ class Drive:
                 " manual"
             )
         try:
-            await self._tell_idle(self.map.fault_reset, values["angle"])
+            await self._write_idle(self.map.fault_reset, values["angle"])
             await self._until(
                 lambda status: not status & self.map.fault_mask,
                 "to reset its fault",
@@ -300,9 +307,9 @@ class Drive:
             )
         except DeviceError:
             with suppress(DeviceError):  # the first one says what is wrong
-                await self._tell_idle(self.map.disable, values["angle"])
+                await self._write_idle(self.map.disable, values["angle"])
             raise
-        await self._tell_idle(self.map.disable, values["angle"])
+        await self._write_idle(self.map.disable, values["angle"])
 
     def words(self, control: int, reference: float) -> list[int]:
         """Return the registers that tell a control word and a set-point (rad).
@@ -332,17 +339,19 @@ class Drive:
         low, high = self.settings.angle_rad
         if low <= angle <= high:
             return self.words(control, angle)
-        held = self.tell.decode(await self.device.read(self.tell.address, self.tell.count))
+        held = self.write_block.decode(
+            await self.device.read(self.write_block.address, self.write_block.count)
+        )
         return self._encoded(control, held["reference"])
 
-    async def _tell_idle(self, control: int, angle: float, *, in_motion: bool = False) -> None:
+    async def _write_idle(self, control: int, angle: float, *, in_motion: bool = False) -> None:
         await self.device.write(
-            self.tell, await self.idle_words(control, angle), in_motion=in_motion
+            self.write_block, await self.idle_words(control, angle), in_motion=in_motion
         )
 
     def _encoded(self, control: int, reference: float) -> list[int]:
         self._beats = (self._beats + 1) % self._beats_span
-        return self.tell.encode(
+        return self.write_block.encode(
             {"reference": reference, "control": control, "heartbeat": self._beats}
         )
 
@@ -381,7 +390,7 @@ class Drive:
         return values
 
     def _reading(self, words: list[int], sent: float) -> Reading:
-        values = self.told.decode(words)
+        values = self.read_block.decode(words)
         # Heeded whatever else it tells that is no number.
         self.conditions.append(condition := self._condition(values.get("status", 0.0)))
         numbers = self._numbers(values)
@@ -438,5 +447,5 @@ class Drive:
         )
 
 
-Tell = Callable[[Drive], Awaitable[Reading]]
+Send = Callable[[Drive], Awaitable[Reading]]
 """Sends a drive its set-point and returns the sample that is latched."""

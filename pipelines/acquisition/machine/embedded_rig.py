@@ -59,7 +59,7 @@ def embedded(
             bufsize=0,
             **_ON_ITS_OWN,
         )
-        output = Said(process)
+        output = ProcessOutput(process)
         try:
             lines = len({device.line for device in (*rig.drive, *rig.sensor)})
             yield _at(rig, dict(_place(output, path, complaints) for _ in range(lines)))
@@ -67,7 +67,7 @@ def embedded(
             output.end()
 
 
-class Said:
+class ProcessOutput:
     """What a process says, line by line; a thread listens, for not every system can wait for a
     pipe."""
 
@@ -102,7 +102,7 @@ class Said:
         self._lines.put(b"")
 
 
-def _place(output: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
+def _place(output: ProcessOutput, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
     """Wait until the rig says where a line is; return its name, None for that of devices on none,
     and the place."""
     if line := output.line(START_S):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.clock_offset import Bounds
-from pipelines.acquisition.machine.drive import Drive, Reading, Tell
+from pipelines.acquisition.machine.drive import Drive, Reading, Send
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.modbus.line import lines_of
@@ -148,7 +148,7 @@ class Machine:
         ):
             await self._find_leads()
         self._counted = looks[-1][0].sequence
-        return Row(tuple(looks[-1]), await self.felt(), self.samples_per_cycle)
+        return Row(tuple(looks[-1]), await self.cuff_forces(), self.samples_per_cycle)
 
     async def _find_leads(self) -> None:
         """Find out how far the counters are apart though they go on while one drive after the other
@@ -188,8 +188,8 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, number: int, send: Tell) -> Answers:
-        """Tell all drives at once; return what came: the sample that all devices latched, or of
+    async def cycle(self, number: int, send: Send) -> Answers:
+        """Send all drives at once; return what came: the sample that all devices latched, or of
         each its newest.
 
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time
@@ -197,11 +197,11 @@ class Machine:
         twice, for a set-point that comes late is no set-point.
         """
         if self.rig.clock == "lockstep":
-            forces = await self.felt(number)
+            forces = await self.cuff_forces(number)
             answers = await answers_or_silence(map(send, self.drives))
         else:
             answers = await answers_or_silence(map(send, self.drives))
-            forces = await self.felt(number)
+            forces = await self.cuff_forces(number)
         readings = [answer for answer in answers if isinstance(answer, Reading)]
         whole = len(readings) == len(answers)
         if whole and self.latches:
@@ -210,7 +210,7 @@ class Machine:
         row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
         return Answers(tuple(answers), forces, row)
 
-    async def felt(self, cycle: int | None = None) -> NDArray:
+    async def cuff_forces(self, cycle: int | None = None) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of
         all."""
         due = [sensor for sensor in self.sensors if cycle is None or sensor.is_due(cycle)]

@@ -58,7 +58,7 @@ class Latched:
         return {}
 
 
-class Beside:
+class PendingRequest:
     """A request to a drive that goes on beside the cycle, which must not wait for it; one at a
     time."""
 
@@ -112,14 +112,14 @@ class Cycled:
     def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
         self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
         self._dither = np.random.default_rng(0)
-        self.beside = Beside()
+        self.pending = PendingRequest()
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what came since the last cycle: the second look at the last one, and this one's
         reading."""
-        seen = await self.beside.brought()
+        seen = await self.pending.brought()
         if self._looks_again:
-            self.beside.begin(self._look_again)
+            self.pending.begin(self._look_again)
         return [*seen, reading]
 
     async def _look_again(self) -> list[Reading]:
@@ -143,17 +143,17 @@ class Recorded:
         assert drive.ring  # a rig file that asks for recorders has one for every drive
         self._drive, self._block = drive, drive.ring.block
         self._drained: int | None = None
-        self.beside = Beside()
+        self.pending = PendingRequest()
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what was drained since the last cycle; mostly nothing, until a read is worth its
         while."""
-        samples = await self.beside.brought() if self.beside.is_answered else []
+        samples = await self.pending.brought() if self.pending.is_answered else []
         is_due = self._drained is None or reading.sequence >= self._drained + self._block
-        if is_due and not self.beside.is_under_way:
-            self.beside.begin(partial(self._drain, reading.sequence))
+        if is_due and not self.pending.is_under_way:
+            self.pending.begin(partial(self._drain, reading.sequence))
             if self._drive.in_lockstep:  # the drives wait
-                return samples + await self.beside.brought()
+                return samples + await self.pending.brought()
         return samples
 
     async def _drain(self, newest: int) -> list[Reading]:
@@ -208,7 +208,7 @@ class Streams:
     def end(self) -> None:
         """Ask the drives for nothing more beside the cycle."""
         for source in self._sources:
-            source.beside.end()
+            source.pending.end()
 
     def _whole(self, samples: Sequence[Sequence[Reading]]) -> Iterator[Row]:
         for drives in self._alignment.rows(samples):

@@ -55,7 +55,7 @@ class Device:
         self._unit = unit
         self._at_rest = Wait(safety.connect_s, "connect_s")
         self._in_motion = Wait(safety.longest_reply_s, "reply_s or watchdog_s")
-        self._to_tell = Wait(safety.watchdog_s, "watchdog_s")
+        self._write_wait = Wait(safety.watchdog_s, "watchdog_s")
 
     @property
     def awaited_s(self) -> float:
@@ -100,15 +100,15 @@ class Device:
         registers = list(getattr(response, "values", []))
         if len(registers) % words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(registers)} registers, expected a multiple of"
-                f" {words}; compare ring.words in the rig file with the device's manual"
+                f"{self.label}: answered {what} with {len(registers)} registers, expected a"
+                f" multiple of {words}; compare ring.words in the rig file with the device's manual"
             )
         return registers
 
     async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
         """Write a block by FC16."""
         what = f"writing registers {_range(block)}"
-        wait = self._in_motion if in_motion else self._to_tell
+        wait = self._in_motion if in_motion else self._write_wait
         request = self._client.write_registers
         await self._ask(what, None, wait, request, address=block.address, values=list(words))
 

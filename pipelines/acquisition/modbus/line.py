@@ -69,10 +69,10 @@ class Line:
         self.place = settings.place
         # Once: files are read, and a lost connection is no time for that.
         self._tls = _tls_context(settings) if isinstance(settings, TlsLine) else None
-        self.client = _client(settings, self._tls, timeout_s, self._told)
+        self.client = _client(settings, self._tls, timeout_s, self._note_connection)
         # The watchdog decides for how long silence is borne.
         self.client.set_max_no_responses(sys.maxsize)
-        check_replies(self.client, self._hear)
+        check_replies(self.client, self._note_reply)
         self.devices: list[str] = []
         """Who is on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
@@ -237,7 +237,7 @@ class Line:
                 return
             self._turn.release()
 
-    def _hear(self, unit: int) -> None:
+    def _note_reply(self, unit: int) -> None:
         """Note that a unit has replied, in time or not."""
         self._quiet_since = asyncio.get_running_loop().time()
         if owed := self._owed.get(unit):
@@ -254,7 +254,7 @@ class Line:
             loop = asyncio.get_running_loop()
             await asyncio.sleep(max(0.0, self._quiet_since + self._settings.quiet_s - loop.time()))
 
-    def _told(self, connected: bool) -> None:
+    def _note_connection(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: its answer will not come."""
         answer = self.client.ctx.response_future
         if self._asking and not connected and not answer.done():

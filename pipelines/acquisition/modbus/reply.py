@@ -84,14 +84,14 @@ class Conversation:
 
     def __init__(self, note: Callable[[int], None]) -> None:
         self._asked = ModbusPDU()
-        self._heard = note
+        self._note = note
 
     def __call__(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
         """Remember a request; return a reply, or what is wrong with it."""
         if sending:
             self._asked = pdu
             return pdu
-        self._heard(pdu.dev_id)
+        self._note(pdu.dev_id)
         wrong = None if isinstance(pdu, NoReply) else self._wrong(pdu)
         return pdu if wrong is None else _instead(pdu, wrong)
 

@@ -64,7 +64,7 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
                 source.samples(reading) for source, reading in zip(sources, row.drives, strict=True)
             )
     for source in sources:
-        await source.beside.brought()
+        await source.pending.brought()
     return late, done
 
 

@@ -35,8 +35,8 @@ def _contradiction(map_: DriveMap) -> str | None:
     written, read = map_.write.reference, map_.read.angle
     if written.scale * read.scale < 0.0:
         return (
-            f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign for"
-            " both, or the drive leaps to the other side of zero as it is enabled; find out by"
+            f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign"
+            " for both, or the drive leaps to the other side of zero as it is enabled; find out by"
             " `exoid rig check --by-hand` which is wrong, and turn that"
         )
     if map_.own_scale or not (apart := _apart(written, read)):

@@ -13,7 +13,7 @@ KEY = b"checksum"
 """Key under which a batch's own metadata hold it."""
 BLANK = b"exoid-batch:00000000"
 """How it stands there before it is known."""
-_TOLD = re.compile(rb"exoid-batch:([0-9a-f]{8})")
+_STATED = re.compile(rb"exoid-batch:([0-9a-f]{8})")
 
 
 def with_checksum(batch: bytes, head: bytes) -> bytes:
@@ -24,7 +24,7 @@ def with_checksum(batch: bytes, head: bytes) -> bytes:
 
 def fits(batch: bytes, head: bytes) -> bool:
     """Return whether a batch is what was written after this head."""
-    stated = _TOLD.search(batch)
+    stated = _STATED.search(batch)
     if stated is None:
         return False
     begin, end = stated.span(1)
@@ -33,4 +33,4 @@ def fits(batch: bytes, head: bytes) -> bool:
 
 def has_any(content: bytes) -> bool:
     """Return whether a part of a journal holds a checksum: those of an older exoid have none."""
-    return _TOLD.search(content) is not None
+    return _STATED.search(content) is not None

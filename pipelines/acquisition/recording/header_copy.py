@@ -15,7 +15,7 @@ COPY = b"head"
 """Key under which a batch's own metadata hold a copy of the head."""
 SEARCHED = 2**20
 """Bytes at the beginning and at the end of a journal in which a copy is looked for."""
-_TOLD = re.compile(rb"exoid-head:([0-9a-f]{8}):([A-Za-z0-9+/]+=*)")
+_STATED = re.compile(rb"exoid-head:([0-9a-f]{8}):([A-Za-z0-9+/]+=*)")
 
 
 def copy_of(head: bytes) -> str:
@@ -36,7 +36,7 @@ def ends_of(file: BinaryIO) -> Iterator[bytes]:
 def head_in(file: BinaryIO) -> bytes | None:
     """Return the head that the first whole copy in a journal holds; None where there is none."""
     for content in ends_of(file):
-        for stated in _TOLD.finditer(content):
+        for stated in _STATED.finditer(content):
             try:
                 head = b64decode(stated[2])
             except ValueError:

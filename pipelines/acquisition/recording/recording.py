@@ -78,7 +78,7 @@ def account_of(journal: JournalFile) -> Account:
             samples + len(index),
         )
         gaps, reached = gaps + metadata, int(index[-1]) + 1
-    ending = None if last_words is None else _said(last_words)
+    ending = None if last_words is None else _ending_of(last_words)
     if ending is None:
         # A full disk takes the last words with it: nobody can tell the two apart.
         why = (
@@ -97,7 +97,7 @@ def account_of(journal: JournalFile) -> Account:
     return Account(samples, planned, rate_hz, gaps, abort, found_out, damaged, journal.checked)
 
 
-def _said(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
+def _ending_of(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
     """Return why a run stopped early, what else it found out, and its number of samples; None where
     that is damaged."""
     try:
@@ -130,8 +130,8 @@ def _positive(journal: JournalFile, *keys: str) -> float:
         return value
     fault = "is missing" if value is None else f"is {value!r:.40}"
     raise ContractError(
-        f"{journal.path}: {'.'.join(keys)} of its metadata {fault}, expected a number above 0 and up"
-        f" to {LARGEST:g}; exoid wrote no such journal, nothing was changed"
+        f"{journal.path}: {'.'.join(keys)} of its metadata {fault}, expected a number above 0 and"
+        f" up to {LARGEST:g}; exoid wrote no such journal, nothing was changed"
     )
 
 

@@ -83,7 +83,7 @@ class ShapeRefinement:
         others: NDArray | None = None,
     ) -> None:
         """Prepare; ``beside`` (N, b) are rows of what else is fitted freely."""
-        self._rows, self._regression, self._beside = rows, regression, others
+        self._rows, self._regression, self._others = rows, regression, others
         measured = regression.measured
         basis = np.zeros((len(measured), 0))
         if others is not None and others.shape[1]:
@@ -101,7 +101,7 @@ class ShapeRefinement:
 
     def fit(self, candidate: Candidate) -> Fitted | None:
         """Fit a candidate's amplitudes; None where its rows are not finite."""
-        columns = self._rows(candidate, self._beside)
+        columns = self._rows(candidate, self._others)
         return None if columns is None else self._fitted(candidate, columns)
 
     def _fitted(self, candidate: Candidate, columns: NDArray) -> Fitted:
@@ -134,7 +134,7 @@ class ShapeRefinement:
         starts = [start] if own is None else [start, own]
         best, slopes = max(map(self._refined, starts), key=lambda pair: pair[0].worth)
         for _ in range(BODY_REFITS):
-            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
+            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._others))
             refined = None if ahead is None else self._refined(ahead)
             if refined is None or refined[0].worth < best.worth + ENOUGH:
                 break
@@ -172,7 +172,7 @@ class ShapeRefinement:
     def _with_own_bodies(self, candidate: Candidate) -> Candidate:
         """Return a transmission with rigid bodies refitted at its shape."""
         for _ in range(BODY_REFITS):
-            candidate = self._rows.with_refitted_bodies(candidate, self._beside)
+            candidate = self._rows.with_refitted_bodies(candidate, self._others)
         return candidate
 
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:
@@ -217,7 +217,7 @@ class ShapeRefinement:
         at, runs = candidate.onset, range(len(candidate.shapes))
         assert at is not None
         alone = candidate.with_own(at, [ALWAYS if k == number else NEVER for k in runs])
-        rows = self._rows(alone, self._beside)
+        rows = self._rows(alone, self._others)
         return np.zeros(len(self._measured)) if rows is None else rows[:, 0]
 
     def _gains(self, plain: NDArray) -> NDArray:
@@ -245,7 +245,7 @@ class ShapeRefinement:
     def _following(self, candidate: Candidate) -> Candidate:
         """Return a candidate at a new shape; a transmission with rigid bodies that follow it."""
         return (
-            self._rows.with_refitted_bodies(candidate, self._beside)
+            self._rows.with_refitted_bodies(candidate, self._others)
             if candidate.bodies
             else candidate
         )
@@ -255,7 +255,7 @@ class ShapeRefinement:
         slopes = np.zeros((len(self._measured), len(units)))
         for d, (i, unit) in enumerate(units):
             step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
-            moved = self._rows(fitted.candidate.moved(i, step), self._beside)
+            moved = self._rows(fitted.candidate.moved(i, step), self._others)
             if moved is not None and moved.shape == fitted.columns.shape:
                 slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / DIFFERENCE
         return slopes

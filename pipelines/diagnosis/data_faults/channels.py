@@ -57,8 +57,8 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
         yield from _torque(motion, joint)
-    if motion.felt is not None and motion.run == "with_human":
-        yield from _forces(motion, motion.felt)
+    if motion.held_forces is not None and motion.run == "with_human":
+        yield from _forces(motion, motion.held_forces)
 
 
 def _repeated(motion: Motion) -> Iterator[Fault]:
@@ -92,9 +92,9 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
-            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}: {who}"
-            " gave stale values, the last sample's again, though the joint moved; wait for new"
-            " data before reading",
+            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}:"
+            f" {who} gave stale values, the last sample's again, though the joint moved; wait for"
+            " new data before reading",
             samples,
         )
 
@@ -246,9 +246,9 @@ def _outlasts(intervals: NDArray) -> NDArray:
 
 def has_silent_cuffs(motion: Motion) -> bool:
     """Tell whether the cuff forces of a person's run were recorded, and none ever changes."""
-    if motion.felt is None or motion.run != "with_human":
+    if motion.held_forces is None or motion.run != "with_human":
         return False
-    channels = motion.felt.reshape(len(motion.felt), -1).T
+    channels = motion.held_forces.reshape(len(motion.held_forces), -1).T
     return not any(np.ptp(known) > 0.0 for x in channels if len(known := x[np.isfinite(x)]))
 
 

@@ -201,8 +201,8 @@ def _judged(asked: _Asked) -> tuple[str, bool]:
     if asked.share < BELOW:
         return (
             (
-                f"{reason}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing"
-                " is lost"
+                f"{reason}by {100 * asked.share:.2g} % of the angles' own noise at most, and"
+                " nothing is lost"
             ),
             False,
         )

@@ -183,7 +183,7 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
             if in_step
             else "that is no harmonic of the motion"
         )
-        sentence = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
+        sentence = f"{_unexplained(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
         terms.append(Dependence(joint, "tone", share, sentence))
         results += sorted(terms, key=_rank, reverse=True)
     return results
@@ -199,10 +199,10 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
 
 
 def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
-    return f"{_left(joint, share)} depends on {_words(joint, machine, words)}"
+    return f"{_unexplained(joint, share)} depends on {_words(joint, machine, words)}"
 
 
-def _left(joint: str, share: float) -> str:
+def _unexplained(joint: str, share: float) -> str:
     return f"{100 * share:.0f} % of what is left at {the(joint)}"
 
 

@@ -53,7 +53,7 @@ SHAPES = 6
 """Values of a free shape parameter that stand for its range."""
 ONSETS = (0.25, 0.5, 0.75)
 """Of a run: when that may begin which has an onset of its own in each."""
-TOLD_APART = np.log(20.0)
+DISTINGUISHED = np.log(20.0)
 """Log likelihood by which one cause must beat another for the two to be told apart: 20 to 1."""
 NEVER = 1e-3
 """Share of an effect that another leaves, below which no size tells the two apart."""
@@ -181,7 +181,7 @@ class Sight:
         """Return each row's output, (rows,)."""
         return np.concatenate([np.nonzero(run.usable)[1] for run in self.runs])
 
-    def left(self, columns: Sequence[NDArray]) -> NDArray:
+    def remainder(self, columns: Sequence[NDArray]) -> NDArray:
         """Return what the baseline leaves of columns, (rows, k)."""
         rows = self.rows(columns)
         for _ in range(2):  # twice is enough for orthogonality to rounding
@@ -221,7 +221,7 @@ class Look:
     by: str
     noncentrality: float
     """At the smallest magnitude."""
-    left: NDArray
+    remainder: NDArray
     """(rows,) of unit length; what the baseline leaves of the direction."""
     span: NDArray
     """(rows, k) orthonormal: all that the effect of this shape could explain."""
@@ -365,8 +365,8 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
     columns = [torque_columns(candidate, r, run) for r, run in enumerate(sight.runs)]
     direction = _direction(effect, columns, sight)
     own = candidate.columns_in([run.motion.run for run in sight.runs])
-    span = sight.left([own.expand(column, r) for r, column in enumerate(columns)])
-    remainder = sight.left(direction)[:, 0]
+    span = sight.remainder([own.expand(column, r) for r, column in enumerate(columns)])
+    remainder = sight.remainder(direction)[:, 0]
     growth, by = _growth(effect, remainder, direction, span.shape[1], sight, power)
     size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
@@ -381,7 +381,7 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
         _squared(remainder) * growth if np.isfinite(growth) else np.inf,
         _unit(remainder),
         _orthonormal(span),
-        _orthonormal(sight.left(_wide(effect, columns, _levels(effect), sight.runs))),
+        _orthonormal(sight.remainder(_wide(effect, columns, _levels(effect), sight.runs))),
         least * unit < torque and largest * unit > LEAST * torque,
     )
 
@@ -438,7 +438,7 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
         shape = zero + (start - zero) / reach * np.exp(x)
         column = _bend(replace(candidate, shapes=(tuple(shape),) * len(sight.runs)), sight)
-        remainder = sight.left(column)[:, 0]
+        remainder = sight.remainder(column)[:, 0]
         growth, by = _growth(effect, remainder, column, 1, sight, power)
         return growth, by, remainder, column, float(effect.physical(effect.completed(shape))[0])
 
@@ -540,7 +540,7 @@ def _detectable(
 def _alike(look: Look, unexplained: NDArray | float) -> NDArray:
     if not np.isfinite(look.noncentrality):  # seen at no size
         return np.zeros(np.shape(unexplained), bool)
-    return 0.5 * look.noncentrality * np.asarray(unexplained) < TOLD_APART
+    return 0.5 * look.noncentrality * np.asarray(unexplained) < DISTINGUISHED
 
 
 def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray:
@@ -551,7 +551,7 @@ def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray
     called that.
     """
     every = [other for others in looks for other in others]
-    directions = np.array([look.left for look in chosen])
+    directions = np.array([look.remainder for look in chosen])
     by_level = 1.0 - _explained(directions, [other.level for other in every])
     shares = np.maximum(1.0 - _explained(directions, [other.span for other in every]), 0.0)
     for row, look, level in zip(shares, chosen, by_level, strict=True):

@@ -36,7 +36,7 @@ def at_block_rate(run: Run) -> Run:
         load=None if motion.load is None else run.average(motion.load),
         limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
         temperature=None if motion.temperature is None else run.average(motion.temperature),
-        forces=None if motion.felt is None else run.average(motion.felt),
+        forces=None if motion.held_forces is None else run.average(motion.held_forces),
         reference=None,
         measured_angle=None,
         sequence=None,

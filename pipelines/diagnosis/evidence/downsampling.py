@@ -18,7 +18,7 @@ def thinned(motion: Motion) -> Motion:
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion
-    motion, starts = replace(motion, forces=motion.felt), every.starts(motion.segment)
+    motion, starts = replace(motion, forces=motion.held_forces), every.starts(motion.segment)
     averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)
         for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "temperature")

@@ -42,7 +42,7 @@ APART = 1.5
 """Widths between two lines of one kind."""
 LONGEST_STEP = 1.5
 """Of a refinement, times that of Gauss and Newton."""
-BESIDE, MUCH_WEAKER = 5.0, 0.05
+NEIGHBOURS, MUCH_WEAKER = 5.0, 0.05
 """A line within so many widths of a stronger one, with at most this share of its likelihood ratio,
 is a part of it."""
 LEAST_S = 2.0
@@ -188,7 +188,7 @@ def _lines_of_joint(
     orders = Orders(swept, max(lowest, LEAST_WAVES * 2.0 * np.pi / swept), highest)
     search = _Search(moving, orders)
     lines = [Sinusoids.none(kind, len(moving)) for kind in Kind]
-    channels = search.left(lines)
+    channels = search.remainder(lines)
     first = spectra = [search.spectrum(kind, channels) for kind in Kind]
     tried: list[tuple[Kind, float]] = []
     while (place := _strongest(spectra, tried, searches)) is not None:
@@ -197,11 +197,11 @@ def _lines_of_joint(
         if search.repeats(lines, place[0]):
             # What is left beside a line whose size or phase changes with speed is no other line.
             lines = search.refined([lines[0].without(-1), lines[1]])
-        channels = search.left(lines)
+        channels = search.remainder(lines)
         spectra = [search.spectrum(kind, channels) for kind in Kind]
     if tried:
         lines = search.refined(lines)
-        channels = search.left(lines)
+        channels = search.remainder(lines)
     return JointLines(search.reported(lines, channels, spectra, searches), *first)
 
 
@@ -282,7 +282,7 @@ class _Search:
         self.longest_s = max(float(np.ptp(waves.grid.time)) for waves in self.waves)
         self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
 
-    def left(self, lines: Sequence[Sinusoids]) -> list[Channel]:
+    def remainder(self, lines: Sequence[Sinusoids]) -> list[Channel]:
         """Return what lines leave of the residual in each run."""
         return [
             waves.grid.channel(waves.grid.residual - sum(kind.torque(waves, r) for kind in lines))
@@ -341,7 +341,7 @@ class _Search:
 
     def refined(self, lines: Sequence[Sinusoids]) -> list[Sinusoids]:
         """Return lines after a step of Gauss and Newton, as long as their likelihood asks for."""
-        channels = self.left(lines)
+        channels = self.remainder(lines)
         over_angle, over_time = lines
         ahead = (
             _step_over_angle(over_angle, self.waves, channels, 0.25 * self.orders.width),
@@ -412,7 +412,7 @@ def _is_trace_of(line: Line, stronger: Sequence[Line], widths: dict[Kind, float]
     """Tell whether a line is what a stronger one leaves beside it when its size changes."""
     return any(
         line.kind is other.kind
-        and abs(line.cycles - other.cycles) < BESIDE * widths[line.kind]
+        and abs(line.cycles - other.cycles) < NEIGHBOURS * widths[line.kind]
         and line.log_likelihood_ratio < MUCH_WEAKER * other.log_likelihood_ratio
         for other in stronger
     )

@@ -54,18 +54,22 @@ def values_of_each_run(
     for number, cause in enumerate(fit.causes):
         for r in fit.columns_of(number).runs if cause.label in values_of else ():
             values_of[cause.label].append(
-                _told(cause.effect, train[r], *parameter_rows.values_in_run(fit, sure, number, r))
+                _stated_values(
+                    cause.effect, train[r], *parameter_rows.values_in_run(fit, sure, number, r)
+                )
             )
     for run in validate if values_of else ():
         for term in settled(fit, run, baseline):
             if term.effect.label in values_of and term.effect.explains(run.motion):
                 values_of[term.effect.label].append(
-                    _told(term.effect, run, term.effect.physical(term.values))
+                    _stated_values(term.effect, run, term.effect.physical(term.values))
                 )
     return values_of
 
 
-def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None) -> dict[str, Any]:
+def _stated_values(
+    effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None
+) -> dict[str, Any]:
     """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a
     verdict tells it.
 

@@ -115,7 +115,7 @@ class _About:
         rest = filtered(motion, motion.torque[:, j] - coulomb_torque[:, j], CUTOFF_HZ)
         return cls(motion, model, j, read, speed, rest, level, near)
 
-    def left(self, side: "Side") -> NDArray:
+    def remainder(self, side: "Side") -> NDArray:
         """Return what friction on that side leaves about reversals, (near,) N·m."""
         column = np.zeros((*self.motion.q.shape, 1))
         column[:, self.j, 0] = self.level * side(self)
@@ -197,7 +197,7 @@ def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:
 
 
 def _power(some: Sequence[_About], side: Side) -> float:
-    return float(np.mean(np.concatenate([about.left(side) for about in some]) ** 2))
+    return float(np.mean(np.concatenate([about.remainder(side) for about in some]) ** 2))
 
 
 def _side_at_once(about: _About) -> NDArray:

@@ -18,14 +18,13 @@ from pipelines.diagnosis.fit.held_out import evaluate
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.validation_error import errors_of, scored
 
-FLOOR, REPEATS, WANDERS, LEFT = (
+FLOOR, REPEATS, WANDERS, UNEXPLAINED = (
     "noise_floor",
     "repeatable_unexplained",
     "not_repeatable",
     "unexplained",
 )
-"""Shares beside the causes'; ``LEFT`` stands for the two before it where no period tells them
-apart."""
+"""Shares next to the causes'; ``UNEXPLAINED`` stands for the two before it without a period."""
 
 
 def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
@@ -44,7 +43,7 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
         }
         above = float(remaining[j] - floor[j])
         if scatter is None:
-            shares[LEFT] = above
+            shares[UNEXPLAINED] = above
         else:
             shares[REPEATS] = float(np.clip(remaining[j] - scatter[j], 0.0, above))
             shares[WANDERS] = above - shares[REPEATS]

@@ -10,7 +10,7 @@ from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.unexplained import Unexplained
-from pipelines.wording.label import amount, cause_label, effect_told, in_words, label_in_words
+from pipelines.wording.label import amount, cause_label, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import UNLISTED
 
 MENTIONED = 3
@@ -245,7 +245,7 @@ def _remains(d: Diagnosis, most: int) -> str:
 
 def _in_words(cause: dict[str, Any]) -> str:
     """Return a cause, those tied with it, and how probable they are together."""
-    alike = [in_words(effect_told(one)) for one in (cause, *cause["indistinguishable_from"])]
+    alike = [in_words(effect_of_cause(one)) for one in (cause, *cause["indistinguishable_from"])]
     likely = f"{cause['probability']:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
-from pipelines.wording.label import SHARES, cause_label, effect_told, in_words, label_in_words
+from pipelines.wording.label import SHARES, cause_label, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import LAW
 
 TONES = {
@@ -95,7 +95,7 @@ class Fall:
 def budget(verdict: dict[str, Any]) -> list[Bar]:
     """Return a bar for each joint; what takes away from an error lies left of zero."""
     rows = []
-    texts = told_in_words(verdict)
+    texts = shares_in_words(verdict)
     for joint, shares in verdict["error_budget"].items():
         left = right = 0.0
         segments = []
@@ -152,12 +152,12 @@ def any_label_in_words(label: str) -> str:
 def cause_in_words(cause: Mapping[str, Any]) -> str:
     """Return a verdict's cause as a sentence says it: one that differs from run to run as such."""
     try:
-        return in_words(effect_told(cause))
+        return in_words(effect_of_cause(cause))
     except InputError:
         return any_label_in_words(cause_label(cause))
 
 
-def told_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
+def shares_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
     """Return a verdict's causes and those that could stand in their place as sentences say them, by
     label."""
     return {

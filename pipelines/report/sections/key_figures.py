@@ -72,8 +72,8 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
             f"gain of {words}",
             digits(gain),
             unit,
-            f"{digits(remaining + gain)} → {digits(remaining)} {unit} at {the(joint)}{qualifier}; 95 %: "
-            f"{digits(low)} … {digits(high)}",
+            f"{digits(remaining + gain)} → {digits(remaining)} {unit} at {the(joint)}{qualifier};"
+            f" 95 %: {digits(low)} … {digits(high)}",
         ),
     ]
 

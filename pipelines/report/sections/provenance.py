@@ -65,7 +65,7 @@ def origins(session: Session) -> list[Origin]:
 
 
 def _input(session: Session, stated: dict[str, str]) -> Input:
-    if session.found(stated["name"], stated["sha256"]):
+    if session.file_of(stated["name"], stated["sha256"]):
         state = "found"
     else:
         state = (
@@ -240,7 +240,7 @@ def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Wo
 
 
 def _path_of(session: Session, stated: dict[str, str]) -> str:
-    return str(session.found(stated["name"], stated["sha256"]) or stated["name"])
+    return str(session.file_of(stated["name"], stated["sha256"]) or stated["name"])
 
 
 def _inputs(session: Session, artifact: Artifact) -> list[str]:

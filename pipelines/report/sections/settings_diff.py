@@ -28,7 +28,7 @@ def settings_apart(first: Session, second: Session) -> list[SettingApart]:
 
     Files of one session that were made with different settings all have their say.
     """
-    one, other = (_told(session) for session in (first, second))
+    one, other = (_stated(session) for session in (first, second))
     return [
         SettingApart(name, " and ".join(one[name]), " and ".join(other[name]))
         for name in one
@@ -36,7 +36,7 @@ def settings_apart(first: Session, second: Session) -> list[SettingApart]:
     ]
 
 
-def _told(session: Session) -> dict[str, list[str]]:
+def _stated(session: Session) -> dict[str, list[str]]:
     by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}

@@ -51,7 +51,7 @@ def watched(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s
             aim = (its.ahead(now) or 0.0) + draw.gauss(0.0, AIM) / rate_hz
             for sent in (now + draw.uniform(0, 0.2) * cycle_s, now + min(max(aim, low), high)):
                 there = sent + way()
-                its.told(clock.newest(there), sent, there + way())
+                its.add(clock.newest(there), sent, there + way())
         now += cycle_s
         if now >= ends:
             ends = now + BUCKET_S

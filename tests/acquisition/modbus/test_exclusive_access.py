@@ -31,13 +31,13 @@ with alone(load_rig(sys.argv[1])):
 @pytest.fixture
 def told(monkeypatch):
     """Control words that drives were told."""
-    words, hear = [], Servo.hear
+    words, hear = [], Servo.receive
 
     def remember(servo, reference, control):
         words.append(control)
         hear(servo, reference, control)
 
-    monkeypatch.setattr(Servo, "hear", remember)
+    monkeypatch.setattr(Servo, "receive", remember)
     return words
 
 

@@ -308,7 +308,7 @@ def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_
     served = []
     monkeypatch.setattr(drive, "EMPTYING_S", 0.2)
     monkeypatch.setattr(Ring, "taken", lambda ring: [0] * 30)
-    monkeypatch.setattr(Servo, "hear", lambda servo, reference, control: served.append(control))
+    monkeypatch.setattr(Servo, "receive", lambda servo, reference, control: served.append(control))
     with pytest.raises(
         DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"
     ):

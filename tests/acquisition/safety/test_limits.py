@@ -341,13 +341,13 @@ def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(stopped):
 def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(
     stopped, monkeypatch, rate_hz
 ):
-    words, hear = set(), Servo.hear
+    words, hear = set(), Servo.receive
 
     def remember(servo, reference, control):
         words.add(control)
         hear(servo, reference, control)
 
-    monkeypatch.setattr(Servo, "hear", remember)
+    monkeypatch.setattr(Servo, "receive", remember)
     why = stopped(shipped="real_time", rate_hz=rate_hz)
     assert re.match(
         r"drive (hip|knee) .*: its sample counter goes up by \d{3}(\.\d)? a second, expected"

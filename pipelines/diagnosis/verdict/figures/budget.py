@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.error_budget import FLOOR, LEFT, REPEATS, WANDERS
+from pipelines.diagnosis.verdict.error_budget import FLOOR, REPEATS, UNEXPLAINED, WANDERS
 from pipelines.plotting.style import BLUE, CAUSES, NOISE
 from pipelines.plotting.style import WANDERS as SCATTER
 from pipelines.wording.label import SHARES, in_words
 
-COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, LEFT: BLUE}
+COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, UNEXPLAINED: BLUE}
 ROOM = 0.07
 """Share of a bar that a number needs to stand in it."""
 SMALL = 0.095

@@ -44,7 +44,8 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
             f"{joint}: 1 s simulations stray {_strayed(verdict, joint)}", loc="left", fontsize=9
         )
         column[2].set_title(
-            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by {_off(d, verdict, joint)}",
+            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by"
+            f" {_off(d, verdict, joint)}",
             loc="left",
             fontsize=9,
         )

@@ -104,7 +104,8 @@ def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(
-        f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict['units'][joint]['torque']}"
+        f"{joint} {d.baseline.machine.joint(joint).effort} error,"
+        f" {verdict['units'][joint]['torque']}"
     )
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
