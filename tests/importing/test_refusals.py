@@ -232,9 +232,7 @@ def test_a_folder_that_is_called_as_a_recordings_file_is_refused_with_what_is_me
     where = ["--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "made" / "x.parquet")]
     assert run(["import", str(write_csv(pendulum.columns())), *where]) == 2
     err = capsys.readouterr().err
-    assert (
-        "x.parquet: is a file name, expected the folder of all recordings, such as -o" in err
-    )
+    assert "x.parquet: is a file name, expected the folder of all recordings, such as -o" in err
     assert 'name = "x" at [[recording]] in the map' in err and len(err.splitlines()) == 1
     assert not (tmp_path / "made").exists()
 
