@@ -51,11 +51,9 @@ def show_parameters(
 
 def _interval(row: Mapping[Any, Any], joints: "Sequence[Joint]") -> str:
     ends = [row[key] for key in ("ci95_low", "ci95_high")]
-    return (
-        " … ".join(format_value(end, joints) for end in ends)
-        if all(map(isfinite, ends))
-        else "held"
-    )
+    if any(end is None or not isfinite(end) for end in ends):
+        return "held"
+    return " … ".join(format_value(end, joints) for end in ends)
 
 
 def _name(row: Mapping[Any, Any]) -> str:

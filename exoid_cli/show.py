@@ -68,12 +68,12 @@ def _show_content(inspection: "Inspection") -> bool:
 
         console.say("")
         show_parameters(
-            PARAMETERS.read(Path(inspection.file)).frame.to_dict("records"),
+            PARAMETERS.load(inspection.file)[0].to_pylist(),
             joints_of(inspection.metadata),
         )
         return True
     if inspection.contract == CANDIDATES.label:
-        _show_candidates(CANDIDATES.read(Path(inspection.file)).frame.to_dict("records"))
+        _show_candidates(CANDIDATES.load(inspection.file)[0].to_pylist())
         return True
     if inspection.contract.startswith("verdict/") and "causes" in inspection.metadata:
         from exoid_cli.verdict_view import show_verdict

@@ -1,4 +1,4 @@
-"""What any exoid file is, where it came from, and what is in it, without knowing beforehand."""
+"""Describe any exoid file: its contract, its origin and its content."""
 
 import json
 from collections.abc import Callable
@@ -27,10 +27,9 @@ class Inspection:
     metadata: dict[str, Any] = field(default_factory=dict)
     rows: int = 0
     columns: list[dict[str, Any]] = field(default_factory=list)
-    """Each with column, unit, type, min and max (None for text), nulls (NaN among them) and
-    meaning."""
+    """Keys: column, unit, type, min and max (None for text), nulls (with NaN) and meaning."""
     fault: ContractError | None = None
-    """Why the file does not keep its contract, if so."""
+    """The first breach of the contract; None if there is none."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the description for programs."""
@@ -42,13 +41,8 @@ class Inspection:
 
 
 def inspect(path: Path) -> Inspection:
-    """Describe a Parquet file of exoid's, one of its JSON documents, or a trajectory as TOML, by
-    its content."""
-    for reader in (_document, _trajectory_toml):
-        found = reader(path)
-        if found:
-            return found
-    return _table(path)
+    """Describe a Parquet file, a JSON document or a TOML trajectory by its content."""
+    return _document(path) or _trajectory_toml(path) or _table(path)
 
 
 def _table(path: Path) -> Inspection:
@@ -56,7 +50,7 @@ def _table(path: Path) -> Inspection:
     table, metadata = parquet.load(path)
     fault = None
     try:
-        contract.read(path)
+        contract.load(path)
     except ContractError as error:
         fault = error
     return Inspection(
@@ -76,11 +70,12 @@ def _table(path: Path) -> Inspection:
 def _column(table: pa.Table, name: str) -> dict[str, Any]:
     index = table.column_names.index(name)
     column, about = table.column(index), table.schema.field(index).metadata or {}
-    low, high = None, None
+    low, high, missing = None, None, column.null_count
     if pa.types.is_floating(column.type):
-        # No number is no value, however it is written.
-        column = pc.if_else(pc.is_nan(column), None, column)
-    if not (pa.types.is_nested(column.type) or checks.is_text(column.type)):
+        # NaN counts as missing, like null, and is no minimum.
+        missing += pc.sum(pc.is_nan(column)).as_py() or 0
+    is_ordered = not (pa.types.is_nested(column.type) or checks.is_text(column.type))
+    if is_ordered and missing < len(column):
         low, high = pc.min_max(column).as_py().values()
     return {
         "column": name,
@@ -88,7 +83,7 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
         "type": checks.type_name(column.type),
         "min": low,
         "max": high,
-        "nulls": column.null_count,
+        "nulls": missing,
         "meaning": about.get(b"meaning", b"").decode(),
     }
 
@@ -96,9 +91,9 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
 DOCUMENTS = {
     "verdict/1": "the answer of `exoid diagnose`",
     "model/1": "a model, as `exoid export --to json` writes it",
-    "detectability/1": "the smallest size of each cause that would be seen",
+    "detectability/1": "the smallest detectable size of each cause",
 }
-"""What is written as JSON, for people and programs that have no Parquet."""
+"""JSON documents, for people and programs without Parquet, and their purposes."""
 
 
 def _document(path: Path) -> Inspection | None:
@@ -140,9 +135,9 @@ def _read_json(path: Path) -> Any:
 
 
 def _parsed(path: Path, read: Callable[[Path], Any]) -> dict[str, Any]:
-    """Return the file's content as an object, empty where it is none."""
+    """Return the file's content; an empty object for another kind of file."""
     try:
         content = read(path)
     except (ValueError, FileNotFoundError, IsADirectoryError):
-        return {}  # some other kind of file; its own reader says what is wrong with it
+        return {}  # its own reader reports the error
     return content if isinstance(content, dict) else {}

@@ -1,64 +1,68 @@
-"""``parameters/1``: a model, one row a parameter."""
+"""``parameters/1``: a model, one row for each parameter."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 
+from pipelines.contracts.checks import first_true
 from pipelines.contracts.metadata import Finite, Geometry, InputKeys, Matrix, TableKeys
 from pipelines.contracts.table import BOOLEAN, TEXT, Column, Contract
 from pipelines.errors import ContractError
 
 
 class OneRun(InputKeys):
-    """What one run has of a cause for itself; its hash is the recording's."""
+    """A cause's own values in one run; the hash is the recording's."""
 
     values: dict[str, Finite | None]
-    """By the parameters' names; null of what never came in this run."""
+    """By the parameters' names; null if the cause does not occur in this run."""
 
 
 class ParametersKeys(TableKeys):
-    """How sure the parameters are together, and what they describe."""
+    """Covariance of the parameters, and the machine that they describe."""
 
     covariance: Matrix | None = None
     mechanism: str | dict[str, Any] | None = None
     geometry: Geometry | None = None
     method: str | dict[str, Any] | None = None
     each_run: dict[str, list[OneRun]] | None = None
-    """What each run has for itself, by the cause's label; the rows hold what the first one has."""
+    """Values that differ from run to run, by the cause's label; the rows hold the first run's."""
 
 
-def _covariance_has_the_rows_shape(
-    frame: pd.DataFrame, metadata: Mapping[str, Any], source: str
+def _covariance_has_a_row_for_each_parameter(
+    table: pa.Table, metadata: Mapping[str, Any], source: str
 ) -> None:
     covariance = metadata.get("covariance")
     if covariance is None:
         return
     lengths = {len(row) for row in covariance}
-    if len(covariance) != len(frame) or lengths != {len(frame)}:
+    count = table.num_rows
+    if len(covariance) != count or lengths != {count}:
         raise ContractError(
             f"{source}: metadata covariance: found {len(covariance)} rows of {sorted(lengths)}"
-            f" values, expected {len(frame)} x {len(frame)}, one for each parameter in row order;"
+            f" values, expected {count} x {count}, one for each parameter in row order;"
             " write the whole matrix"
         )
 
 
-def _errors_are_errors(frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
-    below = np.flatnonzero(frame["std_error"].to_numpy(float) < 0.0)
-    if len(below):
-        found = frame["std_error"].iloc[below[0]]
+def _errors_are_possible(table: pa.Table, metadata: Mapping[str, Any], source: str) -> None:
+    smallest = pc.min(table["std_error"]).as_py()
+    if smallest is not None and smallest < 0.0:
+        row = first_true(pc.less(table["std_error"], 0.0))
+        value = table["std_error"][row].as_py()
         raise ContractError(
-            f"{source}: column std_error, row {below[0]}: found {found:g}, expected 0 or more;"
+            f"{source}: column std_error, row {row}: found {value:g}, expected 0 or more;"
             " write null where it is not known"
         )
     covariance = np.array(metadata.get("covariance") or np.zeros((0, 0)), dtype=float)
     size = np.sqrt(np.abs(np.diag(covariance)))
-    off = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
-    if off.any() or (np.diag(covariance) < 0.0).any():
+    asymmetric = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
+    if asymmetric.any() or (np.diag(covariance) < 0.0).any():
         raise ContractError(
-            f"{source}: metadata covariance: found variances below 0, or a matrix that is not its"
-            " own transpose; write the covariance of the rows"
+            f"{source}: metadata covariance: found variances below 0, or a matrix that is not"
+            " symmetric; write the covariance of the rows"
         )
 
 
@@ -101,5 +105,5 @@ PARAMETERS = Contract(
         ),
     ),
     metadata=ParametersKeys,
-    rules=(_covariance_has_the_rows_shape, _errors_are_errors),
+    rules=(_covariance_has_a_row_for_each_parameter, _errors_are_possible),
 )

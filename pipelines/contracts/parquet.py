@@ -57,7 +57,9 @@ def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tabl
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     """Return a file's whole table and its ``exoid`` metadata."""
     schema, metadata = header(path)
-    return pa.concat_tables([schema.empty_table(), *pieces(path)]), metadata
+    # Not schema.empty_table(), for which Arrow imports pandas.
+    empty = pa.Table.from_batches([], schema)
+    return pa.concat_tables([empty, *pieces(path)]), metadata
 
 
 @contextmanager

@@ -1,15 +1,11 @@
-"""A data contract as code: columns with unit, meaning and type, checked on reading and on
-writing."""
+"""A data contract as code: columns with unit, meaning and type, checked on reading and writing."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-import pandas as pd
 import pyarrow as pa
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pipelines import __version__
@@ -20,13 +16,17 @@ from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
 from pipelines.validation.suggestion import closest
 
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
 FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string()
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table, or, with ``per_joint``, one for each joint, named by the joint and
-    this quantity."""
+    """One column of a table; with ``per_joint``, one of this quantity for each joint."""
 
     name: str
     unit: str
@@ -34,7 +34,7 @@ class Column:
     dtype: pa.DataType = FLOAT
     required: bool = True
     nullable: bool = False
-    """May values be missing (null or NaN)? Infinities never may."""
+    """Whether values may be missing (null or NaN); infinities never may."""
     choices: tuple[str, ...] = ()
     per_joint: bool = False
 
@@ -53,7 +53,7 @@ def per_joint(
 
 
 class Rows(Protocol):
-    """A checked table whose rows can be gone through piece by piece, as often as need be."""
+    """A checked table whose rows can be read piece by piece, any number of times."""
 
     @property
     def metadata(self) -> dict[str, Any]: ...  # noqa: D102
@@ -65,7 +65,7 @@ class Rows(Protocol):
     def joints(self) -> tuple[Joint, ...]: ...  # noqa: D102
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the rows in their order; all columns, or those that are named."""
+        """Yield the rows in their order; all columns, or the named ones."""
         ...
 
 
@@ -73,22 +73,32 @@ class Rows(Protocol):
 class Table:
     """A checked table in memory."""
 
-    frame: pd.DataFrame
+    frame: "pd.DataFrame"
     metadata: dict[str, Any]
     path: Path | None = None
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """The joints this table speaks of."""
+        """The joints of the machine."""
         return joints_of(self.metadata)
 
-    def stacked(self, quantity: str) -> NDArray[np.float64]:
-        """Return a quantity of all joints side by side, shape (rows, joints), in the quantity's SI
-        unit."""
+    def stacked(self, quantity: str) -> "NDArray[np.float64]":
+        """Return a quantity of all joints.
+
+        Parameters
+        ----------
+        quantity : str
+            A key of ``QUANTITIES``, such as ``"angle"``.
+
+        Returns
+        -------
+        (n_rows, n_joints) array
+            In the quantity's SI unit.
+        """
         return self.frame[[joint.column(quantity) for joint in self.joints]].to_numpy(dtype=float)
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the rows as one piece, for there they are."""
+        """Yield all rows as one piece."""
         frame = self.frame if columns is None else self.frame[list(columns)]
         yield pa.Table.from_pandas(frame, preserve_index=False).replace_schema_metadata()
 
@@ -103,23 +113,23 @@ class Stored:
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """The joints this table speaks of."""
+        """The joints of the machine."""
         return joints_of(self.metadata)
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the rows in their order, at most ``parquet.ROWS`` at a time; all columns, or those
-        that are named."""
+        """Yield at most ``parquet.ROWS`` rows at a time; all columns, or the named ones."""
         return self.contract.conformed(
             parquet.pieces(self.path, columns), self.metadata, str(self.path), columns
         )
 
 
-Rule = Callable[[pd.DataFrame, Mapping[str, Any], str], None]
+Rule = Callable[[pa.Table, Mapping[str, Any], str], None]
+"""A further check: rule(table, metadata, source) raises ContractError."""
 
 
 @dataclass(frozen=True)
 class Contract:
-    """What a table promises."""
+    """The columns and metadata that a kind of table must have."""
 
     name: str
     version: int
@@ -131,12 +141,10 @@ class Contract:
     time: str | None = None
     """The column that must strictly increase."""
     restarts_with: tuple[str, ...] = ()
-    """Columns that start time anew when they change from one row to the next."""
+    """Columns at whose changes time restarts."""
     is_bounded: bool = True
-    """Is an angle of more than 1.5 turns taken for degrees, and any quantity refused that no
-    machine reaches? Not where a loop may diverge."""
+    """Whether implausible values are refused; false for a simulated loop, which may diverge."""
     rules: tuple[Rule, ...] = ()
-    """Further checks: rule(frame, metadata, source) raises ContractError."""
 
     @property
     def label(self) -> str:
@@ -144,7 +152,7 @@ class Contract:
         return f"{self.name}/{self.version}"
 
     def columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
-        """Return every column by its name in a file, those of the joints written out."""
+        """Return every column by its name in a file, one for each joint."""
         expanded = (
             [column.at(joint) for joint in joints] if column.per_joint else [column]
             for column in self.columns
@@ -153,21 +161,25 @@ class Contract:
 
     def read(self, path: Path | str) -> Table:
         """Return the table in a file, or raise a ContractError that says what is wrong with it."""
+        rows, metadata = self.load(path)
+        return Table(rows.to_pandas(), metadata, Path(path))
+
+    def load(self, path: Path | str) -> tuple[pa.Table, dict[str, Any]]:
+        """Return the checked rows and metadata of a file without pandas, which starts slowly."""
         stored = self.scan(path)
-        frame = pa.concat_tables(stored.pieces()).to_pandas()
-        self._apply_rules(frame, stored.metadata, str(path))
-        return Table(frame, stored.metadata, stored.path)
+        rows = pa.concat_tables(stored.pieces())
+        self._apply_rules(rows, stored.metadata, str(path))
+        return rows, stored.metadata
 
     def scan(self, path: Path | str) -> Stored:
-        """Return the table in a file without its rows: they are read, and checked, as they are gone
-        through."""
+        """Return the table in a file; its rows are read and checked when they are used."""
         path = Path(path)
         _, metadata = parquet.header(path)
         self._refuse_other_contracts(metadata["contract"], path)
         self._check_metadata(metadata, str(path))
         return Stored(self, metadata, path)
 
-    def write(self, path: Path | str, frame: pd.DataFrame, metadata: Mapping[str, Any]) -> None:
+    def write(self, path: Path | str, frame: "pd.DataFrame", metadata: Mapping[str, Any]) -> None:
         """Check a table and write it atomically; ``contract`` is added to the metadata."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
@@ -178,23 +190,20 @@ class Contract:
     def write_pieces(
         self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]
     ) -> None:
-        """Write a table as ``write`` does, but piece by piece, so that it need never be in memory
-        as a whole."""
+        """Write a table as ``write`` does, but piece by piece, to save memory."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
         self._check_metadata(metadata, str(path))
         parquet.save(path, self.conformed(pieces, metadata, str(path)), metadata)
 
     def refuse_place(self, path: Path) -> None:
-        """Raise a ContractError where this table could not be written: before the work, not after
-        it."""
+        """Refuse a path where this table cannot be written, before it is computed."""
         parquet.refuse_place(path, self.label)
 
     def check(
-        self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str = "table"
+        self, frame: "pd.DataFrame", metadata: Mapping[str, Any], source: str = "table"
     ) -> None:
-        """Raise a ContractError unless frame and metadata keep this contract; ``source`` starts its
-        message."""
+        """Check a frame and its metadata; the message of a ContractError begins with ``source``."""
         self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)
 
     def _refuse_other_contracts(self, found: str, path: Path) -> None:
@@ -210,13 +219,13 @@ class Contract:
                 f"update exoid, or make the file again with `{self.made_by}`"
             )
 
-    def _to_arrow(self, frame: pd.DataFrame, source: str) -> pa.Table:
+    def _to_arrow(self, frame: "pd.DataFrame", source: str) -> pa.Table:
         twice = frame.columns[frame.columns.duplicated()]
         if len(twice):
             raise ContractError(
-                f"{source}: column {twice[0]} stands twice, expected each name once; rename one"
+                f"{source}: column {twice[0]} occurs twice, expected each name once; rename one"
             )
-        # Lists and structs need their type said: an empty list does not tell what it would hold.
+        # Lists and structs need an explicit type, which an empty list does not have.
         nested = {
             column.name: column.dtype for column in self.columns if pa.types.is_nested(column.dtype)
         }
@@ -232,11 +241,10 @@ class Contract:
         return pa.table(arrays)
 
     def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
-        """Return a whole table with every known column in its type, unit and meaning; refuse what
-        cannot be."""
+        """Return a whole table checked, with the contract's types, units and meanings."""
         self._check_metadata(metadata, source)
         (conformed,) = self.conformed([table], metadata, source)
-        self._apply_rules(conformed.to_pandas(), metadata, source)
+        self._apply_rules(conformed, metadata, source)
         return conformed
 
     def conformed(
@@ -246,52 +254,49 @@ class Contract:
         source: str,
         named: Sequence[str] | None = None,
     ) -> Iterator[pa.Table]:
-        """Yield the pieces of a table with every known column in its type, unit and meaning; refuse
-        what cannot be.
+        """Yield the pieces of a table checked, with the contract's types, units and meanings.
 
-        Empty pieces are left out. Where only some columns are ``named``, the others are not asked
-        for.
+        Empty pieces are left out. If columns are ``named``, the others may be missing.
         """
         known = self.columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]
-        rows, seam = 0, None
+        rows, last_row = 0, None
         for piece in pieces:
             if not piece.num_rows:
                 continue
             for column in columns:
                 self._refuse_missing_column(piece, column, source, known)
                 piece = self._conform_column(piece, column, source, rows)
-            self._check_time(piece, seam, source, rows)
+            self._check_time(piece, last_row, source, rows)
             yield piece
-            # Its last row, so that the seam to the next piece is looked at too.
-            rows, seam = rows + piece.num_rows, piece.slice(piece.num_rows - 1)
+            # Time must also increase from one piece to the next.
+            rows, last_row = rows + piece.num_rows, piece.slice(piece.num_rows - 1)
         if not rows:
             raise ContractError(
                 f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again"
             )
 
     def _check_time(
-        self, piece: pa.Table, seam: pa.Table | None, source: str, first_row: int
+        self, piece: pa.Table, last_row: pa.Table | None, source: str, first_row: int
     ) -> None:
         if self.time is None or self.time not in piece.column_names:
             return
-        rows = pa.concat_tables([seam, piece]) if seam else piece
-        frame = rows.select([self.time, *self.restarts_with]).to_pandas()
-        where = checks.Place(source, self.time, first_row - (1 if seam else 0))
-        checks.refuse_time_that_does_not_increase(frame, self.time, self.restarts_with, where)
+        rows = pa.concat_tables([last_row, piece]) if last_row else piece
+        where = checks.Place(source, self.time, first_row - (1 if last_row else 0))
+        checks.refuse_time_not_increasing(rows, self.time, self.restarts_with, where)
 
-    def _apply_rules(self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
+    def _apply_rules(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> None:
         for rule in self.rules:
-            rule(frame, metadata, source)
+            rule(table, metadata, source)
 
     def _refuse_missing_column(
         self, table: pa.Table, column: Column, source: str, known: Sequence[Column]
     ) -> None:
         if not column.required or column.name in table.column_names:
             return
+        known_names = {column.name for column in known}
         near = closest(
-            column.name,
-            [name for name in table.column_names if name not in {c.name for c in known}],
+            column.name, [name for name in table.column_names if name not in known_names]
         )
         raise ContractError(
             f"{source}: column {column.name} is missing, expected {_described(column)}; "
@@ -311,7 +316,7 @@ class Contract:
         if column.choices:
             checks.refuse_unknown_values(values, column.choices, where)
         if self.is_bounded and column.dtype == FLOAT and column.unit and column.name != self.time:
-            checks.refuse_absurd(values, where)
+            checks.refuse_implausible(values, where)
             if column.unit == "rad":
                 checks.refuse_degrees(values, where)
         field = pa.field(
@@ -325,7 +330,7 @@ class Contract:
         except ValidationError as error:
             fault = explain(error, dict(metadata))
             raise ContractError(
-                f"{source}: metadata {fault}; mend it in the file's `exoid` entry"
+                f"{source}: metadata {fault}; correct it in the file's `exoid` entry"
             ) from error
 
 

@@ -1,11 +1,13 @@
-"""Zero-phase low-pass and the derivatives of what it leaves."""
+"""Zero-phase low-pass and the derivatives of what it leaves.
+
+scipy.signal, which is slow to import, is imported by the functions that filter.
+"""
 
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
-from scipy.signal import butter, savgol_coeffs, sosfiltfilt
 
 ORDER = 4
 """Order of one pass; forwards and backwards the filter falls with twice this."""
@@ -20,6 +22,8 @@ NEGLIGIBLE = 1e-18
 def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
     """Return how many samples away a cut in the data is no longer felt: it fades as the slowest
     pole does."""
+    from scipy.signal import butter
+
     _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
     fading = int(np.ceil(np.log(NEGLIGIBLE) / np.log(np.max(np.abs(poles)))))
     return (
@@ -47,6 +51,8 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     rate_hz, cutoff_hz : float
         Sample rate; frequency at which one pass has fallen by 3 dB, below half the sample rate.
     """
+    from scipy.signal import sosfiltfilt
+
     sections = _sections(order, cutoff_hz, rate_hz)
     padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
     return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
@@ -56,12 +62,16 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
 def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
     """Return the filter's second-order sections: their design takes longer than a short stretch's
     filtering."""
+    from scipy.signal import butter
+
     return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 @lru_cache
 def _differences(order: int) -> NDArray:
     """Return the weights of a stencil's samples in the derivative at each of them, per sample."""
+    from scipy.signal import savgol_coeffs
+
     size = DERIVATIVE_STENCIL
     return np.array(
         [savgol_coeffs(size, size - 1, deriv=order, pos=i, use="dot") for i in range(size)]

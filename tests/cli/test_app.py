@@ -31,14 +31,6 @@ def test_the_list_of_commands_tells_each_whole(exoid):
     assert "..." not in exoid("--help").out.partition("Commands:")[2]
 
 
-def test_help_loads_nothing_heavy():
-    code = (
-        "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if"
-        " m in sys.modules])"
-    )
-    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
-
-
 @pytest.mark.parametrize(("told", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
 def test_numpy_uses_one_thread_unless_told_otherwise(told, used):
     code = (

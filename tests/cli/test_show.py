@@ -136,7 +136,7 @@ def test_what_a_motion_would_reveal_is_shown_with_its_origin_and_set_to_the_left
     path.write_text(json.dumps({"contract": "detectability/1"} | told))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
-    assert "detectability/1, the smallest size of each cause that would be seen" in outcome.out
+    assert "detectability/1, the smallest detectable size of each cause" in outcome.out
     lines = [line.rstrip() for line in outcome.out.splitlines()]
     assert "created_by          exoid 9" in lines  # under "Where it came from", and to the left
     assert "causes[0].effect  base_tilt" in lines

@@ -269,22 +269,22 @@ REFUSED_FRAMES = {
     "NaN": (
         _set("hip_angle_rad", 12, np.nan),
         (
-            "column hip_angle_rad, row 12: found NaN, expected a finite number; mend or drop the"
-            " row and write the file again"
+            "column hip_angle_rad, row 12: found NaN, expected a finite number; correct or drop"
+            " the row and write the file again"
         ),
     ),
     "infinity": (
         _set("hip_torque_nm", 7, -np.inf),
         (
-            "column hip_torque_nm, row 7: found -inf, expected a finite number; mend or drop the"
-            " row and write the file again"
+            "column hip_torque_nm, row 7: found -inf, expected a finite number; correct or drop"
+            " the row and write the file again"
         ),
     ),
     "infinity where NaN may be": (
         lambda frame: _set("hip_current_a", 5, np.inf)(frame.assign(hip_current_a=np.nan)),
         (
-            "column hip_current_a, row 5: found inf, expected a finite number; mend or drop the row"
-            " and write the file again"
+            "column hip_current_a, row 5: found inf, expected a finite number; correct or drop"
+            " the row and write the file again"
         ),
     ),
     "time backwards": (
@@ -344,11 +344,11 @@ def test_a_name_that_stands_twice_is_refused(swinging_leg, run_metadata):
     frame = swinging_leg.rename(columns={"knee_angle_rad": "hip_angle_rad"})
     assert (
         refusal(RECORDING.check, frame, run_metadata, "a.parquet")
-        == "a.parquet: column hip_angle_rad stands twice, expected each name once; rename one"
+        == "a.parquet: column hip_angle_rad occurs twice, expected each name once; rename one"
     )
 
 
-MEND = "; mend it in the file's `exoid` entry"
+CORRECT = "; correct it in the file's `exoid` entry"
 REFUSED_METADATA = [
     ({"run": None}, "metadata run: found None, expected 'exo_alone' or 'with_human'"),
     ({"run": "walking"}, "metadata run: found 'walking', expected 'exo_alone' or 'with_human'"),
@@ -385,7 +385,7 @@ REFUSED_METADATA = [
 @pytest.mark.parametrize(("keys", "told"), REFUSED_METADATA)
 def test_metadata_that_break_the_contract_are_refused(swinging_leg, run_metadata, keys, told):
     message = refusal(RECORDING.check, swinging_leg, {**run_metadata, **keys}, "a.parquet")
-    assert message == f"a.parquet: {told}{MEND}"
+    assert message == f"a.parquet: {told}{CORRECT}"
 
 
 def test_metadata_that_json_cannot_hold_are_refused(swinging_leg, run_metadata):
@@ -412,8 +412,8 @@ def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
     assert told.startswith("r.parquet: column time_s, row 100: found 0.0 after 0.495")
     assert (
         refusal(RESIDUALS.check, both.assign(model="best"), {}, "r.parquet")
-        == "r.parquet: column model, row 0: found 'best', expected one of baseline, extended; mend"
-        " the value"
+        == "r.parquet: column model, row 0: found 'best', expected one of baseline, extended;"
+        " correct the value"
     )
 
 
