@@ -155,7 +155,7 @@ def _show(results: Sequence["Detectable"]) -> None:
         {tuple(sorted((one.effect.label, *one.never_apart))) for one in results if one.never_apart}
     )
     for labels in never:
-        console.say(f"Of no size to be told apart with this motion: {', '.join(labels)}.")
+        console.say(f"This motion cannot separate at any size: {', '.join(labels)}.")
 
 
 def _row(one: "Detectable") -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Every error a user can cause or meet, grouped by who has to act.
 
-The text of each says what was found, where, what was expected, and what to do.
+Each text says what is wrong and where, what was expected, and what to do.
 Only ``exoid_cli.app`` turns them into a line on the terminal and an exit code.
 """
 
@@ -40,17 +40,16 @@ class DeviceError(ExoidError):
 
 
 class Refused(DeviceError):
-    """A device answered that it will not do what it was asked."""
+    """A device refused a request."""
 
 
 class Unanswered(DeviceError):
-    """A device gave no answer in time; while the leg moves, one such is survived."""
+    """A device gave no answer in time; a moving leg tolerates one."""
 
 
 @contextmanager
 def about(file: Path | str | None) -> Iterator[None]:
-    """Put before every complaint of the block which file it is about; nothing where there is
-    none."""
+    """Begin every error of the block with the file that it is about, if any."""
     try:
         yield
     except ExoidError as error:

@@ -1,4 +1,4 @@
-"""Every table exoid reads or writes; the stages meet here and nowhere else."""
+"""Every table exoid reads or writes: the only interface between its stages."""
 
 from pathlib import Path
 
@@ -38,12 +38,12 @@ __all__ = [
 
 
 def contract_of(path: Path | str) -> Contract:
-    """Return the contract that a file says it keeps.
+    """Return the contract named in a file.
 
     Raises
     ------
     ContractError
-        Where it is none that exoid knows.
+        If exoid does not know the contract.
     """
     _, metadata = parquet.header(Path(path))
     name = metadata["contract"].partition("/")[0]

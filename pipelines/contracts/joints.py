@@ -9,8 +9,7 @@ Kind = Literal["revolute", "prismatic"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something measured or computed at a joint, as a pattern of column name and unit for each kind
-    of joint."""
+    """A quantity at a joint: patterns of column name and unit for each kind of joint."""
 
     revolute: str
     revolute_unit: str
@@ -47,8 +46,7 @@ QUANTITIES: dict[str, Quantity] = {
 
 
 def the(joint: str) -> str:
-    """Return a joint's name as a sentence has it: ``the hip``, but ``joint2`` and ``q``, which are
-    names already."""
+    """Return a joint's name for a sentence: ``the hip``, but ``joint2`` and ``q`` as they are."""
     return joint if joint[-1:].isdigit() or len(joint) == 1 else f"the {joint}"
 
 
@@ -60,8 +58,7 @@ class Joint:
     kind: Kind = "revolute"
 
     def column(self, quantity: str) -> str:
-        """Return the column that holds a quantity: ``"angle"`` is ``hip_angle_rad`` or
-        ``axis_position_m``."""
+        """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
         pattern = QUANTITIES[quantity]
         chosen = pattern.revolute if self.kind == "revolute" else pattern.prismatic
         return chosen.format(joint=self.name)
@@ -73,12 +70,12 @@ class Joint:
 
     @property
     def place(self) -> str:
-        """What its encoder tells, in a word."""
+        """The word for what its encoder measures."""
         return "angle" if self.kind == "revolute" else "position"
 
     @property
     def effort(self) -> str:
-        """What its drive exerts, in a word."""
+        """The word for what its drive exerts."""
         return "torque" if self.kind == "revolute" else "force"
 
 
@@ -86,18 +83,17 @@ HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
 
 
 def in_words(joints: Iterable[Joint]) -> str:
-    """Return joints with their kinds, as messages have them."""
+    """Return the joints with their kinds, for messages."""
     return ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
 
 
 def either(words: Iterable[str]) -> str:
-    """Return what each joint says, once: ``N`` of slides, ``N or N·m`` of a machine that slides and
-    turns."""
+    """Join the different words by "or": ``N``, or ``N or N·m`` for a machine of both kinds."""
     return " or ".join(dict.fromkeys(words))
 
 
 def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
-    """Return the joints a file speaks of; left out, they are hip and knee, both revolute."""
+    """Return the joints in a file's metadata; by default hip and knee, both revolute."""
     if "joints" not in metadata:
         return HIP_AND_KNEE
     return tuple(

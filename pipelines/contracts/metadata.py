@@ -1,5 +1,4 @@
-"""The parts of the ``exoid`` metadata that several tables share, as typed models; unknown keys are
-kept."""
+"""Typed models of the ``exoid`` metadata that several tables share; unknown keys are kept."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -13,8 +12,7 @@ Matrix = list[list[Finite]]
 
 
 class Keys(BaseModel):
-    """A metadata object: what exoid knows is checked strictly, what it does not know is left
-    alone."""
+    """A metadata object: known keys are checked strictly, unknown keys are kept."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True)
 
@@ -34,7 +32,7 @@ class InputKeys(Keys):
 
 
 class TableKeys(Keys):
-    """What the metadata of any table may hold."""
+    """Metadata of any table."""
 
     contract: str
     joints: Annotated[list[JointKeys], Field(min_length=1)] | None = None
@@ -65,7 +63,7 @@ class TableKeys(Keys):
 
 
 class Geometry(Keys):
-    """Lengths of the leg and gravity, each optional; a recording's win over exoid.toml's."""
+    """Lengths of the leg and gravity, each optional; a recording's override exoid.toml's."""
 
     thigh_length_m: Positive | None = None
     gravity_m_s2: NotNegative | None = None
@@ -84,7 +82,7 @@ class Controller(Keys):
 
 
 class Clock(Keys):
-    """How a drive's clock goes beside the first drive's."""
+    """Offset and rate of a drive's clock against the first drive's."""
 
     offset_s: Finite
     rate_ppm: Finite
@@ -104,7 +102,7 @@ class Latency(Keys):
 
 
 class RunKeys(TableKeys):
-    """What a run knows of itself."""
+    """Metadata of a run."""
 
     run: Literal["exo_alone", "with_human"]
     purpose: Literal["train", "validate"]

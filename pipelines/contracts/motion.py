@@ -10,8 +10,7 @@ from pipelines.contracts.table import BOOLEAN, INTEGER, Column, Contract, per_jo
 
 
 class RegressionFilterKeys(Keys):
-    """What whoever fits applies to torque and to every regressor column alike, never across
-    segments."""
+    """The filter that a fit applies to torque and every regressor column, segment by segment."""
 
     kind: str
     order: Annotated[int, Field(gt=0)] | None = None

@@ -1,5 +1,4 @@
-"""Parquet files with exoid's metadata: opened with a clear refusal, streamed, written whole or not
-at all."""
+"""Parquet files with exoid's metadata: read piece by piece, written whole or not at all."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,26 +16,21 @@ from pipelines.errors import ContractError
 from pipelines.validation.suggestion import similar_file
 
 STREAM = b"\xff\xff\xff\xff"
-"""How an Arrow stream starts, and so the journal of a run."""
-
-
+"""First bytes of an Arrow stream, and so of a run's journal."""
 ROWS = 2**16
-"""Of a piece that is read, and of a row group that is written: some 20 MB of a recording with
-everything in it."""
+"""Rows of a piece that is read and of a row group that is written, some 20 MB of a recording."""
 READ_AHEAD = 2**20
-"""Bytes of each column held beside a piece; without a limit it is the row group, and other tools'
-may be the file."""
+"""Bytes of each column that are read ahead; by default Arrow reads the whole row group."""
 
 
 def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
-    """Return a file's columns and its ``exoid`` metadata, or say why it is none of exoid's."""
+    """Return a file's columns and its ``exoid`` metadata; refuse a file of another program."""
     with _opened(path) as file:
         return file.schema_arrow, _metadata(file.schema_arrow, path)
 
 
 def is_whole(path: Path) -> bool:
-    """Tell whether a file is Parquet from its first byte to its last, whoever wrote it; what it
-    holds is not read."""
+    """Return whether a file is a complete Parquet file; its rows are not read."""
     try:
         with _opened(path):
             return True
@@ -45,10 +39,9 @@ def is_whole(path: Path) -> bool:
 
 
 def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are
-    named."""
+    """Yield at most ``ROWS`` rows of a file at a time; all columns, or the named ones."""
     with _opened(path) as file:
-        # Group by group: Arrow's reader of several keeps hold of all that it has read.
+        # Group by group, because Arrow's reader of several keeps all that it has read in memory.
         for group in range(file.num_row_groups):
             for batch in file.iter_batches(ROWS, row_groups=[group], columns=columns):
                 yield pa.Table.from_batches([batch])
@@ -64,27 +57,26 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    _refuse_what_is_no_file(path)
+    _refuse_unreadable(path)
     try:
-        # Not read_table(path): it would take a folder named "run=1" above the file for a column of
-        # a data set.
+        # Not read_table(path), which takes a parent folder named "run=1" for a column.
         with pq.ParquetFile(path, buffer_size=READ_AHEAD) as file:
             yield file
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
-            # The system's refusal; Arrow tells of a damaged page by an OSError that has no number.
+            # The system's refusal; Arrow's OSError for a damaged page has no number.
             raise
-        raise ContractError(f"{path}: {_what_is_wrong_with_the_bytes(path)}") from error
+        raise ContractError(f"{path}: {_fault_of_bytes(path)}") from error
 
 
 def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
     """Write a table that comes in pieces, with its metadata, under ``path``, atomically."""
     pieces = iter(pieces)
-    first = next(pieces)  # what is wrong with it is told before a folder or a file is made
+    first = next(pieces)  # an error in it is raised before a folder or file is created
     refuse_place(path, metadata["contract"])
     schema = first.schema.with_metadata({KEY: to_json(metadata, str(path)).encode()})
     with whole_file(path) as temporary:
-        temporary.touch()  # else Arrow would complain of the temporary name, in its own words
+        temporary.touch()  # the system's error, if any, is clearer than Arrow's
         with pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
             for piece in chain([first], pieces):
                 writer.write_table(
@@ -93,11 +85,9 @@ def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) ->
 
 
 def refuse_place(path: Path, contract: str) -> None:
-    """Refuse to write where a folder is, or what is no older version of the same: a recording
-    cannot be made again.
+    """Refuse to write over a folder or over a table of another contract.
 
-    Nor under a name that promises another format, or that those who look for ``*.parquet`` would
-    never find.
+    A recording cannot be made again. Names must end in .parquet, or ``*.parquet`` misses them.
     """
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
@@ -110,18 +100,16 @@ def refuse_place(path: Path, contract: str) -> None:
         return
     try:
         schema = pq.ParquetFile(path).schema_arrow
-        found = (
-            _metadata(schema, path)["contract"]
-            if KEY in (schema.metadata or {})
-            else "a table of somebody else's"
-        )
+        present = "a table of another program"
+        if KEY in (schema.metadata or {}):
+            present = _metadata(schema, path)["contract"]
     except (pa.ArrowException, UnicodeDecodeError):
         if _start(path) == MAGIC:
-            return  # what is left of one
-        found = "something else"
-    if found.partition("/")[0] != contract.partition("/")[0]:
+            return  # a truncated table may be replaced
+        present = "no Parquet table"
+    if present.partition("/")[0] != contract.partition("/")[0]:
         raise ContractError(
-            f"{path}: holds {found}, not overwritten with {contract}; choose another name or"
+            f"{path}: holds {present}, not overwritten with {contract}; choose another name or"
             " remove it"
         )
 
@@ -133,7 +121,7 @@ def to_json(metadata: Mapping[str, Any], source: str) -> str:
     Raises
     ------
     ContractError
-        Where something in it has no JSON form.
+        If a value has no JSON form.
     """
     try:
         return json.dumps(dict(metadata), ensure_ascii=False, allow_nan=False, default=_plain)
@@ -152,7 +140,7 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"found {type(value).__name__}")
 
 
-def _refuse_what_is_no_file(path: Path) -> None:
+def _refuse_unreadable(path: Path) -> None:
     if not path.exists():
         raise ContractError(
             f"{path}: no such file; {similar_file(path) or 'check the name, or make it first'}"
@@ -165,8 +153,9 @@ def _refuse_what_is_no_file(path: Path) -> None:
         )
 
 
-def _what_is_wrong_with_the_bytes(path: Path) -> str:
-    if (start := _start(path)) == STREAM:
+def _fault_of_bytes(path: Path) -> str:
+    start = _start(path)
+    if start == STREAM:
         return (
             f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"
             f" whole samples; `exoid recover {path}` makes a recording of it"
@@ -181,7 +170,7 @@ def _what_is_wrong_with_the_bytes(path: Path) -> str:
 
 def _whole_rows(path: Path) -> int:
     rows = 0
-    # Cut off; what stands before is whole.
+    # The stream may be cut off; the rows before the cut are whole.
     with suppress(pa.ArrowException, OSError), open(path, "rb") as file:
         for batch in pa.ipc.open_stream(file):
             rows += batch.num_rows

@@ -1,4 +1,4 @@
-"""Where a file came from: who made it, when, from which inputs, with which settings."""
+"""The origin of a file: program, time, inputs and settings."""
 
 import hashlib
 import json
@@ -17,7 +17,7 @@ from pipelines.contracts import parquet
 from pipelines.errors import ContractError
 
 LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow")
-"""What computes and what writes."""
+"""Libraries that compute or write results."""
 
 
 def describe(
@@ -29,7 +29,7 @@ def describe(
     ----------
     inputs : iterable of Path
         The files this result was computed from. Never pass what a rig keeps sealed: the name and
-        the hash stand in the result for everyone to read.
+        the hash can be read by everyone in the result.
     config : mapping, optional
         The stage's resolved settings, such as ``settings.model_dump(mode="json")``.
 
@@ -50,8 +50,7 @@ def describe(
 
 @cache
 def software() -> dict[str, str]:
-    """Return the versions that a number may depend on: of Python and of the libraries that
-    compute."""
+    """Return the versions of Python and of the libraries that results depend on."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
@@ -62,22 +61,19 @@ def sha256(path: Path) -> str:
 
 
 def recording_behind(path: Path) -> str:
-    """Return the SHA-256 of the recording in a file, or behind a ``motion/1``: whatever holds it, a
-    run has one."""
-    about = parquet.header(path)[1]
-    filtered_from = (
-        about.get("inputs") if str(about.get("contract")).startswith("motion/") else None
-    )
-    return str(filtered_from[0]["sha256"]) if filtered_from else sha256(path)
+    """Return the SHA-256 of the recording in a file, or of the one behind a ``motion/1``."""
+    metadata = parquet.header(path)[1]
+    if metadata["contract"].startswith("motion/") and metadata.get("inputs"):
+        return str(metadata["inputs"][0]["sha256"])
+    return sha256(path)
 
 
 IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</script>', re.DOTALL)
-"""Where a report holds its own; in it, no text contains ``<``."""
+"""The provenance in a report's page, in which no text contains ``<``."""
 
 
 def provenance_of(path: Path) -> dict[str, Any]:
-    """Return a table's metadata, or the ``provenance`` of a document or page; ContractError where
-    there is none."""
+    """Return a table's metadata, or the ``provenance`` of a JSON document or an HTML page."""
     if path.suffix not in (".json", ".html"):
         return parquet.header(path)[1]
     try:
@@ -86,14 +82,13 @@ def provenance_of(path: Path) -> dict[str, Any]:
             return dict(json.loads(IN_A_PAGE.findall(text)[-1]))
         return dict(json.loads(text)["provenance"])
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise ContractError(f"{path}: does not say where it came from; make it again") from error
+        raise ContractError(f"{path}: has no record of its origin; make it again") from error
 
 
 def metadata_of(path: Path) -> dict[str, Any]:
-    """Return what a file tells of where it came from; nothing where there is none, or one that does
-    not tell.
+    """Return what ``provenance_of`` returns; empty for a missing or unreadable file.
 
-    For who only asks whose a file is: whoever reads it says what is wrong with it.
+    For a caller that only needs to know which program made a file.
     """
     if path.is_file() and path.stat().st_size:
         with suppress(ContractError):

@@ -7,7 +7,7 @@ from pipelines.contracts.table import Column, Contract, per_joint
 
 
 class SimulationKeys(TableKeys):
-    """What was simulated."""
+    """Metadata of a simulation."""
 
     plant: dict[str, Any] | None = None
     controller: dict[str, Any] | None = None

@@ -1,5 +1,4 @@
-"""``verdict/1``, the answer of ``exoid diagnose`` as JSON: whole, with numbers where they belong,
-or refused."""
+"""``verdict/1``, the result of ``exoid diagnose`` as JSON, checked key by key."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -29,11 +28,11 @@ class Parameter(_Object):
     value: Number
     unit: str
     ci95: Annotated[list[float | None], Field(min_length=2, max_length=2)]
-    """No numbers where it has no interval."""
+    """Null where there is no interval."""
 
 
 class Gain(_Object):
-    """What naming a cause takes away."""
+    """The error that a cause removes."""
 
     rmse_reduction_nm: Number
     ci95: Interval
@@ -41,7 +40,7 @@ class Gain(_Object):
 
 
 class Tie(_Object):
-    """A cause that these data cannot tell from a named one."""
+    """A cause that these data cannot separate from a named one."""
 
     effect: str
     joint: str | None
@@ -49,23 +48,22 @@ class Tie(_Object):
     how_to_separate: str
     probability: Number | None = None
     per_run: bool = False
-    """Whether it would be another in every run; files of older versions lack it."""
+    """Whether its values differ from run to run; files of older versions lack it."""
 
 
 class OneRun(_Object):
-    """What one run has of a cause for itself."""
+    """A cause's own values in one run."""
 
     file: str
     purpose: str
     values: dict[str, Number | None]
-    """By the parameters' names; null of what never came in this run."""
+    """By the parameters' names; null if the cause does not occur in this run."""
     ci95: dict[str, Interval | None] = {}
-    """Null of what was learnt from its run alone, all else held; files of older versions lack
-    it."""
+    """Null for values fitted to this run alone; files of older versions lack it."""
 
 
 class Known(_Object):
-    """What was told to be there, and is part of the baseline."""
+    """An effect given as present, which is part of the baseline."""
 
     effect: str
     joint: str | None
@@ -84,7 +82,7 @@ class Cause(_Object):
     indistinguishable_from: list[Tie]
     evidence: list[str]
     each_run: list[OneRun] = []
-    """Empty where all runs share everything; files of older versions lack it."""
+    """Empty if all runs share all values; files of older versions lack it."""
 
 
 class Likely(_Object):
@@ -96,8 +94,7 @@ class Likely(_Object):
     probability: Probability
     words: str
     dropped: bool
-    """Whether the runs that were searched would name it, and the validation runs speak against
-    it."""
+    """Whether the searched runs name it, but the validation runs do not support it."""
 
 
 class Law(_Object):
@@ -134,7 +131,7 @@ class Finding(_Object):
 
 
 class Shares(_Object):
-    """How one joint's residual repeats, as shares of its mean square."""
+    """Shares of the mean square of one joint's residual, by how it repeats."""
 
     rms_nm: Number
     noise: Number
@@ -171,7 +168,7 @@ class Control(_Object):
 
 
 class Dependence(_Object):
-    """A variable and the share of the error that it foretells."""
+    """A variable and the share of the error that it predicts."""
 
     variable: str
     share_before: Number
@@ -198,7 +195,7 @@ class Fault(_Object):
 
 
 class Residual(_Object):
-    """What is left without a known cause."""
+    """The residual without a known cause."""
 
     description: str
 
@@ -211,7 +208,7 @@ class Input(_Object):
 
 
 class Provenance(_Object):
-    """Where it came from; what else stands there, nobody computes with."""
+    """The origin; further keys are kept, but not used."""
 
     inputs: list[Input] = []
     config: dict[str, Any] = {}
@@ -224,21 +221,19 @@ class Verdict(_Object):
     status: str
     summary: str
     finding: str | None = None
-    """The summary without what it says of acquisition and of the floor; None where acquisition is
-    at fault."""
+    """The summary without acquisition and noise floor; None if acquisition is at fault."""
     acquisition_at_fault: bool = False
     findings: list[Finding] = []
-    """Empty where nothing is missing; files of older versions lack it, as they do the next
-    three."""
+    """Empty if nothing is missing; files of older versions lack it and the next three."""
     sought_on: Literal["train", "all"] = "train"
-    """The runs that causes were sought on; files of older versions lack it."""
+    """The runs in which causes were sought; files of older versions lack it."""
     router: dict[str, Shares] = {}
     posterior: Posterior | None = None
-    """None where acquisition is at fault."""
+    """None if acquisition is at fault."""
     caveats: list[str]
     scoring: dict[str, Any]
     torque_rms_nm: ByJoint | None = None
-    """What was measured; files of older versions lack it."""
+    """Rms of the measured torque; files of older versions lack it."""
     noise_floor_nm: dict[str, Annotated[Number, Field(gt=0.0)]] = Field(min_length=1)
     baseline_rmse_nm: ByJoint
     extended_rmse_nm: ByJoint
@@ -312,7 +307,7 @@ def _listed(joints: Any) -> str:
 
 
 def parsed(path: Path) -> Any:
-    """Return what a JSON file holds; ContractError, with the place, where it is not whole."""
+    """Return the content of a JSON file; a ContractError names the place of a fault."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
@@ -327,7 +322,7 @@ def parsed(path: Path) -> Any:
 
 
 def check(content: Mapping[str, Any], source: str) -> None:
-    """Raise a ContractError that names the first key of a verdict that is missing or no number."""
+    """Check a verdict; a ContractError names the first key that is missing or wrong."""
     try:
         Verdict.model_validate(content)
     except ValidationError as error:
@@ -337,7 +332,7 @@ def check(content: Mapping[str, Any], source: str) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Return a checked verdict as its file holds it."""
+    """Return the checked verdict in a file."""
     content = parsed(path)
     check(content, str(path))
     return dict(content)

@@ -1,5 +1,4 @@
-"""Windows over a table that comes piece by piece: rows one after the other, each with its
-neighbours."""
+"""Windows over a table that comes piece by piece, each with neighbouring rows on both sides."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -8,24 +7,24 @@ import pyarrow as pa
 
 
 class Window(NamedTuple):
-    """Some rows of a table, and which of them it is about; the others, before and after, are its
-    margin."""
+    """Rows of a table: the core, and a margin before and after it."""
 
     rows: pa.Table
     first: int
-    """Number of its first row in the whole table."""
+    """Number of the first row in the whole table."""
     core: slice
-    """Of ``rows``."""
+    """The rows of the core within ``rows``."""
 
     def kept(self, table: pa.Table) -> pa.Table:
-        """Return the core of a table that has been made of ``rows``, row by row."""
+        """Return the core of a table that was computed from ``rows``, row by row."""
         return table.slice(self.core.start, self.core.stop - self.core.start)
 
 
 def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Window]:
-    """Yield windows whose cores, ``length`` rows each but for the last, are the whole table.
+    """Yield windows whose cores make up the whole table.
 
-    ``margin`` rows stand before and after the core, fewer only where the table begins or ends.
+    A core has ``length`` rows, the last one fewer. The margin has ``margin`` rows on each side,
+    fewer only where the table begins or ends.
     """
     held: pa.Table | None = None
     first = start = 0

@@ -1,2 +1,1 @@
-"""The work of an experiment: which file comes from which, what is up to date, and the same told to
-make."""
+"""The steps of an experiment: which file comes from which, what is up to date, rules for make."""

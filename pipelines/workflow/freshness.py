@@ -1,9 +1,8 @@
-"""Whether a step of an experiment is done, and if not, why: what its file was made of, against what
-is there.
+"""Whether a step of an experiment is up to date, and if not, why.
 
-A result tells the hashes of its inputs and its settings, so it is judged by content. Times count
-only for what no result may tell of; a folder that was copied, or a setting that was changed and
-changed back, makes nothing stale.
+A result holds the hashes of its inputs and its settings, so it is judged by content: copying a
+folder, or changing a setting and changing it back, makes nothing stale. Times count only for a
+rig's sealed file, whose hash no result may hold.
 """
 
 import os
@@ -21,18 +20,18 @@ from pipelines.workflow.graph import Step
 
 
 class Freshness(Enum):
-    """What can be said of a step."""
+    """The state of a step."""
 
     DONE = "done"
     STALE = "stale"
     MISSING = "missing"
     LEFT_OUT = "left out"
-    """It may be impossible, is not there, and what would need it was made without it."""
+    """Its result is missing, but it may fail, and later steps were done without it."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A step, and what is to be said of it."""
+    """A step with its state."""
 
     step: Step
     state: Freshness
@@ -47,46 +46,48 @@ class Judged:
 
 @dataclass
 class Judge:
-    """Judges the steps of one experiment, in the order of its graph; what has been done since is
-    judged anew."""
+    """Judges the steps of one experiment in the order of its graph; a step may be judged again."""
 
     out: Path
-    """Folder of the results, from which they are named."""
-    _seen: dict[Path, Judged] = field(default_factory=dict)
+    """Folder of the results; messages name files relative to it."""
+    _makers: dict[Path, Judged] = field(default_factory=dict)
 
     def all(self, steps: Sequence[Step]) -> list[Judged]:
         """Return every step with its state."""
         judged = [self.judge(step) for step in steps]
-        done_without = {file for one in judged if one.done for file in one.step.inputs}
-        return [_left_out(one) if one.step.target in done_without else one for one in judged]
+        used = {file for one in judged if one.done for file in one.step.inputs}
+        return [_left_out(one) if one.step.target in used else one for one in judged]
 
     def judge(self, step: Step) -> Judged:
-        """Return a step with its state; the steps that make its inputs have been judged before."""
+        """Return a step with its state, after the steps that make its inputs were judged."""
         state = Freshness.STALE if step.target.exists() else Freshness.MISSING
-        reasons = self._reasons(step) if step.target.exists() else self._left_behind(step.target)
+        reasons = self._reasons(step) if step.target.exists() else self._remains(step.target)
         why = tuple(dict.fromkeys(reasons))
         judged = Judged(step, state if why or state is Freshness.MISSING else Freshness.DONE, why)
-        self._seen.update(dict.fromkeys(step.makes, judged))
+        self._makers.update(dict.fromkeys(step.makes, judged))
         return judged
 
     def _reasons(self, step: Step) -> Iterator[str]:
         try:
-            told = provenance_of(step.target)
+            metadata = provenance_of(step.target)
         except ContractError as error:
             yield str(error).removeprefix(f"{step.target}: ")
             return
         yield from self._lacking(
-            [*step.beside, *(step.target.with_name(name) for name in told.get("beside", []))]
+            [
+                *step.other_outputs,
+                *(step.target.with_name(name) for name in metadata.get("beside", [])),
+            ]
         )
         yield from self._other_inputs(
-            step, {(entry["name"], entry["sha256"]) for entry in told.get("inputs", [])}
+            step, {(entry["name"], entry["sha256"]) for entry in metadata.get("inputs", [])}
         )
-        yield from _other_settings(told.get("config", {}), step.settings)
+        yield from _other_settings(metadata.get("config", {}), step.settings)
         if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
             yield f"{self._name(step.watched)} is newer"
 
-    def _lacking(self, beside: Sequence[Path]) -> Iterator[str]:
-        for file in beside:
+    def _lacking(self, outputs: Sequence[Path]) -> Iterator[str]:
+        for file in outputs:
             if not file.exists():
                 yield f"{self._name(file)} is missing"
             elif file.suffix == ".parquet" and not parquet.is_whole(file):
@@ -95,9 +96,9 @@ class Judge:
     def _other_inputs(self, step: Step, recorded: Set[tuple[str, str]]) -> Iterator[str]:
         names = {name for name, _ in recorded}
         for file in step.inputs:
-            maker = self._seen.get(file)
+            maker = self._makers.get(file)
             if maker and maker.step.may_fail and maker.state is Freshness.MISSING:
-                continue  # it does without
+                continue  # the step can do without
             if maker and not maker.done:
                 yield f"waits for {maker.step.stage}"
             elif not file.exists():
@@ -109,13 +110,11 @@ class Judge:
         for name in () if step.takes_all else names - {file.name for file in step.inputs}:
             yield f"{name} is no input any more"
 
-    def _left_behind(self, target: Path) -> Iterator[str]:
-        """Yield what the last try left in the place of a recording."""
+    def _remains(self, target: Path) -> Iterator[str]:
+        """Yield the remains of a run that was killed or stopped early."""
         journal, aborted = journal_of(target), aborted_of(target)
         if journal.exists():
-            yield (
-                f"a killed run left {self._name(journal)}; `exoid recover` makes a recording of it"
-            )
+            yield (f"a run was killed: `exoid recover` makes a recording of {self._name(journal)}")
         if aborted.exists():
             yield f"a run was stopped early: {self._name(aborted)}"
 
@@ -131,8 +130,7 @@ def _left_out(judged: Judged) -> Judged:
 
 
 def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:
-    """Yield the settings that have another value; one that the file is silent about cannot be
-    compared."""
+    """Yield the settings that have changed; those that the file does not hold are skipped."""
     for key in sorted(then.keys() & now.keys()):
         old, new = then[key], now[key]
         if isinstance(old, Mapping) and isinstance(new, Mapping):

@@ -1,8 +1,7 @@
-"""One experiment as a graph of files: which comes from which, by which command, under which
-settings.
+"""The graph of an experiment: which file comes from which, by which command and settings.
 
-It is written here and nowhere else: ``exoid run``, ``exoid status``, a command that is given no
-files, and make, by the rules that ``split`` writes, all go by it.
+This is its only definition: ``exoid run``, ``exoid status``, commands without arguments, and make,
+by the rules that ``split`` writes, all use it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,7 +25,7 @@ STAGES = (
     "extended",
     "report",
 )
-"""Those of an experiment; what it has nothing to do for has no step."""
+"""All stages; an experiment may have no step of some."""
 
 
 @dataclass(frozen=True)
@@ -36,33 +35,32 @@ class Step:
     stage: str
     """The stage it belongs to; a stage has one step, or one for each run."""
     target: Path
-    """The file that tells of what it was made."""
+    """The file that holds the hashes of its inputs and its settings."""
     inputs: tuple[Path, ...]
     """Files whose content counts: targets of other steps, or the user's own."""
     settings: Mapping[str, Any]
     """Settings that count, by the section they are recorded under in the target."""
     command: tuple[str, ...]
-    """What to call exoid with; the output is the last word."""
+    """Arguments for exoid; the output is the last one."""
     run: str | None = None
-    """The run it is for, where it is for one."""
+    """The run it is for; None if it is for all."""
     watched: Path | None = None
-    """A file that counts too, though no result may tell its hash."""
-    beside: tuple[Path, ...] = ()
-    """Other files that the command always makes; it is done where none is missing."""
+    """A further input, whose hash no result may hold; its time counts."""
+    other_outputs: tuple[Path, ...] = ()
+    """Further files that the command always makes; if one is missing, the step is stale."""
     may_fail: bool = False
-    """Whether it may be impossible, so that what needs it does without: not every model with causes
-    can move."""
+    """Whether later steps can do without it: not every model with causes can be simulated."""
     takes_all: bool = False
-    """Whether it takes whatever else the results' folder holds, too."""
+    """Whether it also reads any other file in the folder of the results."""
 
     @property
     def makes(self) -> tuple[Path, ...]:
-        """Every file of it."""
-        return (self.target, *self.beside)
+        """Every file that it makes."""
+        return (self.target, *self.other_outputs)
 
     @property
     def settings_files(self) -> tuple[str, ...]:
-        """Names of the small files by which make sees that a setting has changed."""
+        """Names of the files by which make notices a changed setting."""
         return tuple(f"run-{self.run}" if name == "run" else name for name in self.settings)
 
 
@@ -75,20 +73,20 @@ def graph(
     ----------
     experiment : Experiment
     config : Path
-        Its file, as the commands are to be told.
+        Its file, as the commands name it.
     out : Path
         Folder of the results.
     imported : ImportedRuns, optional
-        Runs whose recordings came from elsewhere: no step makes those, see ``with_imported``.
+        Runs whose recordings were imported: no step makes these, see ``with_imported``.
     """
-    told, runs = ("--config", config.as_posix()), experiment.run
+    config_option, runs = ("--config", config.as_posix()), experiment.run
     validate = [run for run in runs if run.purpose == "validate"]
     recordings = {run.name: out / "recordings" / f"{run.name}.parquet" for run in runs}
     motions = {name: out / "motions" / path.name for name, path in recordings.items()}
     trajectory, parameters = out / "trajectory.parquet", out / "identified" / "parameters.parquet"
 
     recorded = [
-        _recorded(experiment, run, recordings[run.name], trajectory, told)
+        _recorded(experiment, run, recordings[run.name], trajectory, config_option)
         for run in runs
         if run.name not in imported.names
     ]
@@ -100,14 +98,14 @@ def graph(
         settings: Sequence[str],
         *command: str,
         run: str | None = None,
-        beside: Iterable[str] = (),
+        other_outputs: Iterable[str] = (),
     ) -> Step:
         sections = experiment.sections_about(imported.of_a_leg, *settings)
-        # What nobody wrote is not compared with what a result tells.
+        # A section that exoid.toml lacks is not compared with the result's.
         counted = {name: section for name, section in sections.items() if section is not None}
-        others = tuple(target.with_name(name) for name in beside)
-        words = (*command, *told, "-o", _output(stage, target))
-        return Step(stage, target, tuple(inputs), counted, words, run, beside=others)
+        others = tuple(target.with_name(name) for name in other_outputs)
+        words = (*command, *config_option, "-o", _output(stage, target))
+        return Step(stage, target, tuple(inputs), counted, words, run, other_outputs=others)
 
     steps = list(recorded)
     if any(trajectory in one.inputs for one in recorded):
@@ -117,12 +115,14 @@ def graph(
         steps.append(step("filter", motions[name], [recording], ["filter"], *called, run=name))
     counted: tuple[str, ...] = ("identify", "mechanism")
     words = ("identify", *_words(motions))
-    steps.append(step("identify", parameters, motions.values(), counted, *words, beside=IDENTIFIED))
+    steps.append(
+        step("identify", parameters, motions.values(), counted, *words, other_outputs=IDENTIFIED)
+    )
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
         verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
         words = ("diagnose", *_words(recordings))
         steps.append(
-            step("diagnose", verdict, recordings.values(), counted, *words, beside=DIAGNOSED)
+            step("diagnose", verdict, recordings.values(), counted, *words, other_outputs=DIAGNOSED)
         )
         extended = verdict.with_name("parameters.parquet")
 
@@ -131,7 +131,12 @@ def graph(
         if imported.of_a_leg:
             sweep = [SWEEP] if experiment.simulate.sweep_nm_s_rad else []
             yield step(
-                loop, folder / LOOP, [model], ("simulate", "mechanism"), *called, beside=sweep
+                loop,
+                folder / LOOP,
+                [model],
+                ("simulate", "mechanism"),
+                *called,
+                other_outputs=sweep,
             )
         for name in (run.name for run in validate):
             inputs, words = (
@@ -147,7 +152,7 @@ def graph(
                 run=name,
             )
 
-    # What somebody else recorded need not tell enough for a model that can move.
+    # An imported recording may lack what a model needs to be simulated.
     loops = simulated(parameters, out / "simulated", "simulate", "replay")
     steps += [replace(one, may_fail=bool(imported.names)) for one in loops]
     if validate:
@@ -161,14 +166,13 @@ def graph(
 LOOP, SWEEP, WHOLE_FOLDER = "rbf.parquet", "kv-sweep.csv", ("identify", "diagnose")
 IDENTIFIED = ("residuals.parquet",)
 DIAGNOSED = ("parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json")
-"""What these write besides their target, whatever they find; figures are drawn from it, and are not
-looked for."""
+"""Files that these commands always write next to their target; figures are not checked."""
 
 
 def _output(stage: str, target: Path) -> str:
-    """Return what a command is told to write: some are told a folder."""
-    told_a_folder = stage in WHOLE_FOLDER or target.name == LOOP
-    return f"{target.parent.as_posix()}/" if told_a_folder else target.as_posix()
+    """Return the output argument of a command: a folder for some."""
+    is_folder = stage in WHOLE_FOLDER or target.name == LOOP
+    return f"{target.parent.as_posix()}/" if is_folder else target.as_posix()
 
 
 def _words(files: Mapping[str, Path]) -> list[str]:
@@ -176,24 +180,27 @@ def _words(files: Mapping[str, Path]) -> list[str]:
 
 
 def _recorded(
-    experiment: Experiment, run: RunSettings, target: Path, designed: Path, told: tuple[str, ...]
+    experiment: Experiment,
+    run: RunSettings,
+    target: Path,
+    designed: Path,
+    config_option: tuple[str, ...],
 ) -> Step:
-    """Return the step that records one run: its rig and its excitation count by their content."""
+    """Return the step that records one run; its rig and its excitation count by their content."""
     excitation = experiment.file(run.trajectory) if run.trajectory else designed
     rig = experiment.file(experiment.acquire.rig)
     return Step(
         "acquire",
         target,
         (excitation, rig),
-        # Of [acquire] the rig counts by its content, as an input does: it may stand elsewhere on
-        # another computer.
+        # The rig counts by its content, as an input does: its path differs between computers.
         {
             "acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz},
             "run": run.model_dump(mode="json"),
         },
         (
             "acquire",
-            *told,
+            *config_option,
             "--run",
             run.name,
             "--trajectory",
@@ -207,8 +214,7 @@ def _recorded(
 
 
 def sealed_file(rig: Path) -> Path | None:
-    """Return the file of what a rig hides, where there is one; a rig that lacks it says so when it
-    is started."""
+    """Return the sealed file of a virtual rig, if it exists."""
     plant = load_rig(rig).plant if rig.is_file() else None
     sealed = rig.parent / plant.sealed if plant and plant.sealed else None
     return sealed if sealed and sealed.is_file() else None

@@ -1,8 +1,7 @@
-"""An experiment told to make: one small file a section of its settings, and the rules of its graph.
+"""Write an experiment for make: a file for each section of its settings, and the graph's rules.
 
-A section's file whose content is already right keeps its time, so that make re-runs only what a
-change touches. ``graph.mk`` is rewritten each time: its time says when the settings were last
-looked at.
+A section's file that has not changed keeps its time, so that make re-runs only what a change
+affects. ``graph.mk`` is rewritten each time: its time says when the settings were last read.
 """
 
 import json
@@ -17,15 +16,14 @@ from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
 
 INCOMPLETE = "incomplete"
-"""What make is told that a step needs of whose files one is missing."""
+"""The phony prerequisite of a step that lacks one of its files."""
 
 
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
     experiment, imported = with_imported(experiment, folder.parent)
     imported.refuse_damaged()
-    # Names that make knows stand for the places, so that the rules hold wherever make is told to
-    # work.
+    # Variables of make instead of paths, so that the rules hold in any folder.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
     sections = experiment.sections(
         "mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate"
@@ -41,11 +39,10 @@ def split(experiment: Experiment, folder: Path) -> None:
 
 
 def _add_what_is_recorded(experiment: Experiment, sections: dict[str, Any]) -> None:
-    # A rig or an excitation is a setting too: its content counts, not the time of its file.
+    # A rig or an excitation counts by its content, not by the time of its file.
     rig = experiment.file(experiment.acquire.rig)
     sections["acquire"]["rig_sha256"] = sha256(rig)
-    # No stage reads this file, it only has a time for make: what the rig keeps sealed goes no
-    # further than its hash.
+    # No stage reads this file, so that the hash of the sealed file reaches no result.
     sealed = sealed_file(rig)
     sections["acquire"]["hidden_sha256"] = sha256(sealed) if sealed else None
     for run in experiment.run:
@@ -62,31 +59,30 @@ def _write_if_changed(path: Path, text: str) -> None:
 def _rules(steps: Sequence[Step]) -> Iterator[str]:
     yield "# Written by `exoid settings split`; changes here are lost."
     yield f"RESULTS := {' '.join(step.target.as_posix() for step in steps)}"
-    # Its own rule, without a recipe, keeps make from giving up where the sealed file is gone.
+    # A rule without a recipe: make would stop if the sealed file were missing.
     for sealed in dict.fromkeys(step.watched for step in steps if step.watched):
         yield f"$(SETTINGS)/graph.mk: {sealed.as_posix()}"
         yield f"{sealed.as_posix()}:"
-    # What is phony is never up to date, nor is a step then that needs it.
+    # A phony target is never up to date, nor is a step that needs it.
     yield f".PHONY: {INCOMPLETE}"
     for step in steps:
         yield from _rule(step)
 
 
 def _rule(step: Step) -> Iterator[str]:
-    # What is no result, such as a rig, counts by its hash in the settings.
-    made = [file.as_posix() for file in step.inputs if file.is_relative_to("$(OUT)")]
+    # An input that is no result, such as a rig, counts by its hash in the settings.
+    inputs = [file.as_posix() for file in step.inputs if file.is_relative_to("$(OUT)")]
     settings = [f"$(SETTINGS)/{name}.json" for name in step.settings_files]
     yield ""
-    yield f"{step.target.as_posix()}: {' '.join([*made, *settings, *_if_incomplete(step)])}"
-    # A step that may be impossible is tried, and what needs it made without it.
+    yield f"{step.target.as_posix()}: {' '.join([*inputs, *settings, *_if_incomplete(step)])}"
+    # make ignores the failure of a step that may fail.
     yield f"\t{'-' * step.may_fail}$(EXOID) {' '.join(step.command)}"
-    # With an empty recipe make looks at the file's own time, once the command has run.
-    yield from (f"{file.as_posix()}: {step.target.as_posix()} ;" for file in step.beside)
+    # With an empty recipe make checks the file's own time after the command.
+    yield from (f"{file.as_posix()}: {step.target.as_posix()} ;" for file in step.other_outputs)
 
 
 def _if_incomplete(step: Step) -> Iterator[str]:
-    """Yield what a step needs that is to be done again for a missing file; rules of several files
-    need make 4.3."""
-    beside = " ".join(file.as_posix() for file in step.beside)
-    if beside:
-        yield f"$(if $(filter-out $(wildcard {beside}),{beside}),{INCOMPLETE})"
+    """Yield the prerequisite of a step that lacks a file; grouped targets would need make 4.3."""
+    outputs = " ".join(file.as_posix() for file in step.other_outputs)
+    if outputs:
+        yield f"$(if $(filter-out $(wildcard {outputs}),{outputs}),{INCOMPLETE})"

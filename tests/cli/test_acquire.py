@@ -23,8 +23,8 @@ def after(exoid, tmp_path, monkeypatch):
     out."""
 
     def say(missed, left_out):
-        made = Outcome(tmp_path / "one.parquet", 1000, missed, left_out)
-        monkeypatch.setattr("pipelines.acquisition.acquire.acquire", lambda *a, **k: made)
+        result = Outcome(tmp_path / "one.parquet", 1000, missed, left_out)
+        monkeypatch.setattr("pipelines.acquisition.acquire.acquire", lambda *a, **k: result)
         config = tmp_path / "exoid.toml"
         config.write_text(CONFIG.format(rig=(datasets() / "rigs" / "recorder.toml").as_posix()))
         outcome = exoid("acquire", "--config", config, "--run", "one")
@@ -42,8 +42,8 @@ def test_set_points_that_were_left_out_are_warned_of_though_no_sample_is_missing
     )
 
 
-def test_set_points_that_went_with_their_samples_are_told_once(after):
-    said = after(missed=3, left_out=3)
-    assert "3 samples were missed; `exoid show` lists the gaps" in said
-    assert "left out" not in said
+def test_set_points_of_missed_samples_are_reported_once(after):
+    output = after(missed=3, left_out=3)
+    assert "3 samples were missed; `exoid show` lists the gaps" in output
+    assert "left out" not in output
     assert "warning" not in after(missed=0, left_out=0)

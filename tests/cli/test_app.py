@@ -31,8 +31,8 @@ def test_the_list_of_commands_tells_each_whole(exoid):
     assert "..." not in exoid("--help").out.partition("Commands:")[2]
 
 
-@pytest.mark.parametrize(("told", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
-def test_numpy_uses_one_thread_unless_told_otherwise(told, used):
+@pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_numpy_uses_one_thread_unless_set_otherwise(given, used):
     code = (
         "import os, sys; sys.argv = ['exoid', '--help']\n"
         "from exoid_cli.__main__ import main\n"
@@ -40,11 +40,11 @@ def test_numpy_uses_one_thread_unless_told_otherwise(told, used):
     )
     environment = {
         name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")
-    } | told
-    said = subprocess.run(
+    } | given
+    output = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True
     ).stdout
-    assert said.splitlines()[-1] == used
+    assert output.splitlines()[-1] == used
 
 
 def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
@@ -53,7 +53,7 @@ def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
         "app._command_line = lambda words: warnings.warn('overflow', RuntimeWarning); app.main()"
     )
 
-    def told(**more):
+    def stderr(**more):
         environment = {
             name: value for name, value in os.environ.items() if name != "EXOID_DEBUG"
         } | more
@@ -61,8 +61,8 @@ def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True
         ).stderr
 
-    assert told() == ""
-    assert "overflow" in told(EXOID_DEBUG="1")
+    assert stderr() == ""
+    assert "overflow" in stderr(EXOID_DEBUG="1")
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ app.main()
 """
 
 
-def test_what_a_device_did_is_told_with_its_exit_code_however_many_signals_come_meanwhile():
+def test_what_a_device_did_is_printed_with_its_exit_code_however_many_signals_come_meanwhile():
     done = subprocess.run(
         [sys.executable, "-c", IMPATIENT, "stopped"], capture_output=True, text=True
     )
@@ -217,7 +217,7 @@ app.main()
         ("moving", 3, "exoid: made up\n"),  # what a device did is true nevertheless
     ],
 )
-def test_what_an_import_the_compiler_or_asyncio_makes_of_ctrl_c_is_told_as_ctrl_c(
+def test_what_an_import_the_compiler_or_asyncio_makes_of_ctrl_c_is_reported_as_ctrl_c(
     tmp_path, how, code, line
 ):
     (tmp_path / "mistaken.py").write_text(MISTAKEN)

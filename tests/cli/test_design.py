@@ -56,12 +56,14 @@ def test_what_lies_outside_the_bounds_is_marked(tmp_path, capsys):
 def test_a_design_is_written_with_what_it_is_worth(tmp_path, config, capsys):
     out = tmp_path / "t.parquet"
     assert run(["design", "--config", config, "-o", str(out), "--json"]) == 0
-    told, table = json.loads(capsys.readouterr().out), TRAJECTORY.read(out)
-    assert told["criterion_value"] == table.metadata["criterion_value"] == table.metadata["log_det"]
+    result, table = json.loads(capsys.readouterr().out), TRAJECTORY.read(out)
+    assert (
+        result["criterion_value"] == table.metadata["criterion_value"] == table.metadata["log_det"]
+    )
     assert table.metadata["seed"] == 4
     assert table.metadata["config"]["design"]["harmonics"] == 2
     assert run(["design", "--evaluate", str(out), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["log_det"] == pytest.approx(told["log_det"])
+    assert json.loads(capsys.readouterr().out)["log_det"] == pytest.approx(result["log_det"])
 
 
 def test_options_win_over_the_file(tmp_path, config):
@@ -73,7 +75,7 @@ def test_options_win_over_the_file(tmp_path, config):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ([], "exoid: neither -o FILE nor --evaluate FILE is given, and there is no exoid.toml in "),
         (
@@ -86,6 +88,6 @@ def test_options_win_over_the_file(tmp_path, config):
         ),
     ],
 )
-def test_a_wrong_call_is_one_line_and_code_2(arguments, told, capsys):
+def test_a_wrong_call_is_one_line_and_code_2(arguments, message, capsys):
     assert run(["design", *arguments]) == 2
-    assert capsys.readouterr().err.startswith(told)
+    assert capsys.readouterr().err.startswith(message)

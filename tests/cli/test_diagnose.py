@@ -21,7 +21,7 @@ ROW = re.compile(r"^( *)(\w.*?) +([01]\.\d\d)$", flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "ci95", "said"),
+    ("value", "unit", "ci95", "output"),
     [
         (1.932, "N·m", [1.9, 2.0], "play 1.932 N·m (1.9 … 2)"),
         (0.9457, "1", [0.9383, 0.9531], "play 0.9457 (0.9383 … 0.9531)"),
@@ -29,8 +29,8 @@ ROW = re.compile(r"^( *)(\w.*?) +([01]\.\d\d)$", flags=re.MULTILINE)
     ],
     ids=["measured", "a pure number", "chosen"],
 )
-def test_a_parameter_has_its_unit_and_an_interval_only_if_it_was_fitted(value, unit, ci95, said):
-    assert _in_words({"name": "play", "value": value, "unit": unit, "ci95": ci95}) == said
+def test_a_parameter_has_its_unit_and_an_interval_only_if_it_was_fitted(value, unit, ci95, output):
+    assert _in_words({"name": "play", "value": value, "unit": unit, "ci95": ci95}) == output
 
 
 def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
@@ -40,7 +40,7 @@ def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
     assert "excess left" not in printed
 
 
-def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it(capsys):
+def test_an_error_stands_next_to_its_torque_which_older_files_lack(capsys):
     show_verdict(verdict_of(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
     show_verdict(verdict_of(), HIP_AND_KNEE)
     knee, older = [
@@ -50,7 +50,7 @@ def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it
     assert older[:2] == ["knee", "0.272"]
 
 
-def test_a_gait_is_told_of_a_leg_alone(capsys):
+def test_a_gait_is_printed_of_a_leg_alone(capsys):
     slide = [Joint("axis", "prismatic")]
     errors = {key: {"axis": 0.5} for key in (*ERRORS, "unexplained")}
     control = verdict_of()["control"] | {
@@ -62,8 +62,8 @@ def test_a_gait_is_told_of_a_leg_alone(capsys):
     assert "adaptive control" in capsys.readouterr().out
 
 
-def shown(capsys, **told):
-    show_verdict(verdict_of(**told), HIP_AND_KNEE)
+def shown(capsys, **decision):
+    show_verdict(verdict_of(**decision), HIP_AND_KNEE)
     return capsys.readouterr().out
 
 
@@ -116,8 +116,8 @@ def test_no_line_is_less_probable_than_one_below_it(capsys):
 
 
 def test_two_findings_share_the_lines_above_both(capsys):
-    told = decision_of(ties=(), law=0.0)
-    (first,) = told["findings"]
+    decision = decision_of(ties=(), law=0.0)
+    (first,) = decision["findings"]
     law = {"law": "load", "joint": "knee", "probability": 0.8, "words": "a law of the knee's load"}
     path = [
         *first["path"][:3],
@@ -132,7 +132,9 @@ def test_two_findings_share_the_lines_above_both(capsys):
     }
     words = [
         words
-        for _, words, _ in probabilities(shown(capsys, **told | {"findings": [first, second]}))[3:]
+        for _, words, _ in probabilities(shown(capsys, **decision | {"findings": [first, second]}))[
+            3:
+        ]
     ]
     assert words == [
         "something that repeats with the motion",
@@ -145,10 +147,10 @@ def test_two_findings_share_the_lines_above_both(capsys):
 
 
 def test_what_is_known_to_be_missing_and_no_more_has_a_line(capsys):
-    told = decision_of()
-    (first,) = told["findings"]
+    decision = decision_of()
+    (first,) = decision["findings"]
     only = first | {"level": "repeatability", "causes": [], "laws": [], "path": first["path"][:1]}
-    lines = probabilities(shown(capsys, **told | {"findings": [only]}, causes=[]))[3:]
+    lines = probabilities(shown(capsys, **decision | {"findings": [only]}, causes=[]))[3:]
     assert lines == [(0, "something is missing", 97)]
 
 
@@ -156,11 +158,11 @@ def test_a_line_that_is_too_long_goes_on_below_itself_and_keeps_its_probability(
     capsys, monkeypatch
 ):
     monkeypatch.setattr(console.out, "_width", 80)
-    told = decision_of(ties=())
-    told["findings"][0]["laws"][0]["words"] = (
+    decision = decision_of(ties=())
+    decision["findings"][0]["laws"][0]["words"] = (
         "friction of the knee that depends on the other joint's angle " + "so"
     )
-    printed = shown(capsys, **told)
+    printed = shown(capsys, **decision)
     assert max(map(len, printed.splitlines()[2:14])) <= 80
     (first,) = [line for line in printed.splitlines() if "unlisted: friction" in line]
     assert first.endswith("0.02")
@@ -179,9 +181,9 @@ def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_ever
         "what": "the hip's angle is stuck",
     }
     other = fault | {"file": "run_2.parquet"}
-    told = decision_of() | {"findings": [], "posterior": None}
+    decision = decision_of() | {"findings": [], "posterior": None}
     printed = shown(
-        capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **told
+        capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **decision
     )
     assert "No cause was sought. Correct the acquisition, and record again." in printed
     assert "- run_2.parquet, hip_angle_rad: the hip's angle is stuck" in printed

@@ -10,11 +10,11 @@ from pipelines.effects import EFFECTS
 def test_the_list_names_every_effect_with_equation_and_size(exoid):
     outcome = exoid("effects")
     assert outcome.code == 0
-    said = " ".join(outcome.out.split())
+    output = " ".join(outcome.out.split())
     for effect in EFFECTS:
-        assert effect.name in said
-        assert " ".join(effect.equation.split()) in said
-    assert "stribeck_torque 0.3 to 6 N·m" in said
+        assert effect.name in output
+        assert " ".join(effect.equation.split()) in output
+    assert "stribeck_torque 0.3 to 6 N·m" in output
     assert max(map(len, outcome.out.splitlines())) <= 80
 
 
@@ -22,14 +22,14 @@ def test_the_list_names_every_effect_with_equation_and_size(exoid):
 def test_a_page_tells_how_to_see_it_and_how_to_make_sure(exoid, effect):
     outcome = exoid("effects", effect.name)
     assert outcome.code == 0
-    for told in (effect.equation, effect.looks_like, effect.confirm, effect.source):
-        assert " ".join(told.split()) in " ".join(outcome.out.split())
+    for message in (effect.equation, effect.looks_like, effect.confirm, effect.source):
+        assert " ".join(message.split()) in " ".join(outcome.out.split())
     assert max(map(len, outcome.out.splitlines())) <= 80
 
 
 def test_programs_get_the_same_as_json(exoid):
-    told = json.loads(exoid("effects", "--json").out)
-    assert [one["effect"] for one in told] == [effect.name for effect in EFFECTS]
+    descriptions = json.loads(exoid("effects", "--json").out)
+    assert [one["effect"] for one in descriptions] == [effect.name for effect in EFFECTS]
     page = json.loads(exoid("effects", "cogging", "--json").out)
     assert [p["name"] for p in page["parameters"]] == ["amplitude", "cycles_per_turn", "phase"]
 

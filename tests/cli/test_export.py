@@ -31,7 +31,7 @@ def model(tmp_path):
         ("c", ["leg.c", "leg.h"]),
     ],
 )
-def test_each_format_is_written_and_told(exoid, model, tmp_path, to, files):
+def test_each_format_is_written_and_printed(exoid, model, tmp_path, to, files):
     outcome = exoid(
         "export",
         model(named("stribeck_friction@knee")),
@@ -46,7 +46,7 @@ def test_each_format_is_written_and_told(exoid, model, tmp_path, to, files):
     assert ("not in the file" in outcome.err) == (to in ("mjcf", "urdf"))
 
 
-def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(
+def test_a_term_left_out_is_warned_of_with_its_parameters_and_listed_in_the_json(
     exoid, model, tmp_path
 ):
     outcome = exoid("export", model(named("stribeck_friction@knee")), "--to", "mjcf", "--json")
@@ -54,10 +54,10 @@ def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(
         "warning: stribeck_friction@knee is not in the file (MJCF has no element for it): "
         "stribeck_torque = 3 N·m, stribeck_velocity = 0.15 rad/s, exponent = 2" in outcome.err
     )
-    said = json.loads(outcome.out)
-    assert said["files"] == [str(tmp_path / "parameters.xml")]
-    (left,) = [term for term in said["terms"] if term["held"] == "left out"]
-    assert left["parameters"]["stribeck_velocity"] == {"value": 0.15, "unit": "rad/s"}
+    output = json.loads(outcome.out)
+    assert output["files"] == [str(tmp_path / "parameters.xml")]
+    (remaining,) = [term for term in output["terms"] if term["held"] == "left out"]
+    assert remaining["parameters"]["stribeck_velocity"] == {"value": 0.15, "unit": "rad/s"}
 
 
 def test_show_knows_the_json_document(exoid, model, tmp_path):

@@ -63,9 +63,9 @@ def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tm
     outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--json")
     assert outcome.code == 0, outcome.err
     # NaN is no JSON, though Python reads it.
-    said = json.loads(outcome.out, parse_constant=pytest.fail)
-    assert {"hip", "knee"} == set(said["validation"]["all"])
-    assert {row["joint"] for row in said["parameters"]} == {"hip", "knee", None}
+    printed = json.loads(outcome.out, parse_constant=pytest.fail)
+    assert {"hip", "knee"} == set(printed["validation"]["all"])
+    assert {row["joint"] for row in printed["parameters"]} == {"hip", "knee", None}
 
 
 @pytest.mark.parametrize(
@@ -78,13 +78,13 @@ def test_a_method_gives_the_same_table_and_says_how_it_was_made(
     given = ("-o", tmp_path, "--config", tmp_path / "exoid.toml", "--method", method)
     outcome = exoid("identify", *sorted(recordings.iterdir()), *given)
     assert outcome.code == 0, outcome.err
-    found = PARAMETERS.read(tmp_path / "parameters.parquet")
-    assert len(found.frame) == 16
-    assert found.metadata["method"]["estimator"] == method
-    assert set(found.metadata["method"]["steps"]) == {"exo_alone", "with_human"}
-    assert found.metadata["config"]["identify"]["method"] == method
-    said = "Durbin-Wu-Hausman" in outcome.out
-    assert said == (method == "instrumental_variables")
+    result = PARAMETERS.read(tmp_path / "parameters.parquet")
+    assert len(result.frame) == 16
+    assert result.metadata["method"]["estimator"] == method
+    assert set(result.metadata["method"]["steps"]) == {"exo_alone", "with_human"}
+    assert result.metadata["config"]["identify"]["method"] == method
+    printed = "Durbin-Wu-Hausman" in outcome.out
+    assert printed == (method == "instrumental_variables")
 
 
 def test_the_method_can_stand_in_the_settings(exoid, recordings, tmp_path):
@@ -100,8 +100,8 @@ def test_the_method_can_stand_in_the_settings(exoid, recordings, tmp_path):
         tmp_path / "exoid.toml",
     ]
     assert exoid(*given).code == 0
-    found = PARAMETERS.read(tmp_path / "out" / "parameters.parquet")
-    assert found.metadata["method"]["name"] == "two-step ordinary least squares"
+    result = PARAMETERS.read(tmp_path / "out" / "parameters.parquet")
+    assert result.metadata["method"]["name"] == "two-step ordinary least squares"
 
 
 def test_a_method_that_does_not_exist_ends_in_one_line_with_the_nearest(
@@ -293,10 +293,11 @@ def test_the_same_run_twice_is_refused(exoid, recordings, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), [(b"", "is empty (0 bytes)"), (b"no Parquet" * 9, "is not a Parquet file")]
+    ("content", "printed"),
+    [(b"", "is empty (0 bytes)"), (b"no Parquet" * 9, "is not a Parquet file")],
 )
 def test_files_that_are_alike_since_they_hold_nothing_are_not_called_copies(
-    exoid, tmp_path, content, said
+    exoid, tmp_path, content, printed
 ):
     for name in ("one.parquet", "two.parquet"):
         (tmp_path / name).write_bytes(content)
@@ -304,7 +305,7 @@ def test_files_that_are_alike_since_they_hold_nothing_are_not_called_copies(
         "diagnose", tmp_path / "one.parquet", tmp_path / "two.parquet", "-o", tmp_path / "d"
     )
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert said in outcome.err and "same data" not in outcome.err
+    assert printed in outcome.err and "same data" not in outcome.err
 
 
 def test_a_diagnosis_that_is_refused_leaves_no_folder(exoid, recordings, tmp_path):
@@ -324,7 +325,7 @@ def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
     assert isinstance(MOTION.read(target).frame, pd.DataFrame)
 
 
-def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_without(
+def test_causes_of_a_diagnosis_are_fitted_with_their_shapes_held_next_to_the_fit_without(
     exoid, recordings, tmp_path
 ):
     """The rig's knee has an elastic transmission of 900 N·m/rad, says the file; its amplitudes are
@@ -366,9 +367,9 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
     ]
     assert rows[16]["std_error"] == pytest.approx(40.0)
     assert rows[17]["std_error"] is None
-    found = PARAMETERS.read(tmp_path / "refitted" / "parameters.parquet")
-    assert np.array(found.metadata["covariance"]).shape == (19, 19)
-    assert found.metadata["inputs"][-1]["name"] == "named.parquet"
+    result = PARAMETERS.read(tmp_path / "refitted" / "parameters.parquet")
+    assert np.array(result.metadata["covariance"]).shape == (19, 19)
+    assert result.metadata["inputs"][-1]["name"] == "named.parquet"
     assert set(RESIDUALS.read(tmp_path / "refitted" / "residuals.parquet").frame["model"]) == {
         "extended"
     }
@@ -389,16 +390,16 @@ def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordi
     outcome = exoid("identify", *asked, "-o", tmp_path)
     assert outcome.code == 0, outcome.err
     assert "knee J" in outcome.out
-    found = PARAMETERS.read(tmp_path / "parameters.parquet").metadata["method"]
-    assert found["samples"] == "all"
-    assert found["effects"] == ["rotor_inertia@knee"]
+    result = PARAMETERS.read(tmp_path / "parameters.parquet").metadata["method"]
+    assert result["samples"] == "all"
+    assert result["effects"] == ["rotor_inertia@knee"]
     outcome = exoid("identify", *asked)
     assert outcome.code == 2
     assert "--effect: no folder is given" in outcome.err
 
 
 @pytest.mark.parametrize(
-    ("damage", "said"),
+    ("damage", "printed"),
     [
         (
             lambda f: pd.concat([f, f.tail(1)], ignore_index=True),
@@ -415,7 +416,7 @@ def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordi
     ],
 )
 def test_a_damaged_table_of_causes_is_refused_with_its_name(
-    exoid, recordings, tmp_path, damage, said
+    exoid, recordings, tmp_path, damage, printed
 ):
     files = sorted(recordings.iterdir())
     (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
@@ -442,7 +443,7 @@ def test_a_damaged_table_of_causes_is_refused_with_its_name(
     )
     assert outcome.code == 2
     assert f"{tmp_path / 'named.parquet'}" in outcome.err
-    assert said in outcome.err
+    assert printed in outcome.err
     assert not (tmp_path / "out").exists()
 
 

@@ -46,8 +46,8 @@ def test_it_is_filtered_identified_and_never_recorded(exoid, folder):
     outcome = exoid("run", "identify", "--json")
     assert outcome.code == 0, outcome.err
     assert [one["stage"] for one in json.loads(outcome.out)] == ["filter", "filter", "identify"]
-    told = json.loads(outcome.out)[-1]["result"]["parameters"]
-    (inertia,) = [row["value"] for row in told if row["unit"] == "kg·m²"]
+    rows = json.loads(outcome.out)[-1]["result"]["parameters"]
+    (inertia,) = [row["value"] for row in rows if row["unit"] == "kg·m²"]
     assert inertia == pytest.approx(0.5, abs=0.02)
     assert exoid("run", "identify").out == "Everything is up to date.\n"
 
@@ -77,13 +77,11 @@ def test_nothing_is_recorded_in_its_place(exoid, folder, words):
     assert (folder / "recordings" / "Monday-1.parquet").read_bytes() == before
 
 
-def test_results_about_another_machine_tell_no_settings_of_a_leg_until_somebody_writes_them(
-    exoid, folder
-):
+def test_results_of_another_machine_hold_no_settings_of_a_leg_until_they_are_written(exoid, folder):
     assert exoid("run", "identify").code == 0
-    made = PARAMETERS.read(folder / "identified" / "parameters.parquet").metadata
-    assert made["config"]["mechanism"] is None
-    assert made["geometry"] == {"gravity_m_s2": 9.8}
+    result = PARAMETERS.read(folder / "identified" / "parameters.parquet").metadata
+    assert result["config"]["mechanism"] is None
+    assert result["geometry"] == {"gravity_m_s2": 9.8}
     (folder / "exoid.toml").write_text('[mechanism]\nname = "single"\ngravity_m_s2 = 1.6\n')
     stale = {one["stage"]: one["why"] for one in json.loads(exoid("status", "--json").out)}[
         "identify"
@@ -103,7 +101,7 @@ def test_a_machine_that_is_no_leg_is_not_asked_to_follow_a_gait(exoid, folder):
     )
 
 
-def test_steps_that_cannot_be_done_are_told_with_the_reason_after_the_count_of_those_that_were(
+def test_steps_that_cannot_be_done_are_listed_with_the_reason_after_the_count_of_the_others(
     exoid, folder, monkeypatch
 ):
     def refuse(*words, **named):
@@ -131,10 +129,10 @@ def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoi
     )
 
 
-@pytest.mark.parametrize("left", [0, 4, 3000])
-def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, folder, left):
+@pytest.mark.parametrize("remaining", [0, 4, 3000])
+def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, folder, remaining):
     path = folder / "recordings" / "Monday-1.parquet"
-    path.write_bytes(path.read_bytes()[:left])
+    path.write_bytes(path.read_bytes()[:remaining])
     for words in (
         ("run",),
         ("status",),
@@ -156,8 +154,8 @@ def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, fold
     assert not (folder / "motions").exists()
     first = exoid("status").out.splitlines()[1]
     assert first.split()[:3] == ["import", "damaged", "recordings/Monday-1.parquet"]
-    told = json.loads(exoid("status", "--json").out)[0]
-    assert (told["target"], told["state"]) == ("recordings/Monday-1.parquet", "damaged")
+    first = json.loads(exoid("status", "--json").out)[0]
+    assert (first["target"], first["state"]) == ("recordings/Monday-1.parquet", "damaged")
     path.unlink()
     assert exoid("status").code == 0
 
@@ -172,7 +170,7 @@ def test_where_every_recording_is_damaged_all_are_named(exoid, folder):
     )
 
 
-def test_a_table_of_somebody_elses_beside_the_recordings_is_none_of_them(exoid, folder):
+def test_a_table_of_another_program_next_to_the_recordings_is_none_of_them(exoid, folder):
     pd.DataFrame({"t": [0.0]}).to_parquet(folder / "recordings" / "log.parquet")
     assert exoid("status").code == 0
 

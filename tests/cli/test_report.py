@@ -22,9 +22,9 @@ def test_the_page_is_written_and_its_summary_said(exoid, folder, tmp_path):
 
 def test_in_a_folder_with_results_no_arguments_are_needed(exoid, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    told = json.loads(exoid("report", "--json").out)
-    assert told["path"] == "report.html"
-    assert told["bytes"] == len((folder / "report.html").read_bytes())
+    document = json.loads(exoid("report", "--json").out)
+    assert document["path"] == "report.html"
+    assert document["bytes"] == len((folder / "report.html").read_bytes())
 
 
 def test_two_sessions_are_compared(exoid, folder, tmp_path):
@@ -99,7 +99,7 @@ def test_where_there_is_nothing_to_draw_that_is_said(exoid, tmp_path):
 
 
 @pytest.mark.parametrize("text", ['{"contract": "verdict/1", "sta', '{"contract": "verdict/1"}'])
-def test_a_damaged_verdict_is_told_on_the_terminal_and_on_the_page_and_the_rest_is_shown(
+def test_a_damaged_verdict_is_named_on_the_terminal_and_on_the_page_and_the_rest_is_shown(
     exoid, folder, tmp_path, text
 ):
     (folder / "diagnosed" / "verdict.json").write_text(text)

@@ -79,7 +79,7 @@ def test_a_rig_listens_on_loopback_without_further_ado(exoid, monkeypatch, tmp_p
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.168.0.5", "no.such.name.invalid"])
-def test_a_rig_lets_other_computers_in_only_when_told_so_and_warns(
+def test_a_rig_lets_other_computers_in_only_with_anyone_and_warns(
     exoid, monkeypatch, tmp_path, address
 ):
     asked = []

@@ -49,20 +49,20 @@ def test_a_table_is_shown_with_origin_metadata_and_columns_in_80_columns(exoid, 
 def test_json_may_be_asked_for_before_or_after_the_command(exoid, recording):
     after, before = exoid("show", recording, "--json"), exoid("--json", "show", recording)
     assert after.out == before.out
-    found = json.loads(after.out)
-    assert found["contract"] == "recording/1"
-    assert found["rows"] == 5
-    columns = {column["column"]: column for column in found["columns"]}
+    result = json.loads(after.out)
+    assert result["contract"] == "recording/1"
+    assert result["rows"] == 5
+    columns = {column["column"]: column for column in result["columns"]}
     assert columns["hip_angle_rad"]["max"] == 0.5
     assert columns["hip_current_a"]["nulls"] == 5
     assert (columns["lab_note"]["min"], columns["lab_note"]["max"]) == (None, None)
-    assert found["origin"]["config"]["bounds"] == {"hip": [0, 1]}
+    assert result["origin"]["config"]["bounds"] == {"hip": [0, 1]}
 
 
 def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
-    said = verdict_of(unexplained={"hip": 0.1, "knee": None})
+    document = verdict_of(unexplained={"hip": 0.1, "knee": None})
     path = tmp_path / "verdict.json"
-    path.write_text(json.dumps(said))
+    path.write_text(json.dumps(document))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
     for words in (
@@ -129,11 +129,11 @@ def test_verdict_and_trajectory_toml_are_recognised(exoid, tmp_path):
 
 def test_what_a_motion_would_reveal_is_shown_with_its_origin_and_set_to_the_left(exoid, tmp_path):
     path = tmp_path / "detectability.json"
-    told = {
+    message = {
         "causes": [{"effect": "base_tilt", "joint": None}],
         "provenance": {"created_by": "exoid 9"},
     }
-    path.write_text(json.dumps({"contract": "detectability/1"} | told))
+    path.write_text(json.dumps({"contract": "detectability/1"} | message))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
     assert "detectability/1, the smallest detectable size of each cause" in outcome.out

@@ -33,7 +33,7 @@ AT_99_9 = 3.29 / 1.96
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def created(tmp_path_factory):
     """An experiment that make has made, and the stages that ran."""
     folder = tmp_path_factory.mktemp("whole") / "experiment"
     assert run(["init", str(folder), "--quiet"]) == 0
@@ -44,9 +44,9 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture
-def experiment(made, tmp_path, monkeypatch):
+def experiment(created, tmp_path, monkeypatch):
     """The current folder: a copy of it, with the times of its files."""
-    folder = shutil.copytree(made[0], tmp_path / "experiment")
+    folder = shutil.copytree(created[0], tmp_path / "experiment")
     monkeypatch.chdir(folder)
     return folder
 
@@ -72,24 +72,24 @@ def written(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing(made, experiment):
-    assert sorted(made[1]) == sorted(
+def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing(created, experiment):
+    assert sorted(created[1]) == sorted(
         ["design", *["acquire", "filter"] * 4, "identify", "diagnose", *["simulate"] * 6, "report"]
     )
-    found = PARAMETERS.read(experiment / "identified" / "parameters.parquet").frame
-    middle, half = found["value"], AT_99_9 * (found["ci95_high"] - found["ci95_low"]) / 2
+    actual = PARAMETERS.read(experiment / "identified" / "parameters.parquet").frame
+    middle, half = actual["value"], AT_99_9 * (actual["ci95_high"] - actual["ci95_low"]) / 2
     apart = np.abs(middle - truth(experiment)) / half
-    assert (apart < 1.0).all(), found.assign(truth=truth(experiment), apart=apart).to_string()
+    assert (apart < 1.0).all(), actual.assign(truth=truth(experiment), apart=apart).to_string()
     # An interval that covers everything would not be an answer.
-    body = found["effect"] == "rigid_body"
+    body = actual["effect"] == "rigid_body"
     assert (half[body] < 0.15 * middle[body] + 0.02).all()
 
 
 def test_make_does_nothing_twice_and_after_a_change_only_what_depends_on_it(experiment):
     before = written(experiment)
-    said, stages = make(experiment)
+    output, stages = make(experiment)
     assert (stages, written(experiment)) == ([], before)
-    assert "Nothing to be done" in said
+    assert "Nothing to be done" in output
     change(experiment / "exoid.toml", *OTHER_GAIN)
     _, stages = make(experiment)
     changed = {path for path, when in written(experiment).items() if before.get(path) != when}
@@ -104,17 +104,17 @@ def test_what_make_has_done_exoid_takes_for_done_and_the_other_way_round(exoid, 
     assert exoid("run").out == "Everything is up to date.\n"
     assert written(experiment) == before
     change(experiment / "exoid.toml", *OTHER_GAIN)
-    said = exoid("status").out
-    assert "simulate.feedback_gain_nm_s_radwas300.0,is200.0" in "".join(said.split())
-    assert "3 of 18 steps are to do" in said
-    assert max(map(len, said.splitlines())) <= 80
+    output = exoid("status").out
+    assert "simulate.feedback_gain_nm_s_radwas300.0,is200.0" in "".join(output.split())
+    assert "3 of 18 steps are to do" in output
+    assert max(map(len, output.splitlines())) <= 80
     done = json.loads(exoid("run", "--json").out)
     assert [one["stage"] for one in done] == ["simulate", "extended", "report"]
     assert set(done[0]["result"]["peak_torque_nm"]) == {"hip", "knee"}
     assert make(experiment)[1] == []
 
 
-def test_a_file_that_a_stage_lacks_is_told_and_made_again(exoid, experiment):
+def test_a_file_that_a_stage_lacks_is_named_and_made_again(exoid, experiment):
     lost = [
         "identified/residuals.parquet",
         "simulated/kv-sweep.csv",
@@ -122,8 +122,8 @@ def test_a_file_that_a_stage_lacks_is_told_and_made_again(exoid, experiment):
     ]
     for name in lost:
         (experiment / name).unlink()
-    told = {reason for one in json.loads(exoid("status", "--json").out) for reason in one["why"]}
-    assert told == {
+    message = {reason for one in json.loads(exoid("status", "--json").out) for reason in one["why"]}
+    assert message == {
         "waits for identify",
         "waits for simulate",
         "waits for replay",
@@ -194,7 +194,7 @@ def test_a_command_alone_says_which_command_makes_what_is_missing(exoid, experim
     )
 
 
-def test_what_is_not_told_comes_from_the_experiment(exoid, experiment):
+def test_what_is_not_given_comes_from_the_experiment(exoid, experiment):
     change(experiment / "exoid.toml", "order = 4\n", "order = 3\n")
     assert exoid("filter", "recordings/with_human_train.parquet", "--cutoff-hz", "7").code == 0
     config = MOTION.read("motions/with_human_train.parquet").metadata["config"]

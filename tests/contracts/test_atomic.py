@@ -64,13 +64,11 @@ def test_a_folder_is_not_replaced_by_a_file(tmp_path):
         write_text(tmp_path, "x")
 
 
-def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_made_with(
-    tmp_path, monkeypatch
-):
+def test_the_last_file_is_never_seen_with_others_than_it_was_made_with(tmp_path, monkeypatch):
     def make(**texts):
-        with all_or_none(tmp_path, last="a") as made:
+        with all_or_none(tmp_path, last="a") as result:
             for name, text in texts.items():
-                write_text(made / name, text)
+                write_text(result / name, text)
 
     make(a="one", b="one")
     real = os.replace
@@ -84,9 +82,9 @@ def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_mad
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"b": "one"}
 
 
-def test_a_full_disk_is_told_by_the_name_of_the_file_not_of_its_temporary_place(tmp_path):
-    with pytest.raises(OSError) as refused, all_or_none(tmp_path) as made:
-        raise OSError(errno.ENOSPC, "No space left on device", str(made / "b"))
+def test_the_error_of_a_full_disk_names_the_file_not_its_temporary_name(tmp_path):
+    with pytest.raises(OSError) as refused, all_or_none(tmp_path) as result:
+        raise OSError(errno.ENOSPC, "No space left on device", str(result / "b"))
     assert refused.value.filename == str(tmp_path / "b")
 
 

@@ -115,7 +115,7 @@ def test_lists_and_structs_keep_their_types_even_when_empty(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "text"),
     [
         (None, "no such file; check the name, or make it first"),
         (b"", "is empty (0 bytes), expected a Parquet file; copy or make it again"),
@@ -130,11 +130,11 @@ def test_lists_and_structs_keep_their_types_even_when_empty(tmp_path):
     ],
     ids=["missing", "empty", "text", "truncated"],
 )
-def test_what_is_no_parquet_file_is_refused(tmp_path, content, told):
+def test_what_is_no_parquet_file_is_refused(tmp_path, content, text):
     path = tmp_path / "a.parquet"
     if content is not None:
         path.write_bytes(content)
-    assert refusal(RECORDING.read, path) == f"{path}: {told}"
+    assert refusal(RECORDING.read, path) == f"{path}: {text}"
 
 
 def test_a_file_cut_short_anywhere_is_refused(tmp_path, swinging_leg, run_metadata):
@@ -160,7 +160,7 @@ def test_a_folder_is_refused(tmp_path, swinging_leg, run_metadata):
     )
 
 
-def test_a_mistyped_name_is_told_from_one_of_another_file(tmp_path, swinging_leg, run_metadata):
+def test_a_mistyped_name_is_not_taken_for_one_of_another_file(tmp_path, swinging_leg, run_metadata):
     RECORDING.write(tmp_path / "exo_alone_train.parquet", swinging_leg, run_metadata)
     slip = refusal(RECORDING.read, tmp_path / "exo_alone_trian.parquet")
     assert slip.endswith(f"no such file; did you mean {tmp_path / 'exo_alone_train.parquet'}?")
@@ -169,7 +169,7 @@ def test_a_mistyped_name_is_told_from_one_of_another_file(tmp_path, swinging_leg
 
 
 @pytest.mark.parametrize(
-    ("entry", "told"),
+    ("entry", "text"),
     [
         (
             None,
@@ -206,14 +206,14 @@ def test_a_mistyped_name_is_told_from_one_of_another_file(tmp_path, swinging_leg
         ),
     ],
 )
-def test_a_file_of_another_contract_is_refused(tmp_path, swinging_leg, entry, told):
+def test_a_file_of_another_contract_is_refused(tmp_path, swinging_leg, entry, text):
     path = tmp_path / "a.parquet"
     table = pa.Table.from_pandas(swinging_leg)
     pq.write_table(table.replace_schema_metadata({b"exoid": entry} if entry else None), path)
-    assert refusal(RECORDING.read, path) == f"{path}: {told}"
+    assert refusal(RECORDING.read, path) == f"{path}: {text}"
 
 
-def test_an_unknown_contract_is_told_with_the_known_ones(tmp_path, swinging_leg):
+def test_an_unknown_contract_is_named_with_the_known_ones(tmp_path, swinging_leg):
     path = tmp_path / "a.parquet"
     storage.save(path, [pa.Table.from_pandas(swinging_leg)], {"contract": "gait/1"})
     assert (
@@ -324,9 +324,9 @@ REFUSED_FRAMES = {
 
 @pytest.mark.parametrize("fault", REFUSED_FRAMES)
 def test_a_table_that_breaks_its_contract_is_refused(swinging_leg, run_metadata, fault):
-    spoil, told = REFUSED_FRAMES[fault]
+    spoil, text = REFUSED_FRAMES[fault]
     message = refusal(RECORDING.check, spoil(swinging_leg), run_metadata, "a.parquet")
-    assert message == f"a.parquet: {told}"
+    assert message == f"a.parquet: {text}"
 
 
 def test_reading_refuses_what_writing_refuses(tmp_path, swinging_leg, run_metadata):
@@ -382,17 +382,17 @@ REFUSED_METADATA = [
 ]
 
 
-@pytest.mark.parametrize(("keys", "told"), REFUSED_METADATA)
-def test_metadata_that_break_the_contract_are_refused(swinging_leg, run_metadata, keys, told):
+@pytest.mark.parametrize(("keys", "text"), REFUSED_METADATA)
+def test_metadata_that_break_the_contract_are_refused(swinging_leg, run_metadata, keys, text):
     message = refusal(RECORDING.check, swinging_leg, {**run_metadata, **keys}, "a.parquet")
-    assert message == f"a.parquet: {told}{CORRECT}"
+    assert message == f"a.parquet: {text}{CORRECT}"
 
 
 def test_metadata_that_json_cannot_hold_are_refused(swinging_leg, run_metadata):
-    told = refusal(
+    text = refusal(
         RECORDING.check, swinging_leg, {**run_metadata, "noise": float("nan")}, "a.parquet"
     )
-    assert told.startswith(
+    assert text.startswith(
         "a.parquet: metadata cannot be written as JSON (Out of range float values"
     )
 
@@ -408,8 +408,8 @@ def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
     )
     both = pd.concat([frame.assign(file="a"), frame.assign(file="b")], ignore_index=True)
     RESIDUALS.check(both, {})
-    told = refusal(RESIDUALS.check, both.assign(file="a"), {}, "r.parquet")
-    assert told.startswith("r.parquet: column time_s, row 100: found 0.0 after 0.495")
+    text = refusal(RESIDUALS.check, both.assign(file="a"), {}, "r.parquet")
+    assert text.startswith("r.parquet: column time_s, row 100: found 0.0 after 0.495")
     assert (
         refusal(RESIDUALS.check, both.assign(model="best"), {}, "r.parquet")
         == "r.parquet: column model, row 0: found 'best', expected one of baseline, extended;"
@@ -469,7 +469,7 @@ def test_nothing_but_an_older_version_of_itself_is_overwritten(
     )
     assert (
         refusal(RECORDING.write, notes, swinging_leg, run_metadata)
-        == f"{notes}: holds something else, not overwritten with recording/1; choose another name"
+        == f"{notes}: holds no Parquet table, not overwritten with recording/1; choose another name"
         " or remove it"
     )
     assert notes.read_text() == "a month of work"

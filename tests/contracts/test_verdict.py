@@ -12,35 +12,39 @@ from tests.report.sessions import AXIS, LEG, decision_of, verdict_of
 
 NAN = float("nan")
 HOLES = {
-    "baseline_rmse_nm.knee": lambda said: said["baseline_rmse_nm"].update(knee=None),
-    "extended_rmse_unmasked_nm.hip": lambda said: said["extended_rmse_unmasked_nm"].update(
+    "baseline_rmse_nm.knee": lambda document: document["baseline_rmse_nm"].update(knee=None),
+    "extended_rmse_unmasked_nm.hip": lambda document: document["extended_rmse_unmasked_nm"].update(
         hip="0.3"
     ),
-    "noise_floor_nm.hip": lambda said: said["noise_floor_nm"].update(hip=0.0),
-    "causes": lambda said: said.update(causes="x"),
-    "causes[0].gain.ci95[1]": lambda said: said["causes"][0]["gain"].update(ci95=[0.1, NAN]),
-    "causes[0].gain.joint": lambda said: said["causes"][0]["gain"].update(joint="ankle"),
-    "control.with.peak_torque_nm.hip": lambda said: said["control"]["with"][
+    "noise_floor_nm.hip": lambda document: document["noise_floor_nm"].update(hip=0.0),
+    "causes": lambda document: document.update(causes="x"),
+    "causes[0].gain.ci95[1]": lambda document: document["causes"][0]["gain"].update(
+        ci95=[0.1, NAN]
+    ),
+    "causes[0].gain.joint": lambda document: document["causes"][0]["gain"].update(joint="ankle"),
+    "control.with.peak_torque_nm.hip": lambda document: document["control"]["with"][
         "peak_torque_nm"
     ].update(hip=NAN),
-    "error_budget.hip.noise_floor": lambda said: said["error_budget"]["hip"].update(
+    "error_budget.hip.noise_floor": lambda document: document["error_budget"]["hip"].update(
         noise_floor=None
     ),
-    "unexplained": lambda said: said["unexplained"].pop("hip"),
-    "units": lambda said: said.update(units={}),
-    "torque_rms_nm": lambda said: said.update(torque_rms_nm={"knee": 12.0}),
-    "findings[0].joint": lambda said: said["findings"][0].update(joint="ankle"),
-    "findings[0].path[1].probability": lambda said: said["findings"][0]["path"][1].update(
+    "unexplained": lambda document: document["unexplained"].pop("hip"),
+    "units": lambda document: document.update(units={}),
+    "torque_rms_nm": lambda document: document.update(torque_rms_nm={"knee": 12.0}),
+    "findings[0].joint": lambda document: document["findings"][0].update(joint="ankle"),
+    "findings[0].path[1].probability": lambda document: document["findings"][0]["path"][1].update(
         probability=NAN
     ),
-    "findings[0].causes[1].words": lambda said: said["findings"][0]["causes"][1].pop("words"),
-    "findings[0].level": lambda said: said["findings"][0].update(level="guess"),
-    "posterior.unlisted": lambda said: said["posterior"].update(unlisted=1.2),
-    "posterior.causes.cogging@knee": lambda said: said["posterior"]["causes"].update(
+    "findings[0].causes[1].words": lambda document: document["findings"][0]["causes"][1].pop(
+        "words"
+    ),
+    "findings[0].level": lambda document: document["findings"][0].update(level="guess"),
+    "posterior.unlisted": lambda document: document["posterior"].update(unlisted=1.2),
+    "posterior.causes.cogging@knee": lambda document: document["posterior"]["causes"].update(
         {"cogging@knee": "0.9"}
     ),
-    "router": lambda said: said["router"].pop("hip"),
-    "router.knee.noise": lambda said: said["router"]["knee"].update(noise=None),
+    "router": lambda document: document["router"].pop("hip"),
+    "router.knee.noise": lambda document: document["router"]["knee"].update(noise=None),
 }
 
 
@@ -57,24 +61,26 @@ def test_a_verdict_of_an_older_version_has_no_findings_and_is_read():
 
 
 def test_where_acquisition_is_at_fault_there_is_no_posterior():
-    told = decision_of() | {"findings": [], "posterior": None}
-    verdict.check(verdict_of(acquisition_at_fault=True, causes=[], **told), "faulty")
+    decision = decision_of() | {"findings": [], "posterior": None}
+    verdict.check(verdict_of(acquisition_at_fault=True, causes=[], **decision), "faulty")
 
 
 @pytest.mark.parametrize("key", HOLES)
 def test_a_hole_is_named_by_its_key(key):
     whole = verdict_of(**decision_of())
-    said = {k: deepcopy(value) for k, value in whole.items()}  # no two tables are one object then
-    HOLES[key](said)
+    document = {
+        k: deepcopy(value) for k, value in whole.items()
+    }  # no two tables are one object then
+    HOLES[key](document)
     with pytest.raises(ContractError) as refusal:
-        verdict.check(said, "verdict.json")
+        verdict.check(document, "verdict.json")
     assert str(refusal.value).startswith("verdict.json: ")
     assert key in str(refusal.value)
 
 
 @pytest.mark.parametrize("key", [key for key in verdict_of() if key != "contract"])
 def test_no_key_may_be_left_out(key):
-    said = verdict_of()
-    del said[key]
+    document = verdict_of()
+    del document[key]
     with pytest.raises(ContractError, match=f"^here: {key}: missing; add it"):
-        verdict.check(said, "here")
+        verdict.check(document, "here")

@@ -120,7 +120,7 @@ def test_somebody_elses_table_under_a_recordings_name_is_kept_and_named(
     outcome = imported(write_csv(pendulum.columns()))
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
     assert (
-        "whole.parquet: holds a table of somebody else's, not overwritten with recording/1; choose"
+        "whole.parquet: holds a table of another program, not overwritten with recording/1; choose"
         in outcome.err
     )
     assert list(pd.read_parquet(path)) == ["t"]

@@ -33,8 +33,8 @@ class Chain:
     def make(self) -> None:
         (self.folder / "sealed").touch()
         for step in self.steps:
-            told = describe(step.inputs, step.settings)
-            step.target.write_text(json.dumps({"contract": "x/1", "provenance": told}))
+            provenance = describe(step.inputs, step.settings)
+            step.target.write_text(json.dumps({"contract": "x/1", "provenance": provenance}))
 
     def states(self) -> dict[str, tuple[str, tuple[str, ...]]]:
         return {
@@ -85,7 +85,7 @@ def test_a_newer_sealed_file_counts_though_no_result_tells_its_hash(chain):
     assert chain.states()["one"] == ("stale", ("sealed is newer",))
 
 
-def test_another_set_of_inputs_is_told(chain):
+def test_another_set_of_inputs_is_named(chain):
     step = chain.steps[1]
     step.target.write_text(json.dumps({"provenance": describe([chain.source])}))
     assert chain.states()["two"] == (
@@ -100,7 +100,7 @@ def test_what_may_be_impossible_and_is_not_there_is_done_without(chain):
     assert Judge(chain.folder).all([replace(first, may_fail=True), second])[1].done
 
 
-def test_two_inputs_of_one_name_are_told_apart_by_their_content(chain):
+def test_two_inputs_of_one_name_differ_by_their_content(chain):
     first, second = chain.steps
     other = chain.folder / "other" / "first.json"
     other.parent.mkdir()
@@ -121,24 +121,24 @@ def test_a_report_that_takes_all_may_have_taken_more(chain):
 @pytest.mark.parametrize("content", ["", "{", "{}", "[1]"])
 def test_a_damaged_result_is_stale(chain, content):
     chain.steps[1].target.write_text(content)
-    assert chain.states()["two"] == ("stale", ("does not say where it came from; make it again",))
+    assert chain.states()["two"] == ("stale", ("has no record of its origin; make it again",))
 
 
 def test_a_step_is_done_where_all_its_files_are_there(chain):
     first, second = chain.steps
-    beside = chain.folder / "beside.parquet"
-    step = replace(first, beside=(beside,))
+    others = chain.folder / "beside.parquet"
+    step = replace(first, other_outputs=(others,))
     steps = (step, replace(second, inputs=(*step.makes,)))
 
     def states():
         return [(one.state.value, one.why) for one in Judge(chain.folder).all(steps)]
 
-    pd.DataFrame({"a": [1]}).to_parquet(beside)
+    pd.DataFrame({"a": [1]}).to_parquet(others)
     second.target.write_text(json.dumps({"provenance": describe(step.makes)}))
     assert states() == [("done", ()), ("done", ())]
-    beside.write_bytes(beside.read_bytes()[:-1])
+    others.write_bytes(others.read_bytes()[:-1])
     assert states()[0] == ("stale", ("beside.parquet is damaged",))
-    beside.unlink()
+    others.unlink()
     assert states() == [("stale", ("beside.parquet is missing",)), ("stale", ("waits for one",))]
 
 
@@ -152,13 +152,13 @@ def test_a_file_that_a_result_tells_of_as_made_with_it_must_be_there(chain):
     assert chain.states()["two"] == ("done", ())
 
 
-def test_what_a_killed_or_stopped_run_left_is_told(tmp_path):
+def test_the_remains_of_a_killed_or_stopped_run_are_named(tmp_path):
     (tmp_path / "a.parquet.journal").touch()
     (tmp_path / "a.aborted.parquet").touch()
     judged = Judge(tmp_path).judge(Step("acquire", tmp_path / "a.parquet", (), {}, ("acquire",)))
     assert judged.state is Freshness.MISSING
     assert judged.why == (
-        "a killed run left a.parquet.journal; `exoid recover` makes a recording of it",
+        "a run was killed: `exoid recover` makes a recording of a.parquet.journal",
         "a run was stopped early: a.aborted.parquet",
     )
 
