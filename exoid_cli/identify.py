@@ -102,8 +102,8 @@ def identify(
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"
         raise InputError(
-            f"{option}: no folder is given, and identified/ is for the model without; name one with"
-            " -o"
+            f"{option}: no folder is given; name one with -o, since identified/ is for the model"
+            " without"
         )
     if output and (output / "verdict.json").exists():
         raise InputError(
