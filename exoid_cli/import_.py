@@ -156,16 +156,16 @@ def _same_name(path: Path, first: Path, second: Path) -> str:
 
 
 def _say_next_step(output: Path, names: list[str], map_: Path) -> None:
-    from pipelines.importing.sanity.leftover_recordings import lacks, no_longer_made
+    from pipelines.importing.sanity.leftover_recordings import missing_for_verdict, outdated
     from pipelines.workflow.imported import imported_in
 
     imported = imported_in(output)
-    for name in no_longer_made(imported, names):
+    for name in outdated(imported, names):
         console.warn(
             f"{output / name}: made of these logs with an earlier map, but not with this one;"
             " remove it"
         )
-    problems = list(lacks(imported, names, map_))
+    problems = list(missing_for_verdict(imported, names, map_))
     for problem in problems:
         console.say(problem)
     settings_file = output.parent / NAME
@@ -219,7 +219,7 @@ def _findings(log: dict[str, Any]) -> "list[Finding]":
     from pipelines.importing.finding import Finding
 
     entries = (entry for recording in log["recordings"] for entry in recording["findings"])
-    return list(dict.fromkeys(Finding(**entry) for entry in entries))
+    return list(dict.fromkeys(Finding.from_json(entry) for entry in entries))
 
 
 def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:

@@ -1,6 +1,8 @@
-"""What was found in a log, and what was done about it."""
+"""An observation about a log, and what the import did about it."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -9,16 +11,21 @@ class Finding:
 
     where: str
     """Time, a joint's quantity, or the rows."""
-    found: str
-    done: str
-    """What was made of it; empty where nothing had to be."""
+    observation: str
+    action: str
+    """What the import did about it, or what to do; empty where nothing has to be done."""
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.found}" + (f"; {self.done}" if self.done else "")
+        return f"{self.where}: {self.observation}" + (f"; {self.action}" if self.action else "")
 
     def as_json(self) -> dict[str, str]:
         """Return it for programs, and for the recording's metadata."""
-        return asdict(self)
+        return {"where": self.where, "found": self.observation, "done": self.action}
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, str]) -> Self:
+        """Return the finding in a recording's metadata."""
+        return cls(entry["where"], entry["found"], entry["done"])
 
 
 def counted(number: int, what: str) -> str:

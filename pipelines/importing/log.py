@@ -1,5 +1,4 @@
-"""A log whose columns have been read: its clock's runs, and the quantities that a map makes of
-it."""
+"""A log with the columns that a map names: the runs of its clock, and its quantities."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.quantities.conversion import columns_of, quantity, turn_of_its_counter
+from pipelines.importing.quantities.conversion import columns_of, counter_turn, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
@@ -31,7 +30,7 @@ class Channel:
     gain: float
     required: bool
     enabled: str | None = None
-    """Column that is 0 where the reading says nothing."""
+    """Column that is 0 where the reading is not valid."""
 
 
 @dataclass(frozen=True)
@@ -55,17 +54,12 @@ class Log:
 
     @property
     def turns(self) -> dict[str, float]:
-        """What a turn of its counter is in SI, of each of the recording's columns that has a
-        counter."""
-        found = {
-            channel.target: turn_of_its_counter(channel.reading, channel.gain)
-            for channel in self.channels
-        }
-        return {target: turn for target, turn in found.items() if turn is not None}
+        """A turn of the counter in SI, for each of the recording's columns that has a counter."""
+        turns = {one.target: counter_turn(one.reading, one.gain) for one in self.channels}
+        return {target: turn for target, turn in turns.items() if turn is not None}
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
-        """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no
-        value."""
+        """Return every channel, (n,) in SI, at the instants of a run; NaN where missing."""
         return {
             channel.target: self._where_enabled(channel, run, findings) for channel in self.channels
         }
@@ -74,30 +68,26 @@ class Log:
         values = self._quantity(channel, run, findings)
         if channel.enabled is None:
             return values
-        told = self.columns[channel.enabled]
-        if len(told) != self.rows:
+        switch = self.columns[channel.enabled]
+        if len(switch) != self.rows:
             raise InputError(
-                f"{channel.enabled!r} has {len(told)} rows where the clock has {self.rows},"
-                " expected as many"
+                f"{channel.enabled!r} has {len(switch)} rows, expected {self.rows} as of the clock"
             )
-        said = told[run.rows]
-        off, blank = said == 0.0, np.isnan(said)
+        states = switch[run.rows]
+        off, blank = states == 0.0, np.isnan(states)
         if (off | blank).all():
-            what = (
-                "has no number in any row"
-                if blank.all()
-                else "says of no row that the drive was on"
-            )
+            problem = "has no number in any row" if blank.all() else "is on in no row"
             raise InputError(
-                f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number"
-                " where it was on; correct joint.enabled in the map, or leave it out"
+                f"{channel.enabled!r} {problem}, expected 0 where the drive was off and another"
+                " number where it was on; correct joint.enabled in the map, or leave it out"
             )
-        for rows, says, so in (
+        for rows, state, meaning in (
             (off, "is 0", "the drive was off"),
-            (blank, "has no number", "it says of none of them that the drive was on"),
+            (blank, "has no number", "the drive's state is not known"),
         ):
             if rows.any():
-                seen = f"{channel.enabled} {says} in {counted(int(rows.sum()), 'row')}: {so}"
+                count = counted(int(rows.sum()), "row")
+                seen = f"{channel.enabled} {state} in {count}: {meaning}"
                 findings.append(Finding(channel.target, seen, TAKEN_FOR_MISSING))
         return np.where(off | blank, np.nan, values)
 
@@ -110,27 +100,26 @@ class Log:
             values = self.columns[name]
             if len(values) not in (1, self.rows) or (len(values) == 1 and channel.reading.column):
                 raise InputError(
-                    f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it was"
-                    f" sampled by a clock of its own, name that in the map: {channel.where}.time"
+                    f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it has a"
+                    f" clock of its own, name that in the map: {channel.where}.time"
                 )
             picked[name] = values if len(values) == 1 else values[run.rows]
         if all(len(self.columns[name]) == 1 for name in names):
             raise InputError(
-                f"{channel.where}: {', '.join(names)} have one row each, expected one column with a"
-                " row of each stamp"
+                f"{channel.where}: {', '.join(names)} have one row each, expected a column with a"
+                " row for each stamp"
             )
         return quantity(channel.reading, channel.gain, picked, channel.target, findings)
 
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
-        """Return a channel with a clock of its own at a run's instants, on straight lines between
-        its own samples."""
+        """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
         reading = channel.reading
         stamps = clock.stamps(self.columns[str(reading.time)], self.settings, findings)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(
-                f"{channel.where} and its clock {reading.time!r} differ in length; name the one"
-                " that it was sampled by"
+                f"{channel.where} and its clock {reading.time!r} differ in length; name the clock"
+                " by which it was sampled"
             )
         values = quantity(reading, channel.gain, columns, channel.target, findings)
         known = np.isfinite(values)
@@ -146,35 +135,33 @@ class Log:
             )
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
-        found = np.interp(at, time, samples, left=np.nan, right=np.nan)
+        interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
         steps = np.diff(time)
         gap = steps > 1.5 * np.quantile(steps, 0.95)
         behind = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps) - 1)
         on_sample = time[behind] == at
-        found[gap[behind] & ~on_sample] = np.nan
+        interpolated[gap[behind] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
         seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
-        findings.append(
-            Finding(channel.target, seen, "interpolated on straight lines, not across its gaps")
-        )
-        return found
+        findings.append(Finding(channel.target, seen, "interpolated linearly, not across its gaps"))
+        return interpolated
 
 
 def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
-    """Read the columns that a map names, and look at their clock.
+    """Read the columns that a map names, and divide their clock into runs.
 
     Raises
     ------
     SettingsError
-        Where the map names what the log does not have.
+        If the map names columns that the log does not have, or has twice.
     """
     channels = tuple(_channels(settings))
     needed = _needed(channels, settings.time)
     for name, where in needed.items():
         if f"{name}#1" in source.names:
             raise SettingsError(
-                f"has {name!r} twice, which {where} in {map_path} names, and nobody knows which is"
-                f" meant; name {name}#1, {name}#2 ... in the map, or rename one in the file"
+                f"has {name!r} twice, which {where} in {map_path} names; name {name}#1, {name}#2"
+                " ... in the map, or rename one in the file"
             )
         if name not in source.names:
             raise SettingsError(
@@ -190,7 +177,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}
     for stamped in clocks - {None}:
-        clock.refuse_another_unit(columns[str(stamped)], str(stamped), settings.time.unit)
+        clock.check_unit(columns[str(stamped)], str(stamped), settings.time.unit)
     columns = _as_numbers(columns, clocks, findings)
     stamps = clock.stamps(columns[settings.time.column], settings.time, findings)
     origin = clock.first_stamp(stamps)
@@ -203,19 +190,20 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
             gain = reading.gain(transmission.TARGETS[name][joint.kind])
-            required, enabled = (
-                name in ("angle", "torque"),
-                joint.enabled if name == "torque" else None,
-            )
             yield Channel(
-                joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required, enabled
+                joint.joint.column(name),
+                f"joint[{i}].{name}",
+                reading,
+                gain,
+                required=name in ("angle", "torque"),
+                enabled=joint.enabled if name == "torque" else None,
             )
     for i, force in enumerate(settings.force):
         yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)
 
 
 def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:
-    """Return every column that the map names, and where it first does."""
+    """Return every column that the map names, and its first place there."""
     needed = {time.column: "time.column"} if time.column is not None else {}
     for channel in channels:
         for name in columns_of(channel.reading, channel.where):
@@ -228,8 +216,7 @@ def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]
 
 
 def _as_numbers(columns: Columns, clocks: set[str | None], findings: list[Finding]) -> Columns:
-    """Return the columns as float64; those of clocks are left, for they may be dates or need all
-    their digits."""
+    """Return the columns as float64, but clocks as they are: dates, or integers of many digits."""
     return {
         name: values if name in clocks else numbers(values, name, findings)
         for name, values in columns.items()

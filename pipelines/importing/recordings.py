@@ -1,4 +1,4 @@
-"""From a log and its map to recordings: which rows, which columns, which span."""
+"""Make recordings of a log and its map: choose rows, columns and spans."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.quantities.turn_offset import Beginnings
-from pipelines.importing.sanity.plausibility import look_at
+from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
-"""Rows that a recording must have at least."""
+"""Least number of rows of a recording."""
 LARGEST_TORQUE = 1e6
-"""N·m or N; beyond it no joint's drive comes near."""
+"""N·m or N; far more than any drive delivers at a joint."""
 LONGEST_PERIOD = 1.01
-"""In runs: one that lasts a period ends a sample before it."""
+"""In lengths of the run, as a run of one period ends a sample before the period does."""
 
 
 @dataclass(frozen=True)
@@ -68,18 +68,31 @@ class Imported:
 def recordings(
     path: Path, settings: ImportMap, map_path: Path, before: Beginnings
 ) -> Iterator[Imported]:
-    """Yield the recordings that a map makes of a log; ``before`` tells where those before it began.
+    """Yield the recordings that a map makes of a log.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+    settings : ImportMap
+        The map.
+    map_path : Path
+        File of the map.
+    before : Beginnings
+        First readings of the counters in logs before this one.
 
     Raises
     ------
+    InputError
+        If the log cannot be read, or is too short.
     SettingsError
-        Where no ``[[recording]]`` of the map is of this file.
+        If the map has no ``[[recording]]`` for this file, or does not fit the log.
     """
     wanted = [recording for recording in settings.recording if recording.is_of(path)]
     if not wanted:
         patterns = ", ".join(recording.files for recording in settings.recording)
         raise SettingsError(
-            f"{map_path}: no [[recording]] is of {path.name}, only of {patterns}; add one"
+            f"{map_path}: no [[recording]] matches {path.name}, only {patterns}; add one"
         )
     with about(path):
         log = read_log(open_source(path, settings.source), settings, map_path)
@@ -88,7 +101,7 @@ def recordings(
             config=settings.model_dump(mode="json", exclude_none=True),
         )
         given = {"source": path.as_posix(), "map": map_path.as_posix()}
-        _refuse_short(log)
+        _check_length(log)
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
@@ -101,7 +114,7 @@ def _files(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
 
 
-def _refuse_short(log: Log) -> None:
+def _check_length(log: Log) -> None:
     if log.rows < FEWEST:
         raise InputError(
             f"found {counted(log.rows, 'row')}, a recording needs at least {FEWEST}; log for longer"
@@ -109,8 +122,8 @@ def _refuse_short(log: Log) -> None:
     longest = max(map(len, log.runs), default=0)
     if longest < FEWEST:
         raise InputError(
-            f"no run of its clock has {FEWEST} rows, which a recording needs: the longest has"
-            f" {longest} of {log.rows}; correct [time] in the map"
+            f"its clock starts over too often: the longest run has {longest} of {log.rows} rows,"
+            f" expected at least {FEWEST}; correct [time] in the map"
         )
 
 
@@ -120,12 +133,11 @@ def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list
     if len(runs) == 1:
         return long
     kept = long if restarts == "split" else [max(long, key=len)]
-    told = ", ".join(f"{run.rows[0]}-{run.rows[-1]}" for run in kept)
+    rows = ", ".join(f"{run.rows[0]}-{run.rows[-1]}" for run in kept)
     lost = sum(map(len, runs)) - sum(map(len, kept))
-    done = f"rows {told} kept, {lost} left out" + (
-        "" if restarts == "split" else " (time.restarts)"
-    )
-    findings.append(Finding("time", f"{len(runs)} runs", done))
+    setting = "" if restarts == "split" else " (time.restarts)"
+    action = f"rows {rows} kept, {lost} left out{setting}"
+    findings.append(Finding("time", f"{len(runs)} runs", action))
     return kept
 
 
@@ -145,31 +157,31 @@ def _recordings_of(
     sampling = Sampling.of(run.time_s, time)
     findings += _sampling_findings(sampling)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
-    _refuse_absurd_angles(columns, settings)
-    _refuse_absurd_torques(columns, settings)
-    _refuse_long_periods(wanted, float(run.time_s[-1]))
+    _check_angles(columns, settings)
+    _check_torques(columns, settings)
+    _check_periods(wanted, float(run.time_s[-1]))
     findings += _period_findings(columns, settings, wanted)
-    findings += look_at(columns, settings)
-    findings += before.look_at(f"{path.name}{suffix}", columns, log.turns)
+    findings += plausibility.check(columns, settings)
+    findings += before.check(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
-    _refuse_overlap(time, wanted, spans)
+    _check_overlap(time, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):
         own = {name: values[rows] for name, values in columns.items()}
         begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
         cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
         metadata = _metadata(settings, recording, cut) | provenance
         in_source = run.rows[whole][rows]
-        metadata["imported"] = _account(path, log, run, sampling, findings) | {
+        metadata["imported"] = _import_metadata(path, log, run, sampling, findings) | {
             "given": given,
             "rows": [int(in_source[0]), int(in_source[-1])],
         }
         yield Imported(recording.name_of(path) + suffix, own, metadata, cut, tuple(findings))
 
 
-def _account(
+def _import_metadata(
     path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]
 ) -> dict[str, Any]:
-    """Return what the recording tells of how it was made."""
+    """Return the metadata of the import: source, rows, sampling and findings."""
     return {
         "source": path.name,
         "sha256": [sha256(file) for file in _files(path)],
@@ -186,11 +198,11 @@ def _account(
 def _whole_rows(
     columns: Mapping[str, NDArray], required: Sequence[str], findings: list[Finding]
 ) -> NDArray:
-    """Return which rows have every quantity that a recording must have."""
+    """Return a mask of the rows that have every required quantity."""
     known = {name: np.isfinite(values) for name, values in columns.items()}
     for name in required:
         if not known[name].any():
-            texts = [str(finding) for finding in findings if finding.done == TAKEN_FOR_MISSING]
+            texts = [str(finding) for finding in findings if finding.action == TAKEN_FOR_MISSING]
             seen = f" ({'; '.join(texts)})" if texts else ""
             raise InputError(
                 f"{name} has no value in any row{seen}; correct its column, range or time in"
@@ -200,123 +212,100 @@ def _whole_rows(
     if np.count_nonzero(whole) < FEWEST:
         shares = ", ".join(f"{name} in {np.mean(known[name]):.0%}" for name in required)
         raise InputError(
-            f"only {np.count_nonzero(whole)} rows have all of them ({shares} of the rows): they"
-            " were sampled at different instants; give those that are to be interpolated a time of"
-            " their own in the map"
+            f"only {np.count_nonzero(whole)} rows have every quantity ({shares} of the rows). If"
+            " they were sampled at different instants, name the clock of each in the map"
         )
     for name, present in known.items():
         missing = len(present) - int(np.count_nonzero(present))
-        if missing and name in required:
-            findings.append(
-                Finding(name, f"no value in {counted(missing, 'row')}", "rows left out")
-            )
-        elif missing:
-            findings.append(Finding(name, f"no value in {counted(missing, 'row')}", "left empty"))
+        if missing:
+            action = "rows left out" if name in required else "left empty"
+            findings.append(Finding(name, f"no value in {counted(missing, 'row')}", action))
     return whole
 
 
 def _sampling_findings(sampling: Sampling) -> list[Finding]:
-    found = []
+    findings = []
     if not SLOWEST_HZ <= sampling.rate_hz <= FASTEST_HZ:
-        seen = (
-            f"{sampling.rate_hz:.4g} Hz, where machines are sampled at {SLOWEST_HZ:g} to"
-            f" {FASTEST_HZ:g} Hz"
-        )
-        found.append(Finding("time", seen, "kept; check time.unit, s or ms, or time.rate_hz"))
+        seen = f"{sampling.rate_hz:.4g} Hz, usual are {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz"
+        findings.append(Finding("time", seen, "kept; check time.unit, s or ms, or time.rate_hz"))
     if sampling.irregular > 0.05:
         shortest, median, longest = (1e3 * step for step in sampling.steps_s)
         seen = (
             f"irregular: {sampling.irregular:.0%} of the steps are more than 2 % off their median; "
             f"{shortest:.4g} to {longest:.4g} ms, median {median:.4g}"
         )
-        found.append(
-            Finding(
-                "time",
-                seen,
-                "stamps kept as they are; exoid filter interpolates angles between them",
-            )
-        )
+        action = "stamps kept as they are; exoid filter interpolates angles between them"
+        findings.append(Finding("time", seen, action))
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
         seen = (
             f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest"
             f" {longest_gap:.3g} s"
         )
-        found.append(Finding("time", seen, "told in `gaps`; nothing is filled in"))
-    return found
+        findings.append(Finding("time", seen, "listed in `gaps`; nothing is filled in"))
+    return findings
 
 
 def _period_findings(
     columns: Mapping[str, NDArray], settings: ImportMap, wanted: Sequence[RecordingSettings]
 ) -> list[Finding]:
-    """Tell of a period that the map does not: without it noise cannot be told from what repeats."""
+    """Report a period that the map lacks, by which noise is separated from systematic errors."""
     if all(recording.period_s is not None for recording in wanted):
         return []
-    asked = [joint.joint.column("reference") for joint in settings.joint]
-    motion = (
-        asked
-        if all(name in columns for name in asked)
-        else [j.joint.column("angle") for j in settings.joint]
-    )
-    period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in motion]))
+    names = [joint.joint.column("reference") for joint in settings.joint]
+    if not all(name in columns for name in names):
+        names = [joint.joint.column("angle") for joint in settings.joint]
+    period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in names]))
     if period_s is None:
         return []
-    to_do = (
-        f"period_s = {period_s:.6g} in [[recording]] lets diagnose measure the noise instead of"
-        " guessing it"
+    seen = f"the motion repeats every {period_s:.6g} s, but the map has no period_s"
+    action = (
+        f"set period_s = {period_s:.6g} in [[recording]], so that exoid diagnose can measure the"
+        " noise"
     )
-    return [
-        Finding(
-            "time",
-            f"the motion repeats every {period_s:.6g} s, of which the map tells nothing",
-            to_do,
-        )
-    ]
+    return [Finding("time", seen, action)]
 
 
-def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+def _check_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     for i, joint in enumerate(settings.joint):
         angle = columns[joint.joint.column("angle")]
-        absurd = np.flatnonzero(np.abs(angle) > LARGEST_ANGLE_RAD)
-        if joint.kind == "revolute" and len(absurd):
-            first = f"{angle[absurd[0]]:.4g} at {columns['time_s'][absurd[0]]:.6g} s"
+        beyond = np.flatnonzero(np.abs(angle) > LARGEST_ANGLE_RAD)
+        if joint.kind == "revolute" and len(beyond):
+            first = f"{angle[beyond[0]]:.4g} at {columns['time_s'][beyond[0]]:.6g} s"
             raise SettingsError(
-                f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad,"
-                f" expected at most {LARGEST_ANGLE_RAD:.3g} to both sides; beyond it in"
-                f" {counted(len(absurd), 'row')} of {len(angle)}, the first {first}; leave slips"
-                " out with range, or correct its unit, zero, counts_per_turn or wraps_at in"
-                " the map"
+                f"joint[{i}].angle: reaches {np.min(angle):.4g} to {np.max(angle):.4g} rad,"
+                f" expected at most {LARGEST_ANGLE_RAD:.3g} rad either way"
+                f" ({counted(len(beyond), 'row')} of {len(angle)} beyond, the first {first})."
+                " Exclude outliers with range, or correct its unit, zero, counts_per_turn or"
+                " wraps_at in the map"
             )
 
 
-def _refuse_absurd_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+def _check_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     for i, joint in enumerate(settings.joint):
-        torque, unit = (
-            columns[joint.joint.column("torque")],
-            "N·m" if joint.kind == "revolute" else "N",
-        )
-        absurd = np.flatnonzero((torque > LARGEST_TORQUE) | (torque < -LARGEST_TORQUE))
-        if len(absurd):
-            first = f"{torque[absurd[0]]:.4g} {unit} at {columns['time_s'][absurd[0]]:.6g} s"
+        torque = columns[joint.joint.column("torque")]
+        unit = "N·m" if joint.kind == "revolute" else "N"
+        beyond = np.flatnonzero((torque > LARGEST_TORQUE) | (torque < -LARGEST_TORQUE))
+        if len(beyond):
+            first = f"{torque[beyond[0]]:.4g} {unit} at {columns['time_s'][beyond[0]]:.6g} s"
             raise SettingsError(
-                f"joint[{i}].torque: would be {first}, and beyond {LARGEST_TORQUE:g} {unit}, which"
-                f" no drive delivers, in {counted(len(absurd), 'row')}; leave slips out with range,"
-                " or correct unit, scale and what follows it in the map"
+                f"joint[{i}].torque: is {first}, expected at most {LARGEST_TORQUE:g} {unit}"
+                f" ({counted(len(beyond), 'row')} beyond). Exclude outliers with range, or correct"
+                " its unit, scale or gains in the map"
             )
 
 
-def _refuse_long_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:
+def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:
     for recording in wanted:
         if recording.period_s is not None and recording.period_s > LONGEST_PERIOD * duration_s:
             raise SettingsError(
                 f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected"
-                f" at most the {duration_s:.6g} s of the run, for an excitation that repeats;"
-                " correct it, or remove it"
+                f" at most the {duration_s:.6g} s of the run; correct it, or remove it"
             )
 
 
 def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> slice:
-    """Return the rows of a span; one that reaches to the end has the last row."""
+    """Return the rows of a span, with the last row if it reaches to the end."""
     begin, end = 0.0, np.inf
     if recording.span is not None:
         begin, end = (share * duration_s for share in recording.span)
@@ -333,18 +322,17 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
     return slice(int(first), int(last))
 
 
-def _refuse_overlap(
+def _check_overlap(
     time: NDArray, wanted: Sequence[RecordingSettings], spans: Sequence[slice]
 ) -> None:
-    """Refuse to judge a fit on samples that it was made from."""
+    """Refuse samples both to train and to validate."""
     for (one, first), (other, second) in combinations(zip(wanted, spans, strict=True), 2):
         both = slice(max(first.start, second.start), min(first.stop, second.stop))
         if one.purpose != other.purpose and both.start < both.stop:
             begin, end = time[both][[0, -1]]
             raise SettingsError(
-                f"{begin:.6g} to {end:.6g} s would be to train and to validate, expected no sample"
-                " in both: a fit is judged on data that it has not seen; correct the spans of"
-                " [[recording]] in the map"
+                f"{begin:.6g} to {end:.6g} s is both to train and to validate, expected no common"
+                " sample; correct the spans of [[recording]] in the map"
             )
 
 
@@ -368,11 +356,10 @@ def _metadata(
 
 
 def refuse_to_overwrite(path: Path) -> None:
-    """Refuse to put a recording where something else stands: another file, or a recording that was
-    not imported."""
+    """Refuse to overwrite another file, or a recording that was not imported."""
     RECORDING.refuse_place(path)
-    told = metadata_of(path)
-    if told.get("contract") == RECORDING.label and "imported" not in told:
+    metadata = metadata_of(path)
+    if metadata.get("contract") == RECORDING.label and "imported" not in metadata:
         raise ContractError(
             f"{path}: holds a recording that was not imported, not overwritten; choose another"
             " folder"

@@ -8,7 +8,7 @@ from pipelines.settings.base import Settings
 
 
 class AcquireSettings(Settings):
-    """What all runs share."""
+    """Settings that all runs share."""
 
     rig: str = Field(
         "../rigs/default.toml", description="The rig's description, relative to this file."
@@ -24,9 +24,7 @@ class RunSettings(Settings):
     name: str = Field(
         pattern=r"^[a-z0-9][a-z0-9_]*$", description="Name of the run and of its files."
     )
-    run: Literal["exo_alone", "with_human"] = Field(
-        description="Nobody in the machine, or somebody."
-    )
+    run: Literal["exo_alone", "with_human"] = Field(description="Without a wearer, or with one.")
     purpose: Literal["train", "validate"] = Field(
         description="Fitted, or held back to judge the fit."
     )

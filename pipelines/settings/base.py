@@ -1,4 +1,4 @@
-"""Settings read from TOML: typed, frozen, and refused in one line with the key's path."""
+"""Settings from TOML files: typed and frozen, with errors in one line that name the key."""
 
 import json
 import tomllib
@@ -15,19 +15,20 @@ from pipelines.validation.toml import read_toml
 
 
 class Settings(BaseModel):
-    """One table of a settings file. Every field has a description; a unit stands at the end of its
-    name."""
+    """One table of a settings file.
+
+    Every field has a description; its name ends with its unit.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def changed(self, **values: Any) -> Self:
-        """Return the settings with some values replaced, as command-line options do; None leaves
-        one as it is.
+        """Return the settings with the values replaced that are not None.
 
         Raises
         ------
         SettingsError
-            Where the result is not valid.
+            If the result is not valid.
         """
         content = self.model_dump() | {
             name: value for name, value in values.items() if value is not None
@@ -42,13 +43,17 @@ Model = TypeVar("Model", bound=Settings)
 
 
 def load_toml(path: Path | str, model: type[Model]) -> Model:
-    """Return the settings in a TOML file, or raise a SettingsError that names file, key and
-    remedy."""
+    """Return the settings in a TOML file.
+
+    Raises
+    ------
+    SettingsError
+        If the file or a value is not valid, with file, key and remedy.
+    """
     path = Path(path)
     content = _content(path)
     try:
-        # As JSON, because there strict means what a TOML file means: "5" is no number, [1, 2] is a
-        # pair.
+        # Strict validation of JSON has the types of TOML: "5" is no number, but [1, 2] is a tuple.
         return model.model_validate_json(json.dumps(content, default=str), strict=True)
     except ValidationError as error:
         raise SettingsError(
@@ -67,7 +72,7 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         return read_toml(path)
     except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"{path}: is not valid TOML: {error}; mend that line") from error
+        raise SettingsError(f"{path}: is not valid TOML: {error}; correct that line") from error
     except UnicodeDecodeError as error:
         raise SettingsError(
             f"{path}: is not UTF-8 text, expected a TOML file; save it as UTF-8"
@@ -86,7 +91,7 @@ def _keys_at(model: type[BaseModel], path: str) -> list[str]:
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the models that a field's type mentions: of ``tuple[Run, ...] | None`` it is Run."""
+    """Yield the models in a field's type: Run for ``tuple[Run, ...] | None``."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):

@@ -1,4 +1,4 @@
-"""Where the shipped data lie: beside the code in a checkout, inside the package once installed."""
+"""The folder of the shipped data: next to the code in a checkout, else in the package."""
 
 from pathlib import Path
 

@@ -9,7 +9,7 @@ from pipelines.settings.base import Settings
 
 
 class Bounds(Settings):
-    """What the excitation may ask of one joint."""
+    """Bounds of the excitation at one joint."""
 
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
     velocity_rad_s: float = Field(1.6449, gt=0.0, description="Highest speed, either way.")
@@ -33,7 +33,7 @@ class Bounds(Settings):
 
 
 class JointBounds(Settings):
-    """The bounds of each joint; the paper's Table 2 unless said otherwise."""
+    """The bounds of each joint; defaults are the paper's Table 2."""
 
     hip: Bounds = Field(Bounds(angle_rad=(0.0872, 1.2217)), description="Hip, forward positive.")
     knee: Bounds = Field(
@@ -42,8 +42,7 @@ class JointBounds(Settings):
 
 
 class NoiseSettings(Settings):
-    """What the expected standard errors are computed for: the rig's torque noise and the record's
-    length."""
+    """Torque noise and length of a record, for the expected standard errors."""
 
     hip_nm: float = Field(0.6, gt=0.0, description="Standard deviation of the hip's torque noise.")
     knee_nm: float = Field(

@@ -1,4 +1,4 @@
-"""``[diagnose]``: what is known of the machine before its data are looked at."""
+"""``[diagnose]``: effects of the machine that are known before a diagnosis."""
 
 from pydantic import Field
 
@@ -6,13 +6,12 @@ from pipelines.settings.base import Settings
 
 
 class DiagnoseSettings(Settings):
-    """The diagnosis of what the model lacks."""
+    """The diagnosis of effects that the model lacks."""
 
     known: tuple[str, ...] = Field(
         (),
         description=(
-            "What the machine's drawings show beside rigid body and friction, as"
-            " `rotor_inertia@knee` or `parallel_spring@hip`: part of the model that everything is"
-            " held against, its size fitted."
+            "Effects known to be present, such as `rotor_inertia@knee` or `parallel_spring@hip`."
+            " They are part of the baseline, and their size is fitted."
         ),
     )

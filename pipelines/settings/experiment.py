@@ -18,7 +18,7 @@ from pipelines.validation.suggestion import similar_file, suggestion
 
 
 def _four_runs() -> tuple[RunSettings, ...]:
-    """Return both kinds of run, each once to fit and once to judge the fit."""
+    """Return both kinds of run, each once to train and once to validate."""
     return (
         RunSettings(name="exo_alone_train", run="exo_alone", purpose="train", seed=1),
         RunSettings(name="exo_alone_validate", run="exo_alone", purpose="validate", seed=2),
@@ -58,15 +58,14 @@ class Experiment(Settings):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Return the experiment in a file; names of files in it are taken from that file's
-        folder."""
+        """Return the experiment in a file; names of files in it are relative to its folder."""
         experiment = load_toml(path, cls)
         experiment._path = Path(path)
         return experiment
 
     @property
     def path(self) -> Path:
-        """The file that it was read from; exoid.toml where there is none."""
+        """The file that it was read from, else exoid.toml."""
         return self._path
 
     def file(self, name: str) -> Path:
@@ -74,39 +73,34 @@ class Experiment(Settings):
         return self._path.parent / name
 
     def sections(self, *names: str) -> dict[str, Any]:
-        """Return some sections as JSON would hold them: what a result records of its settings."""
+        """Return some sections as JSON, for the metadata of a result."""
         return {name: getattr(self, name).model_dump(mode="json") for name in names}
 
     def sections_about(self, a_leg: bool, *names: str) -> dict[str, Any]:
-        """Return some sections as a result about a machine, ``a_leg`` or another, records them.
+        """Return some sections for the metadata of a result about a leg or another machine.
 
-        The defaults of [mechanism] are the leg's: of another machine it is null where nobody wrote
-        it, for then what counts is what the recordings say of themselves.
+        The defaults of [mechanism] are those of a leg. For another machine without [mechanism] it
+        is null, as its recordings have the mechanism.
         """
-        unsaid = {} if a_leg or self.mechanism.model_fields_set else {"mechanism": None}
-        return self.sections(*names) | {
-            name: value for name, value in unsaid.items() if name in names
-        }
+        sections = self.sections(*names)
+        if "mechanism" in names and not a_leg and not self.mechanism.model_fields_set:
+            sections["mechanism"] = None
+        return sections
 
     def refuse_missing_files(self) -> None:
-        """Refuse to name a file that is not there."""
+        """Refuse names of missing files."""
         named = {"acquire.rig": self.acquire.rig}
         named |= {
             f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory
         }
         for key, name in named.items():
-            if not self.file(name).is_file():
-                raise SettingsError(
-                    f"{self._path}: {key}: {self.file(name)}: no such file; "
-                    + (
-                        similar_file(self.file(name))
-                        or "name one relative to the experiment's file"
-                    )
-                )
+            path = self.file(name)
+            if not path.is_file():
+                remedy = similar_file(path) or "its path is relative to this file"
+                raise SettingsError(f"{self._path}: {key}: {path}: no such file; {remedy}")
 
     def refuse_what_cannot_run(self) -> None:
-        """Refuse what only other files or other sections show: a file that is not there, a cut-off
-        above Nyquist's."""
+        """Refuse missing files, and a cut-off above the Nyquist frequency."""
         self.refuse_missing_files()
         cutoff_hz, rate_hz = self.filter.cutoff_hz, self.acquire.sample_rate_hz
         if cutoff_hz != "auto" and cutoff_hz >= rate_hz / 2:
@@ -121,7 +115,7 @@ class Experiment(Settings):
         Raises
         ------
         SettingsError
-            Where there is no run of this name.
+            If there is no run of this name.
         """
         for run in self.run:
             if run.name == name:

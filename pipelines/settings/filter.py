@@ -1,4 +1,4 @@
-"""``[filter]``: how a recording becomes fit for regression."""
+"""``[filter]``: preparation of recordings for regression."""
 
 from typing import Annotated, Literal
 
@@ -8,7 +8,7 @@ from pipelines.settings.base import Settings
 
 
 class FilterSettings(Settings):
-    """The zero-phase low-pass on the angle, from which the derivatives follow."""
+    """The zero-phase low-pass on the angle, from which derivatives are computed."""
 
     cutoff_hz: Literal["auto"] | Annotated[float, Field(gt=0.0)] = Field(
         "auto", description='Cut-off, or "auto": where the angle\'s spectrum meets its noise floor.'

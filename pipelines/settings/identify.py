@@ -1,4 +1,4 @@
-"""``[identify]``: how the two-step fit is made, and what it leaves behind."""
+"""``[identify]``: the two-step fit and its output."""
 
 from typing import Literal
 
@@ -19,9 +19,7 @@ Method = Literal[
 class IdentifySettings(Settings):
     """The two-step fit: friction from exo_alone runs, then inertia with the human."""
 
-    figures: bool = Field(
-        True, description="Draw the figures, beside the parameters, as PNG and PDF."
-    )
+    figures: bool = Field(True, description="Draw figures next to the parameters, as PNG and PDF.")
     method: Method = Field(
         "weighted_least_squares",
         description=(
@@ -33,8 +31,7 @@ class IdentifySettings(Settings):
     reversals: bool = Field(
         False,
         description=(
-            "Fit samples near a joint's reversals, too. No friction of the model describes what is"
-            " there, so parameters are biased by it; for comparing with what others fit to every"
-            " sample."
+            "Fit samples near a joint's reversals, too. The model's friction is wrong there, so"
+            " parameters are biased; for comparison with fits of other tools to every sample."
         ),
     )

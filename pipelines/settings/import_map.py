@@ -1,5 +1,4 @@
-"""A map: what the columns of a log from elsewhere are, so that ``exoid import`` can make recordings
-of it."""
+"""A map: the meaning of a log's columns, from which ``exoid import`` makes recordings."""
 
 import re
 from collections import Counter
@@ -19,16 +18,16 @@ from pipelines.settings.units import unit_named, units_of
 from pipelines.validation.suggestion import closest, similar_file
 
 LARGEST = 1e12
-"""The most that a number of a map may be; what is more is a slip of the pen."""
+"""Greatest number in a map; a larger one is a typing error."""
 
-NAMED_AFTER = {"file", "folder", "purpose"}
-"""What may stand in braces in a recording's name."""
+PLACEHOLDERS = {"file", "folder", "purpose"}
+"""Words in braces that a recording's name may have."""
 
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class SourceSettings(Settings):
-    """How the log is to be read; what is left out is found by looking at the file."""
+    """The format of the log; keys that are left out are derived from the file."""
 
     delimiter: str | None = Field(
         None, description="The one character between the fields of a text file."
@@ -55,8 +54,8 @@ class SourceSettings(Settings):
     def _is_one_character(cls, delimiter: str | None) -> str | None:
         if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n\0'):
             raise ValueError(
-                f'found {delimiter!r}, expected one character, such as "," or ";" or "\\t" for'
-                ' tabs; " " stands for any number of blanks and tabs'
+                f'found {delimiter!r}, expected one character, such as "," or ";"; "\\t" is tabs,'
+                ' " " is blanks and tabs'
             )
         return delimiter
 
@@ -69,7 +68,7 @@ class TimeSettings(Settings):
     wraps_at: float | None = Field(
         None,
         gt=0.0,
-        description="Reading at which the clock starts anew at 0, such as 4294967296 (32 bits).",
+        description="Reading at which the clock wraps around to 0, such as 4294967296 (32 bits).",
     )
     rate_hz: float | None = Field(
         None, gt=0.0, description="In place of a column: rows a second, where no clock was logged."
@@ -92,7 +91,7 @@ class TimeSettings(Settings):
 
 
 class ReadingSettings(Settings):
-    """A column, or arithmetic with several, and how its numbers are to be understood."""
+    """A column, or arithmetic with several, and the meaning of its numbers."""
 
     column: str | None = Field(None, description="Name of the column.")
     expression: str | None = Field(
@@ -110,7 +109,7 @@ class ReadingSettings(Settings):
         0.0,
         ge=-LARGEST,
         le=LARGEST,
-        description="What the log says where the joint is at zero, in `unit`.",
+        description="Reading where the joint is at zero, in `unit`.",
     )
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
         None,
@@ -124,9 +123,9 @@ class ReadingSettings(Settings):
         gt=0.0,
         le=LARGEST,
         description=(
-            "Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on,"
-            " from the one in which the log begins nearest to `zero`. `signed_bits` beside it"
-            " changes nothing."
+            "Raw reading at which a counter wraps around to 0 (65536, 360). Turns are counted"
+            " from the one in which the log begins nearest to `zero`. With it `signed_bits` has no"
+            " effect."
         ),
     )
     begins_at: float | None = Field(
@@ -134,13 +133,13 @@ class ReadingSettings(Settings):
         ge=-LARGEST,
         le=LARGEST,
         description=(
-            "About what raw reading each log begins at, turns counted, where that is not near"
-            " `zero`."
+            "Approximate raw reading at which each log begins, turns counted, where that is not"
+            " near `zero`."
         ),
     )
     range: tuple[float, float] | None = Field(
         None,
-        description="Lowest and highest raw reading to believe; rows with others are left out.",
+        description="Lowest and highest valid raw reading; rows with others are left out.",
     )
     time: str | None = Field(
         None,
@@ -160,7 +159,7 @@ class ReadingSettings(Settings):
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
         if self.begins_at is not None and self.wraps_at is None:
-            raise ValueError("begins_at: found without wraps_at; set wraps_at, or remove it")
+            raise ValueError("begins_at: needs wraps_at; set wraps_at, or remove it")
         return self
 
 
@@ -213,19 +212,18 @@ class JointReadingSettings(ReadingSettings):
     gain_nm_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Torque for a voltage.")
     gain_n_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Force for a voltage.")
     rated_torque_nm: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="What 100 % or 1000 permille are."
+        None, gt=0.0, le=LARGEST, description="Value of 100 % or 1000 permille."
     )
     rated_force_n: float | None = Field(
         None, gt=0.0, le=LARGEST, description="The same of a linear motor."
     )
 
     def gain(self, target: str) -> float:
-        """Return what a reading in SI is multiplied by to be what it is at the joint."""
+        """Return the factor from a reading in SI to the quantity at the joint."""
         unit = unit_named(self.unit)
-        assert unit is not None, "was looked at with the joint"
-        given = {
-            key: value for key in transmission.KEYS if (value := getattr(self, key)) is not None
-        }
+        assert unit is not None, "the joint checks its units"
+        numbers = {key: getattr(self, key) for key in transmission.KEYS}
+        given = {key: value for key, value in numbers.items() if value is not None}
         return transmission.gain(unit.dimension, target, given, self.gear_ratio)
 
 
@@ -238,16 +236,13 @@ class JointSettings(Settings):
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
     enabled: str | None = Field(
         None,
-        description=(
-            "Column that is 0 (false) while the drive is off; rows whose torque so says nothing are"
-            " left out."
-        ),
+        description=("Column that is 0 (false) while the drive is off; these rows are left out."),
     )
     angle: JointReadingSettings = Field(
         description="Measured angle, or position of a prismatic joint."
     )
     torque: JointReadingSettings = Field(
-        description="What the drive delivers at the joint: torque, or force."
+        description="Torque, or force, that the drive delivers at the joint."
     )
     reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
     velocity: JointReadingSettings | None = Field(
@@ -270,7 +265,7 @@ class JointSettings(Settings):
         return self
 
     def readings(self) -> Iterator[tuple[str, JointReadingSettings]]:
-        """Yield the quantities that the log has, and where they are."""
+        """Yield the quantities that the log has, and their readings."""
         for quantity in transmission.TARGETS:
             reading = getattr(self, quantity)
             if reading is not None:
@@ -278,31 +273,28 @@ class JointSettings(Settings):
 
     @property
     def joint(self) -> Joint:
-        """The joint as files have it."""
+        """The joint, as in files."""
         return Joint(self.name, self.kind)
 
 
 class RecordingSettings(Settings):
-    """A recording to make of each file: all of it, or a span."""
+    """A recording of each file: all of it, or a span."""
 
     name: str = Field(
         "{file}_{purpose}",
         description=(
-            "Its name; {file} is the source's, without its ending, and {folder} that of the folder"
-            " it lies in."
+            "Its name; {file} is the source's name without its ending, {folder} that of its folder."
         ),
     )
     files: str = Field(
         "*",
         description=(
-            'Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".'
+            'Pattern of its files, such as "swing_0[0-2].csv", or with folder, "run1/*.csv".'
         ),
     )
-    purpose: Literal["train", "validate"] = Field(
-        description="To be fitted to, or to be judged on."
-    )
+    purpose: Literal["train", "validate"] = Field(description="To fit to, or to judge the fit.")
     run: Literal["exo_alone", "with_human"] = Field(
-        "exo_alone", description="exo_alone is any machine with nobody in it."
+        "exo_alone", description="exo_alone is any machine without a wearer."
     )
     span_s: tuple[float, float] | None = Field(
         None, description="Seconds of the run to take, from its start."
@@ -313,8 +305,8 @@ class RecordingSettings(Settings):
     period_s: float | None = Field(
         None, gt=0.0, description="Period of the excitation, where it repeats."
     )
-    subject: str | None = Field(None, description="Who was in the machine.")
-    session: str | None = Field(None, description="Of which session it is.")
+    subject: str | None = Field(None, description="Wearer of the machine.")
+    session: str | None = Field(None, description="Name of its session.")
 
     @field_validator("name")
     @classmethod
@@ -324,9 +316,10 @@ class RecordingSettings(Settings):
                 f"found {name!r}, expected a file's name without its folder, and without control"
                 ' characters and / \\ : * ? " < > |; -o names the folder'
             )
-        if strange := set(re.findall(r"\{(.*?)\}", name)) - NAMED_AFTER:
+        unknown = set(re.findall(r"\{(.*?)\}", name)) - PLACEHOLDERS
+        if unknown:
             raise ValueError(
-                f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or"
+                f"found {{{min(unknown)}}} in {name!r}, expected {{file}}, {{folder}} or"
                 " {purpose}"
             )
         return name
@@ -342,18 +335,15 @@ class RecordingSettings(Settings):
         return self
 
     def is_of(self, file: Path) -> bool:
-        """Tell whether it is to be made of a file: a pattern with folders is that of the end of its
-        path."""
-        return (
-            file.absolute().match(self.files)
-            if "/" in self.files
-            else fnmatch(file.name, self.files)
-        )
+        """Return whether a file matches; a pattern with folders matches the end of its path."""
+        if "/" in self.files:
+            return file.absolute().match(self.files)
+        return fnmatch(file.name, self.files)
 
     def name_of(self, file: Path) -> str:
-        """Return the name of the recording that is made of a file."""
-        known = {"file": file.stem, "folder": file.absolute().parent.name, "purpose": self.purpose}
-        return re.sub(r"\{(.*?)\}", lambda found: known[found[1]], self.name)
+        """Return the name of the recording of a file."""
+        words = {"file": file.stem, "folder": file.absolute().parent.name, "purpose": self.purpose}
+        return re.sub(r"\{(.*?)\}", lambda match: words[match[1]], self.name)
 
 
 def _two_parts() -> tuple[RecordingSettings, ...]:
@@ -364,7 +354,7 @@ def _two_parts() -> tuple[RecordingSettings, ...]:
 
 
 class ImportMap(Settings):
-    """Everything that a log does not say of itself."""
+    """The meaning of a log: clock, joints, forces, geometry and recordings."""
 
     rig: str | None = Field(None, description="Name of the machine.")
     source: SourceSettings = Field(SourceSettings(), description="How the log is read.")
@@ -373,7 +363,7 @@ class ImportMap(Settings):
     force: tuple[ForceSettings, ...] = Field((), description="Cuff force sensors.")
     geometry: GeometrySettings = Field(GeometrySettings(), description="Lengths and gravity.")
     recording: tuple[RecordingSettings, ...] = Field(
-        default_factory=_two_parts, min_length=1, description="What recordings to make."
+        default_factory=_two_parts, min_length=1, description="Recordings of each log."
     )
 
     @model_validator(mode="after")
@@ -390,21 +380,20 @@ class ImportMap(Settings):
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:
                 raise ValueError(
-                    f"{place}.time: found {reading.time!r} beside time.rate_hz, expected"
-                    " time.column: nobody knows when on that clock the rows began; name the column"
-                    " of a clock of theirs, or leave this out"
+                    f"{place}.time: found {reading.time!r} with time.rate_hz, expected time.column,"
+                    " as both clocks must have a common origin; set time.column, or remove it"
                 )
             if reading.column is not None:
                 owner = owners.setdefault(reading.column, place)
                 if owner != place:
                     raise ValueError(
-                        f"{place}.column: found {reading.column!r}, which is {owner} already;"
+                        f"{place}.column: found {reading.column!r}, which is also {owner};"
                         " correct one of them"
                     )
         return self
 
     def readings(self) -> Iterator[tuple[str, ReadingSettings]]:
-        """Yield every reading and its place in the map, as messages name it."""
+        """Yield every reading and its place in the map, for messages."""
         for i, joint in enumerate(self.joint):
             for quantity, reading in joint.readings():
                 yield f"joint[{i}].{quantity}", reading
@@ -418,7 +407,7 @@ def load_map(path: Path) -> ImportMap:
     Raises
     ------
     SettingsError
-        Where there is no such file, or it is none of a map.
+        If there is no such file, or it is no map.
     """
     if not path.exists():
         raise SettingsError(
@@ -427,17 +416,17 @@ def load_map(path: Path) -> ImportMap:
         )
     if not path.is_file():  # it is read again for its hash
         kind = "a folder" if path.is_dir() else "a pipe or a device"
-        raise SettingsError(f"{path}: is {kind}, expected the file of a map; name that")
+        raise SettingsError(f"{path}: is {kind}, expected the file of a map")
     return load_toml(path, ImportMap)
 
 
 def _refuse_other_units(name: str, dimensions: list[str]) -> None:
     unit = unit_named(name)
     if unit is None or unit.dimension not in dimensions:
-        what = f", a unit of {unit.dimension}" if unit else ""
+        kind = f", a unit of {unit.dimension}" if unit else ""
         known = units_of(*dimensions)
         near = closest(name, known)
         raise ValueError(
-            f"found {name!r}{what}, expected one of {dimensions[0]}: {', '.join(known)}"
+            f"found {name!r}{kind}, expected one of {dimensions[0]}: {', '.join(known)}"
             + (f"; did you mean {near}?" if near else "")
         )

@@ -1,7 +1,7 @@
 """The page docs/import-map.md, written from the map's settings themselves.
 
-``python -m pipelines.settings.map_reference > docs/import-map.md`` brings it up to date; a test
-says when it is not.
+``python -m pipelines.settings.map_reference > docs/import-map.md`` updates it; a test compares
+them.
 """
 
 from pydantic import BaseModel
@@ -14,10 +14,10 @@ from pipelines.settings.units import ALIASES, UNITS
 INTRODUCTION = """\
 # Every key of a map for `exoid import`
 
-Written by `make docs` from `pipelines/settings/`; change it there. [import.md](import.md) tells how
-to write a map.
+Written by `make docs` from `pipelines/settings/`; change it there. [import.md](import.md) explains
+how to write a map.
 
-Outside of all tables stands `rig`, the name of the machine.
+`rig`, the name of the machine, is outside of all tables.
 """
 HEAD = "| key | default | meaning |\n|---|---|---|\n"
 
@@ -46,7 +46,7 @@ def _units() -> str:
 
 
 def _drive_trains() -> str:
-    """Return which keys lead from a unit to what a joint's quantity is."""
+    """Return the keys that convert each dimension of a log to that at the joint."""
     dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
     rows = [
         f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} |"

@@ -1,5 +1,4 @@
-"""``[mechanism]``: which mechanism the machine is, and its geometry where a recording does not say
-its own."""
+"""``[mechanism]``: the kind of machine, and its geometry where a recording has none."""
 
 from typing import Self
 
@@ -12,7 +11,7 @@ from pipelines.settings.physical_bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 from pipelines.validation.suggestion import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
-"""Of the mechanisms whose joints may be left out."""
+"""Joints of the mechanisms for which they may be left out."""
 
 
 class JointSettings(Settings):
@@ -25,7 +24,7 @@ class JointSettings(Settings):
 
 
 class MechanismSettings(Settings):
-    """The mechanism, and its geometry where a recording does not say its own."""
+    """The mechanism, and its geometry where a recording has none."""
 
     name: str = Field(
         "leg",
@@ -60,12 +59,11 @@ class MechanismSettings(Settings):
 
     @model_validator(mode="after")
     def _joints_are_given(self) -> Self:
-        """Whether they make the mechanism is for those to say who know all there are
-        (``mechanics/read.py``)."""
+        # Whether the joints fit the mechanism is checked where all are known: mechanics/read.py.
         if not self.joints and self.name not in USUAL_JOINTS:
             raise ValueError(
-                f"name: found {self.name!r} without joints, which only {' and '.join(USUAL_JOINTS)}"
-                " may leave out; add [[mechanism.joints]], or correct the name:"
+                f"name: found {self.name!r} without joints, optional only for"
+                f" {' and '.join(USUAL_JOINTS)}; add [[mechanism.joints]], or correct the name:"
                 f" {suggestion(self.name, list(USUAL_JOINTS))}"
             )
         if len({joint.name for joint in self.joints}) < len(self.joints):
@@ -73,28 +71,27 @@ class MechanismSettings(Settings):
         return self
 
     def refuse_all_but_the_leg(self, command: str) -> None:
-        """Refuse what a command that works on hip and knee alone cannot do."""
+        """Refuse other machines in a command for hip and knee alone."""
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
                 f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg"
-                f" with hip and knee: {command} is for these alone; record other machines with"
-                " their own tools, and give the recordings to `exoid identify` and `exoid"
-                " diagnose`"
+                f" with hip and knee for {command}. Import recordings of other machines with `exoid"
+                " import`"
             )
 
     @property
     def geometry(self) -> dict[str, float]:
-        """As a recording's metadata have it."""
+        """The geometry as in a recording's metadata."""
         return {"thigh_length_m": self.thigh_length_m, "gravity_m_s2": self.gravity_m_s2}
 
     @property
     def all_joints(self) -> tuple[Joint, ...]:
-        """Those that are given, else the usual ones."""
+        """The given joints, else the usual ones."""
         return (
             tuple(Joint(joint.name, joint.kind) for joint in self.joints) or USUAL_JOINTS[self.name]
         )
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
-        """Of its joints."""
+        """Kinds of its joints."""
         return tuple(joint.kind for joint in self.all_joints)

@@ -1,7 +1,6 @@
 """The page docs/settings.md, written from the settings themselves.
 
-``python -m pipelines.settings.reference > docs/settings.md`` brings it up to date; a test says when
-it is not.
+``python -m pipelines.settings.reference > docs/settings.md`` updates it; a test compares them.
 """
 
 import json
@@ -43,7 +42,7 @@ def sections_of(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, t
 
 
 def rows_of(model: type[BaseModel]) -> Iterator[str]:
-    """Yield a row of Markdown for each key of a table that is no table itself."""
+    """Yield a row of Markdown for each key of a table, except subtables."""
     for name, field in model.model_fields.items():
         if not any(models_in(field.annotation)):
             yield f"| `{name}` | {_default(field)} | {field.description} |"

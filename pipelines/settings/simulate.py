@@ -13,7 +13,7 @@ class SimulateSettings(Settings):
     duration_s: float = Field(10.0, gt=0.0, description="Simulated time.")
     step_s: float = Field(0.001, gt=0.0, le=0.01, description="Step of controller and integrator.")
     error_gain_1_s: float = Field(
-        10.0, gt=0.0, description="Lambda: weight of the error beside its derivative."
+        10.0, gt=0.0, description="Lambda: weight of the error relative to its derivative."
     )
     feedback_gain_nm_s_rad: float = Field(
         300.0, ge=0.0, description="Kv: feedback of the filtered error."
@@ -22,7 +22,7 @@ class SimulateSettings(Settings):
         500.0, ge=0.0, description="F: how fast the network's weights adapt."
     )
     robust_gain_nm: float = Field(
-        0.3, ge=0.0, description="Gain of the sign term against what the network misses."
+        0.3, ge=0.0, description="Gain of the sign term against the network's error."
     )
     network_nodes: int = Field(7, ge=1, le=200, description="Gaussians of each joint's network.")
     network_width: float = Field(10.0, gt=0.0, description="b: width of each Gaussian.")
@@ -52,7 +52,7 @@ class SimulateSettings(Settings):
         (50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0),
         description="Values of Kv for the sweep of the paper's Figure 3; empty for none.",
     )
-    figures: bool = Field(True, description="Draw the figures, beside the tables, as PNG and PDF.")
+    figures: bool = Field(True, description="Draw figures next to the tables, as PNG and PDF.")
 
     @model_validator(mode="after")
     def _settles_before_the_end(self) -> Self:

@@ -1,4 +1,4 @@
-"""A new experiment: the default one, copied to be edited."""
+"""A new experiment: a copy of the default one."""
 
 import shutil
 from pathlib import Path
@@ -9,19 +9,19 @@ from pipelines.settings.datasets import datasets
 
 
 def create(folder: Path, exoid: str) -> None:
-    """Write exoid.toml, rigs/ and Makefile into a folder; nothing that is there is overwritten.
+    """Write exoid.toml, rigs/ and Makefile into a folder, without overwriting anything.
 
     Parameters
     ----------
     folder : Path
-        The experiment's folder, made if need be.
+        The experiment's folder, created if missing.
     exoid : str
-        The command that the Makefile calls unless told otherwise.
+        The default command in the Makefile.
 
     Raises
     ------
     SettingsError
-        Where the folder has one of them already.
+        If the folder has one of them already.
     """
     source = datasets()
     for name in ("exoid.toml", "rigs", "Makefile"):

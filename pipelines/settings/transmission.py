@@ -1,5 +1,4 @@
-"""From what was measured at a motor to what it is at the joint: encoder, gear, screw, torque
-constant."""
+"""Convert measurements at a motor to the joint: encoder, gear, screw, torque constant."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -15,23 +14,22 @@ TARGETS: dict[str, dict[Kind, str]] = {
     "current": {"revolute": "current", "prismatic": "current"},
     "temperature": {"revolute": "temperature", "prismatic": "temperature"},
 }
-"""What a joint's quantity is, for each kind of joint."""
+"""Dimension of each quantity, for each kind of joint."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One part of a drive train: it makes one dimension of another, by a number that stands on its
-    data sheet."""
+    """One part of a drive train, which converts dimensions by a number from its data sheet."""
 
     source: str
     target: str
     key: str
     divides: bool = False
     per_turn: bool = False
-    """Does the number count per turn, where the dimension counts radians?"""
+    """Whether the number is per turn, where the dimension is in radians."""
 
     def factor(self, value: float) -> float:
-        """Return what a reading is multiplied by."""
+        """Return the factor on a reading."""
         value = value / (2.0 * pi) if self.per_turn else value
         return 1.0 / value if self.divides else value
 
@@ -62,66 +60,74 @@ GEARED = {
     "current": 0,
     "temperature": 0,
 }
-"""Power of the gear ratio, by what arrives at the joint: motion is divided by it, torque is
-multiplied."""
+"""Power of the gear ratio by dimension at the joint: it divides motion, multiplies torque."""
 
 METRIC = {
     "length": ("m", "metres"),
     "velocity": ("m/s", "metres a second"),
     "force": ("N", "newtons"),
 }
-"""What a log of a joint that slides may be in, where its map says what turns."""
+"""Units of a prismatic joint's log, suggested where its map has the unit of a turning one."""
 
 
 def paths(source: str, target: str) -> list[tuple[Step, ...]]:
-    """Return all ways through a drive train from one dimension to another, the shortest first."""
+    """Return all sequences of steps from one dimension to another, the shortest first."""
     if source == target:
         return [()]
-    found = [
+    sequences = [
         (step, *rest)
         for step in STEPS
         if step.source == source
         for rest in paths(step.target, target)
     ]
-    return sorted(found, key=len)
+    return sorted(sequences, key=len)
 
 
 def sources(target: str) -> list[str]:
-    """Return the dimensions from which there is a way to one."""
-    return list(
-        dict.fromkeys([target, *(step.source for step in STEPS if paths(step.source, target))])
-    )
+    """Return the dimensions that can be converted to one."""
+    others = (step.source for step in STEPS if paths(step.source, target))
+    return list(dict.fromkeys([target, *others]))
 
 
 def gain(source: str, target: str, given: Mapping[str, float], gear_ratio: float) -> float:
-    """Return what an SI reading is multiplied by to be what it is at the joint.
+    """Return the factor from an SI reading to the quantity at the joint.
+
+    Parameters
+    ----------
+    source, target : str
+        Dimension of the reading, and of the quantity at the joint.
+    given : mapping of str to float
+        Numbers of the drive train, by key.
+    gear_ratio : float
+        Turns of the motor for one of the joint.
 
     Raises
     ------
     ValueError
-        Where a number on the way is not given, or one is given that no way needs.
+        If a number is missing, or is not needed.
     """
     ways = paths(source, target)
     complete = [way for way in ways if {step.key for step in way} == set(given)]
     if not complete:
-        raise ValueError(_what_is_wrong(ways, target, set(given)))
+        raise ValueError(_problem(ways, target, set(given)))
     return gear_ratio ** GEARED[target] * prod(step.factor(given[step.key]) for step in complete[0])
 
 
-def _what_is_wrong(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
+def _problem(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
     wanted = [{step.key for step in way} for way in ways]
     for keys in wanted:
-        if keys >= given:
-            instead = (
-                f", or {_both(wanted[0] - given)} in place of {_both(given)}"
-                if given - wanted[0]
-                else ""
-            )
-            metric = METRIC[target] if keys == {"lead_m"} else None
-            rather = f', or unit = "{metric[0]}", where the log is in {metric[1]}' if metric else ""
-            return f"needs {_both(keys - given)}{instead}; add it from the data sheet{rather}"
+        if not keys >= given:
+            continue
+        message = f"needs {_both(keys - given)}"
+        if given - wanted[0]:
+            message += f", or {_both(wanted[0] - given)} in place of {_both(given)}"
+        message += "; add it from the data sheet"
+        if keys == {"lead_m"}:
+            unit, words = METRIC[target]
+            message += f', or unit = "{unit}", if the log is in {words}'
+        return message
     spare = min((given - keys for keys in wanted), key=len)
-    return f"has no use for {_both(spare)}; remove it, or correct the unit"
+    return f"does not need {_both(spare)}; remove it, or correct the unit"
 
 
 def _both(keys: Collection[str]) -> str:

@@ -149,11 +149,11 @@ ALIASES = {
     "µm": "um",
     "μm": "um",
 }
-"""Other ways to write them."""
+"""Other spellings of units."""
 
 
 def unit_named(name: str) -> Unit | None:
-    """Return the unit that is written so; None where there is none."""
+    """Return the unit with a name or alias, if any."""
     return UNITS.get(ALIASES.get(name, name))
 
 

@@ -1,1 +1,1 @@
-"""Explains what is wrong in a file that a user wrote."""
+"""Explain errors in files that users write."""

@@ -1,4 +1,4 @@
-"""A pydantic complaint as one line a person can act on."""
+"""An error of pydantic in one line, with key, value and expectation."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -12,17 +12,16 @@ if TYPE_CHECKING:
 def explain(
     error: "ValidationError", data: Any, known_keys: Callable[[str], list[str]] = lambda path: []
 ) -> str:
-    """Say which key is wrong, what was found there and what was expected.
+    """Return which key is wrong, its value, and what was expected.
 
     Parameters
     ----------
     error : pydantic.ValidationError
-        What pydantic found.
+        The error of a validation.
     data : dict
-        The data it looked at, as read from TOML or JSON.
+        The validated data, as read from TOML or JSON.
     known_keys : callable, optional
-        Returns the keys allowed in the table at a dotted path ("" is the top), to suggest one for a
-        misspelt key.
+        Return the keys of the table at a dotted path ("" is the top), to suggest one.
 
     Returns
     -------
@@ -39,13 +38,15 @@ def explain(
 
 
 def _own(error: "ValidationError") -> list[Any]:
-    """Return the faults without those that are others' shadows: a list lacks the tables that have a
-    fault."""
-    found = error.errors(include_url=False)
-    at = [fault["loc"] for fault in found]
+    """Return the faults without consequences of others.
+
+    A list is too short only because tables in it have a fault.
+    """
+    faults = error.errors(include_url=False)
+    at = [fault["loc"] for fault in faults]
     return [
         fault
-        for fault in found
+        for fault in faults
         if fault["type"] != "too_short"
         or not any(
             loc[: len(fault["loc"])] == fault["loc"] and len(loc) > len(fault["loc"]) for loc in at
@@ -66,23 +67,22 @@ def _sentence(
     if kind == "union_tag_not_found":
         return f"{path}.{_discriminator(faults[0])}: missing; add it"
     if kind == "union_tag_invalid":
-        found, known = faults[0]["ctx"]["tag"], faults[0]["ctx"]["expected_tags"]
-        return f"{path}.{_discriminator(faults[0])}: found {found!r}, expected one of {known}"
+        tag, known = faults[0]["ctx"]["tag"], faults[0]["ctx"]["expected_tags"]
+        return f"{path}.{_discriminator(faults[0])}: found {tag!r}, expected one of {known}"
     if kind == "value_error":
         return f"{path}: {faults[0]['ctx']['error']}" if path else str(faults[0]["ctx"]["error"])
-    # A union ("auto" or a number) complains once for each of its members.
+    # A union ("auto" or a number) has one fault for each of its members.
     expected = " or ".join(dict.fromkeys(expectation(fault["msg"]) for fault in faults))
-    return f"{path}: found {_found(faults[0]['input'])}, expected {expected}"
+    return f"{path}: found {_shortened(faults[0]['input'])}, expected {expected}"
 
 
 def _discriminator(fault: dict[str, Any]) -> str:
-    """Return the key that chooses among the kinds a table can be of."""
+    """Return the key that determines the kind of a table."""
     return fault["ctx"]["discriminator"].strip("'")
 
 
 def _key_path(fault: Any, data: Any) -> str:
-    """Return the fault's dotted path as the user wrote it, without pydantic's names for members of
-    a union."""
+    """Return the fault's dotted path in the file, without pydantic's names of union members."""
     path = ""
     for part in fault["loc"]:
         if isinstance(data, dict) and part in data:
@@ -95,11 +95,11 @@ def _key_path(fault: Any, data: Any) -> str:
 
 
 def expectation(message: str) -> str:
-    """Return what pydantic says was expected, as the end of a sentence."""
+    """Return pydantic's expectation, as the end of a sentence."""
     expected = message.removeprefix("Input should be ").split(", unable to")[0]
     return expected.replace("String should match pattern", "text matching")
 
 
-def _found(value: Any) -> str:
+def _shortened(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

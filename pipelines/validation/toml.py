@@ -1,4 +1,4 @@
-"""TOML files as people save them."""
+"""Read TOML files, with or without a byte order mark."""
 
 import tomllib
 from pathlib import Path
@@ -6,6 +6,6 @@ from typing import Any
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return what a file says; tomllib's and Unicode's errors are its own reader's to explain."""
+    """Return the content of a TOML file; errors of tomllib and Unicode are left to the caller."""
     # Windows' editors put a byte order mark first.
     return tomllib.loads(path.read_text(encoding="utf-8-sig"))

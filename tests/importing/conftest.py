@@ -67,7 +67,7 @@ class Outcome:
     folder: Path
 
     @property
-    def told(self) -> str:
+    def printed(self) -> str:
         """What was printed, on one line whatever the terminal's width."""
         return " ".join(self.out.split())
 

@@ -229,8 +229,7 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(
     outcome = imported(path)
     assert outcome.code == 2
     assert (
-        outcome.err
-        == f"exoid: {path}: to read it exoid needs h5py, which is not installed; pip install"
+        outcome.err == f"exoid: {path}: needs h5py, which is not installed; pip install"
         " 'exoid[import]'\n"
     )
 
@@ -245,8 +244,8 @@ def test_a_line_of_nul_bytes_costs_its_row_wherever_it_stands(imported, pendulum
     path.write_bytes(b"\n".join(lines))
     outcome = imported(path)
     assert (outcome.code, len(outcome.recording().frame)) == (0, 1999)
-    assert r"time: 1 row with text, the first '\x00" in outcome.told
-    assert f"in row {row}; taken for missing" in outcome.told
+    assert r"time: 1 row with text, the first '\x00" in outcome.printed
+    assert f"in row {row}; taken for missing" in outcome.printed
 
 
 def as_parquet(pendulum, tmp_path, time):
@@ -283,7 +282,7 @@ def test_dates_whose_unit_is_one_of_numbers_are_refused_with_the_right_one(
     outcome = imported(path, map_text=MAP.replace('unit = "s"', f'unit = "{unit}"'))
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
     assert "'time' holds dates, the first '2025-03-30T01:59:58.000123" in outcome.err
-    assert f"and time.unit = '{unit}' in the map says otherwise; set it to iso8601" in outcome.err
+    assert f"but the map has time.unit = '{unit}'; set it to iso8601" in outcome.err
 
 
 def test_durations_whose_unit_is_another_are_refused_with_the_right_one(
@@ -301,7 +300,8 @@ def test_numbers_whose_unit_is_that_of_dates_are_refused_with_the_unit_of_a_usua
     path = write_csv(pendulum.columns() | {"time": factor * pendulum.time})
     outcome = imported(path, map_text=MAP.replace('unit = "s"', 'unit = "iso8601"'))
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert "'time' holds plain numbers, the first '0.0', and time.unit = 'iso8601'" in outcome.err
+    content = "'time' holds plain numbers, the first '0.0'"
+    assert f"{content}, but the map has time.unit = 'iso8601'" in outcome.err
     assert outcome.err.endswith(f"set it to {unit}\n")
 
 
@@ -317,7 +317,7 @@ def test_a_date_that_is_missing_is_no_text():
     findings = []
     values = np.array(["2025-03-30", "NaT", "NaT"], dtype="datetime64[ns]")
     assert np.isnan(numbers(values, "angle", findings)).all()
-    assert [finding.found for finding in findings] == [
+    assert [finding.observation for finding in findings] == [
         "1 row with text, the first '2025-03-30T00:00:00.' in row 0"
     ]
 

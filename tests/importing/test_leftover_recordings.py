@@ -28,7 +28,7 @@ def two_folders(pendulum, write_csv, tmp_path):
     return files
 
 
-def test_files_of_one_name_are_told_apart_by_their_folders_as_the_refusal_says(
+def test_files_of_one_name_are_distinguished_by_their_folders_as_the_refusal_says(
     imported, two_folders
 ):
     refused = imported(*two_folders, map_text=BOTH)
@@ -82,18 +82,18 @@ def test_a_map_of_one_purpose_says_which_is_missing_and_how_to_give_it(
 ):
     path = write_csv(pendulum.columns())
     outcome = imported(path, map_text=MAP.replace('purpose = "train"', f'purpose = "{has}"'))
-    assert f"`exoid run` lacks a recording to {what}: add a [[recording]] to" in outcome.told
-    assert f'with purpose = "{lacks}"' in outcome.told
-    assert EMPTY_TOML not in outcome.told
+    assert f"`exoid run` lacks a recording to {what}: add a [[recording]] to" in outcome.printed
+    assert f'with purpose = "{lacks}"' in outcome.printed
+    assert EMPTY_TOML not in outcome.printed
     other = MAP.replace('purpose = "train"', f'purpose = "{lacks}"').replace("whole", "another")
-    assert EMPTY_TOML in imported(path, map_text=other).told
+    assert EMPTY_TOML in imported(path, map_text=other).printed
 
 
-def test_a_recording_that_no_file_matches_is_told(imported, pendulum, write_csv):
+def test_a_recording_that_no_file_matches_is_reported(imported, pendulum, write_csv):
     text = MAP + '[[recording]]\npurpose = "validate"\nfiles = "lgo*.csv"\n'
     outcome = imported(write_csv(pendulum.columns()), map_text=text)
     assert outcome.code == 0
-    assert 'recording[1] (validate) is of "lgo*.csv", and no file given is; left out' in outcome.err
+    assert 'recording[1] (validate): no given file matches "lgo*.csv"; left out' in outcome.err
 
 
 def test_a_recording_that_a_changed_map_no_longer_makes_is_named_and_kept(
@@ -111,7 +111,7 @@ def test_a_recording_that_a_changed_map_no_longer_makes_is_named_and_kept(
     assert imported(other, map_text=MAP.replace("whole", "other")).err == ""
 
 
-def test_somebody_elses_table_under_a_recordings_name_is_kept_and_named(
+def test_a_foreign_table_under_a_recordings_name_is_kept_and_named(
     imported, pendulum, write_csv, tmp_path
 ):
     path = tmp_path / "recordings" / "whole.parquet"
@@ -127,10 +127,10 @@ def test_somebody_elses_table_under_a_recordings_name_is_kept_and_named(
 
 
 def test_what_a_killed_import_left_is_named(imported, pendulum, write_csv, tmp_path):
-    left = tmp_path / "recordings" / ".abc.tmp"
-    left.mkdir(parents=True)
+    temporary = tmp_path / "recordings" / ".abc.tmp"
+    temporary.mkdir(parents=True)
     outcome = imported(write_csv(pendulum.columns()))
-    message = f"{left}: temporary file of an import that was killed"
+    message = f"{temporary}: temporary file of an import that was killed"
     assert (outcome.code, message in outcome.err) == (0, True)
 
 

@@ -36,8 +36,8 @@ def test_a_period_is_found_through_ramps_drift_jitter_and_encoder_steps(seed):
         multisine(rng, time, period) * np.minimum(time, 1.0)[:, np.newaxis]
         + 0.05 * time[:, np.newaxis] / time[-1]
     )
-    found = repeats_after(time, np.round(angle / 0.002) * 0.002)
-    assert found == pytest.approx(period, rel=5e-4)
+    period_s = repeats_after(time, np.round(angle / 0.002) * 0.002)
+    assert period_s == pytest.approx(period, rel=5e-4)
 
 
 def filtered_noise(rng, time):
@@ -97,15 +97,15 @@ def repeated(rng):
     }
 
 
-def test_a_guess_tells_the_period_of_each_file(tmp_path, write_csv, capsys):
+def test_a_guess_has_the_period_of_each_file(tmp_path, write_csv, capsys):
     rng = np.random.default_rng(3)
     log = repeated(rng)
     wandering = log | {"angle_rad": random_walk(rng, log["time"])}
     logs = [write_csv(log, "one.csv"), write_csv(wandering, "two.csv")]
     assert run(["import", *map(str, logs), "--guess"]) == 0
-    told = capsys.readouterr().out.split("[[recording]]")
-    assert "period_s = 8.0 " in told[1]
-    assert "# period_s: no motion repeats here" in told[2]
+    printed = capsys.readouterr().out.split("[[recording]]")
+    assert "period_s = 8.0 " in printed[1]
+    assert "# period_s: no motion repeats here" in printed[2]
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_a_set_point_is_counted_on_where_its_angle_is_and_not_where_it_steps_by_
         )
 
 
-def test_an_import_whose_map_tells_no_period_says_that_the_motion_repeats(imported, write_csv):
+def test_an_import_without_a_period_in_its_map_reports_that_the_motion_repeats(imported, write_csv):
     path = write_csv(repeated(np.random.default_rng(4)))
     text = """
         time = {column = "time", unit = "s"}
@@ -153,6 +153,6 @@ def test_an_import_whose_map_tells_no_period_says_that_the_motion_repeats(import
         [[recording]]
         purpose = "train"
     """
-    told = imported(path, map_text=text).told
-    assert "the motion repeats every 8 s, of which the map tells nothing" in told
-    assert "the motion repeats" not in imported(path, map_text=text + "period_s = 8.0").told
+    printed = imported(path, map_text=text).printed
+    assert "the motion repeats every 8 s, but the map has no period_s" in printed
+    assert "the motion repeats" not in imported(path, map_text=text + "period_s = 8.0").printed

@@ -66,7 +66,7 @@ def test_the_settings_page_is_current():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("[desing]\n", "desing: unknown key; did you mean design?"),
         ("[design]\nharmonic = 3\n", "design.harmonic: unknown key; did you mean harmonics?"),
@@ -128,32 +128,32 @@ def test_the_settings_page_is_current():
         ),
     ],
 )
-def test_a_bad_key_is_one_line_with_its_path(tmp_path, text, told):
+def test_a_bad_key_is_one_line_with_its_path(tmp_path, text, message):
     path = tmp_path / "exoid.toml"
     path.write_text(text)
     with pytest.raises(SettingsError) as caught:
         Experiment.load(path)
-    assert str(caught.value) == f"{path}: {told}"
+    assert str(caught.value) == f"{path}: {message}"
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (None, "no such file; `exoid init DIR` writes a commented one to start from"),
-        (b"a = [", "is not valid TOML: Invalid value (at end of document); mend that line"),
+        (b"a = [", "is not valid TOML: Invalid value (at end of document); correct that line"),
         (b"\xff\xfe", "is not UTF-8 text, expected a TOML file; save it as UTF-8"),
     ],
 )
-def test_what_is_no_toml_is_refused(tmp_path, content, told):
+def test_what_is_no_toml_is_refused(tmp_path, content, message):
     path = tmp_path / "exoid.toml"
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(SettingsError) as caught:
         Experiment.load(path)
-    assert str(caught.value) == f"{path}: {told}"
+    assert str(caught.value) == f"{path}: {message}"
 
 
-def test_an_unknown_run_is_told_with_the_known_ones():
+def test_an_unknown_run_is_reported_with_the_known_ones():
     with pytest.raises(SettingsError, match=r"exoid\.toml: has no \[\[run\]\] named with_human; "):
         Experiment().run_named("with_human")
 

@@ -1,28 +1,31 @@
-"""How a joint's columns were counted: in registers that lost their sign, or that start anew when
-they are full."""
+"""Counters in a log: registers that lost their sign, or that wrap around."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import TURNS
-from pipelines.importing.guess.register import lost_sign
+from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
+
+FEW = 0.001
+"""Least share of rows in the upper half of a signed register; fewer may be outliers."""
 
 
 @dataclass(frozen=True)
 class Counting:
-    """How a column was counted; nothing of what simply holds its numbers."""
+    """How a column was counted; both are None where it has plain numbers."""
 
     bits: int | None = None
-    """Of a signed register that was logged as if it had no sign."""
+    """Bits of a signed register that was logged as unsigned."""
     full: float | None = None
-    """Reading at which it starts anew."""
+    """Reading at which it wraps around to 0."""
 
     def undone(self, values: NDArray) -> NDArray:
-        """Return what was counted, (n,), in readings that go on."""
+        """Return readings (n,) with their sign and without wraparounds."""
         values = values.astype(float)
         if self.bits is not None:
             values = signed(values, self.bits, "", [])
@@ -32,17 +35,42 @@ class Counting:
 def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, Counting]:
     """Return how each quantity of a joint was counted, from a log's columns (n,)."""
     logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
-    found = {quantity: Counting(lost_sign(values)) for quantity, values in logged.items()}
+    counted = {quantity: Counting(lost_sign(values)) for quantity, values in logged.items()}
     unit = joint.columns["angle"].unit
     turns = [turn for name, turn in TURNS.items() if unit in (None, name)]
-    full = full_at(found["angle"].undone(logged["angle"]), turns)
+    full = full_at(counted["angle"].undone(logged["angle"]), turns)
     if full is None:
-        return found
-    found["angle"] = Counting(found["angle"].bits, full)
-    # A set-point may step by a turn, and so be told to; it starts anew only where the angle does.
-    if (
-        "reference" in found
-        and full_at(found["reference"].undone(logged["reference"]), turns) == full
-    ):
-        found["reference"] = Counting(found["reference"].bits, full)
-    return found
+        return counted
+    counted["angle"] = Counting(counted["angle"].bits, full)
+    # A set-point may also step by a turn on purpose. It wraps around only where the angle does.
+    reference = counted.get("reference")
+    if reference is not None and full_at(reference.undone(logged["reference"]), turns) == full:
+        counted["reference"] = Counting(reference.bits, full)
+    return counted
+
+
+def lost_sign(values: NDArray) -> int | None:
+    """Return the bits of a signed register that was logged as unsigned; None for other columns.
+
+    Its values are whole and never negative. Some are in the upper half of the register, some near
+    zero, and hardly any between.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    """
+    known = values[np.isfinite(values)]
+    if np.any(known < 0) or not are_whole(known):
+        return None
+    for bits in (16, 32):
+        full = 2.0**bits
+        # A little beyond, for digits that a float32 lost; values far beyond are of no register.
+        held = known[known <= 1.0001 * full]
+        upper = np.count_nonzero(held >= full / 2)
+        lower = np.count_nonzero(held < full / 2)
+        empty = np.count_nonzero((held > 0.4 * full) & (held < 0.6 * full)) < 0.01 * len(known)
+        common = upper >= FEW * len(known) or (bits == 32 and upper)
+        if common and lower and empty and len(held) > 0.98 * len(known):
+            return bits
+    return None

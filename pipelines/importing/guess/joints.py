@@ -1,4 +1,4 @@
-"""Which columns belong to one joint, and which of them is its angle, its velocity, its torque."""
+"""Group columns by joint, and choose those of its angle, velocity and torque."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -8,52 +8,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.guess.names import TWIN, Meaning, in_counts
-from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
+from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS
 
-TURNING, SLIDING = (
-    ("torque", "current", "force", "voltage"),
-    ("force", "torque", "current", "voltage"),
-)
-"""What may tell what the drive of a joint delivers, the best first."""
+TURNING = ("torque", "current", "force", "voltage")
+"""Quantities that show the torque of a revolute joint's drive, the best first."""
+SLIDING = ("force", "torque", "current", "voltage")
+"""Quantities that show the force of a prismatic joint's drive, the best first."""
 OBVIOUS = 0.9
-"""Share of the variance by which a velocity is known whatever its name."""
+"""Least share of the variance by which a velocity is recognised without a name."""
 FEW_PAIRS = 400
-"""So many pairs of columns are looked at one by one: twenty columns, each with each."""
+"""Number of pairs up to which all are compared: twenty columns, each with each."""
 MANY = 100.0
-"""So many counts a column goes over that is an encoder's, and no queue's."""
+"""Least range of an encoder's counts; the level of a queue has a smaller one."""
 FROM_THE_BASE = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-"""Joints of limbs, of which each carries those behind it."""
+"""Joints of limbs, of which each carries the following ones."""
 
 
 @dataclass(frozen=True)
 class JointColumns:
-    """The columns of one joint by quantity; what the log lacks is not there."""
+    """The columns of one joint, by the quantities that the log has."""
 
     name: str
     columns: Mapping[str, Meaning]
     why: Mapping[str, str]
-    """Of what was not found by its name alone."""
+    """Reasons for columns that were not chosen by name alone."""
     enabled: str | None = None
-    """Column of 0 and 1 that says whether its drive is on."""
+    """Column that is 1 while its drive is on, else 0."""
 
     @property
     def drive(self) -> str | None:
-        """The quantity that tells best what its drive delivers; None where none does."""
-        return next(
-            (
-                quantity
-                for quantity in (SLIDING if self.slides else TURNING)
-                if quantity in self.columns
-            ),
-            None,
-        )
+        """The quantity that shows best what its drive delivers, if any."""
+        quantities = SLIDING if self.slides else TURNING
+        return next((quantity for quantity in quantities if quantity in self.columns), None)
 
     @property
     def slides(self) -> bool:
-        """Whether the name of its angle says that it is a length."""
+        """Whether its angle is a length, by the unit in its name."""
         unit = self.columns["angle"].unit
         return unit is not None and UNITS[unit].dimension == "length"
 
@@ -61,77 +54,95 @@ class JointColumns:
 def group_joints(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray, clock: str
 ) -> list[JointColumns]:
-    """Return the joints of a log of columns (n,) at times (n,) s, in their columns' order, a limb's
-    from the body."""
+    """Group columns by joint.
+
+    Parameters
+    ----------
+    meanings : sequence of Meaning
+        Meanings of the columns' names.
+    columns : mapping of str to (n,) array
+        The columns.
+    time_s : (n,) array
+        Times, s.
+    clock : str
+        Column of the clock.
+
+    Returns
+    -------
+    list of JointColumns
+        Joints in the order of their columns, those of a limb from the body outwards.
+    """
+    rows = len(time_s)
+    enabled = [m for m in meanings if m.quantity == "enabled"]
+    switches = [m for m in enabled if _switches(columns[m.column], rows)]
     usable = [
         m
         for m in meanings
-        if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
+        if m not in enabled and m.column != clock and _moves(columns[m.column], rows)
     ]
-    switches = [
-        m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))
-    ]
-    told = any(found.quantity == "angle" and not found.commanded for found in usable)
-    if not told:
-        usable = [_counted(found, columns[found.column]) for found in usable]
-    by_joint: dict[str, list[Meaning]] = {}
-    for found in usable:
-        if found.quantity == "angle" and not found.commanded:
-            by_joint.setdefault(found.joint, [])
+    named = any(_is_angle(m) for m in usable)
+    if not named:
+        usable = [_counted(m, columns[m.column]) for m in usable]
+    by_joint: dict[str, list[Meaning]] = {m.joint: [] for m in usable if _is_angle(m)}
+    alone = len(by_joint) == 1
     if not by_joint:
-        return [
-            replace(one, enabled=_switch(switches, "", alone=True))
-            for one in _by_behaviour(usable, columns, time_s)
-        ]
-    for found in usable:
-        owner = found.joint if found.joint in by_joint else "" if "" in by_joint else None
-        if owner is None and len(by_joint) == 1:
-            owner = next(iter(by_joint))
+        switch = _switch(switches, "", alone=True)
+        return [replace(one, enabled=switch) for one in _by_behaviour(usable, columns, time_s)]
+    for meaning in usable:
+        owner = _owner(meaning, by_joint)
         if owner is not None:
-            by_joint[owner].append(found)
+            by_joint[owner].append(meaning)
     joints = [
         replace(
-            _joint(name, members, number, len(by_joint)),
-            enabled=_switch(switches, name, len(by_joint) == 1),
+            _joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, alone)
         )
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
-    return sorted(joints if told else map(_told_by_counts, joints), key=_place)
+    return sorted(joints if named else map(_with_reason_of_counts, joints), key=_place)
+
+
+def _is_angle(meaning: Meaning) -> bool:
+    return meaning.quantity == "angle" and not meaning.commanded
+
+
+def _owner(meaning: Meaning, by_joint: Mapping[str, list[Meaning]]) -> str | None:
+    """Return the joint of a column; without a name of its own it belongs to the only joint."""
+    if meaning.joint in by_joint:
+        return meaning.joint
+    if "" in by_joint:
+        return ""
+    return next(iter(by_joint)) if len(by_joint) == 1 else None
 
 
 def _place(joint: JointColumns) -> int:
-    """Return where a joint stands in its limb; nought where its name does not say."""
-    return next(
-        (place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower()), 0
-    )
+    """Return the place of a joint in its limb; 0 where its name has none."""
+    places = (place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower())
+    return next(places, 0)
 
 
-def order_is_told(joints: Sequence[JointColumns]) -> bool:
-    """Tell whether the names of joints say which carries which: places in a limb, or numbers."""
+def order_is_known(joints: Sequence[JointColumns]) -> bool:
+    """Return whether the names of joints give their order: places in a limb, or numbers."""
+    if len(joints) == 1 or all(re.search(r"\d+", joint.name) for joint in joints):
+        return True
     places = [_place(joint) for joint in joints]
-    numbered = [re.search(r"\d+", joint.name) for joint in joints]
-    return (
-        len(joints) == 1 or (0 not in places and len(set(places)) == len(places)) or all(numbered)
-    )
+    return 0 not in places and len(set(places)) == len(places)
 
 
-def _counted(found: Meaning, values: NDArray) -> Meaning:
-    """Return a column as an angle where that is what it may count; what never goes back counts
-    events, or time."""
+def _counted(meaning: Meaning, values: NDArray) -> Meaning:
+    """Return a column as an angle if it may be an encoder's; counts of events never decrease."""
     known = values[np.isfinite(values)].astype(float)
     swings = are_whole(known) and np.ptp(known) > MANY and np.any(np.diff(known) < 0.0)
-    return (in_counts(found) or found) if swings else found
+    return (in_counts(meaning) or meaning) if swings else meaning
 
 
-def _told_by_counts(joint: JointColumns) -> JointColumns:
-    rather = joint.why.get("angle")
-    why = "no name says angle, but this one is in counts" + (f", {rather}" if rather else "")
+def _with_reason_of_counts(joint: JointColumns) -> JointColumns:
+    others = joint.why.get("angle")
+    why = "no name contains angle, but this column is in counts" + (f", {others}" if others else "")
     return replace(joint, why={**joint.why, "angle": why})
 
 
 def _switches(values: NDArray, rows: int) -> bool:
-    """Tell whether a column holds 0 and 1 alone, and not 0 alone: then it would say that the drive
-    never was on."""
+    """Return whether a column has only 0 and 1, and 1 at least once."""
     if values.dtype.kind not in "biuf" or len(values) != rows:
         return False
     known = values.astype(float)
@@ -140,20 +151,20 @@ def _switches(values: NDArray, rows: int) -> bool:
 
 
 def _switch(switches: Sequence[Meaning], joint: str, alone: bool) -> str | None:
-    """Return the switch of a joint: its own, else that of all, which names none."""
+    """Return the switch of a joint: its own, else one without a joint in its name."""
     own = [m.column for m in switches if m.joint == joint]
     of_all = [m.column for m in switches if alone or not m.joint]
     return next(iter([*own, *of_all]), None)
 
 
 def _moves(values: NDArray, rows: int) -> bool:
-    """Tell whether a column holds numbers that change, but do not merely count the rows."""
+    """Return whether a column has numbers that change, other than row numbers."""
     if values.dtype.kind not in "iuf" or len(values) != rows:
         return False
     known = values[np.isfinite(values)].astype(float)
-    return (
-        bool(len(known)) and bool(np.ptp(known) > 0.0) and not bool(np.all(np.diff(known) == 1.0))
-    )
+    if not len(known) or np.ptp(known) == 0.0:
+        return False
+    return not np.all(np.diff(known) == 1.0)
 
 
 def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> JointColumns:
@@ -167,9 +178,8 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
         others = [m.column for m in candidates[1:]]
         if others:
             twin = TWIN.sub("", others[0]) == TWIN.sub("", candidates[0].column)
-            why[quantity] = (
-                f"{'no name says which, ' if twin else ''}rather than {', '.join(others)}"
-            )
+            doubt = "no name shows which, " if twin else ""
+            why[quantity] = f"{doubt}rather than {', '.join(others)}"
     named = key if key and key[0].isalpha() else ""
     return JointColumns(named or (f"joint{number}" if joints > 1 else "joint"), chosen, why)
 
@@ -177,79 +187,61 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
 def _by_behaviour(
     usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
 ) -> list[JointColumns]:
-    """Return one joint of columns whose names tell nothing: what integrates to what, what follows
-    the motion."""
-    # Of a single sine the angle integrates to the velocity too, but with the other sign.
-    pairs = [
-        (agreement.explained, angle, velocity)
-        for angle, velocity in _pairs(usable, columns, time_s)
-        if (
-            agreement := integral_agreement(
-                time_s, _float(columns, angle), _float(columns, velocity)
-            )
-        )
-        is not None
-        and agreement.slope > 0.0
-    ]
+    """Return one joint of columns without meaningful names, by integrals and by a torque fit."""
+    pairs = []
+    for angle, velocity in _pairs(usable, columns, time_s):
+        agreement = integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))
+        # For a single sine the angle integrates to the velocity, too, but with a negative slope.
+        if agreement is not None and agreement.slope > 0.0:
+            pairs.append((agreement.explained, angle, velocity))
     best = max(pairs, key=lambda pair: pair[0], default=None)
     if best is None or best[0] < OBVIOUS:
         return []
     share, angle, velocity = best
     rest = [m for m in usable if m not in (angle, velocity)]
-    found = _joint("", [m for m in rest if m.quantity not in ("", "velocity")], 1, 1)
+    joint = _joint("", [m for m in rest if m.quantity not in ("", "velocity")], 1, 1)
     why = {
-        "angle": (
-            f"no name says so, but {velocity.column} integrates to it ({share:.0%} of its variance)"
-        ),
-        "velocity": f"no name says so, but it integrates to {angle.column}",
+        "angle": f"no name, but {velocity.column} integrates to it ({share:.0%} of its variance)",
+        "velocity": f"no name, but it integrates to {angle.column}",
     }
     joint = replace(
-        found,
-        columns={**found.columns, "angle": angle, "velocity": velocity},
-        why={**found.why, **why},
+        joint,
+        columns={**joint.columns, "angle": angle, "velocity": velocity},
+        why={**joint.why, **why},
     )
-    return [
-        (
-            joint
-            if joint.drive
-            else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)
-        )
-    ]
+    if joint.drive:
+        return [joint]
+    return [_with_torque(joint, [m for m in rest if not m.quantity], columns, time_s)]
 
 
 def _pairs(
     usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
 ) -> list[tuple[Meaning, Meaning]]:
-    """Return every pair of columns that may be angle and velocity; of many columns the likeliest
-    pairs."""
+    """Return the pairs of columns that may be angle and velocity; of many only the likeliest."""
     angles = [m for m in usable if not m.quantity]
     velocities = [m for m in usable if m.quantity in ("", "velocity")]
     if len(angles) * len(velocities) <= FEW_PAIRS:
-        found = [(angle, velocity) for angle in angles for velocity in velocities]
+        pairs = [(angle, velocity) for angle in angles for velocity in velocities]
     else:
         logged = ([_float(columns, m) for m in members] for members in (angles, velocities))
-        found = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]
-    return [(angle, velocity) for angle, velocity in found if angle is not velocity]
+        pairs = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]
+    return [(angle, velocity) for angle, velocity in pairs if angle is not velocity]
 
 
-def _with_a_torque(
+def _with_torque(
     joint: JointColumns,
     nameless: Sequence[Meaning],
     columns: Mapping[str, NDArray],
     time_s: NDArray,
 ) -> JointColumns:
-    """Return a joint with the column for its torque that follows the motion best, where one does at
-    all."""
+    """Return a joint with the column for its torque that follows the motion best, if any does."""
     angle = _float(columns, joint.columns["angle"])
-    fits = [
-        (fit.explained, m)
-        for m in nameless
-        if (fit := fit_torque(time_s, angle, _float(columns, m))) is not None
-    ]
-    if not fits:
+    fits = [(fit_torque(time_s, angle, _float(columns, m)), m) for m in nameless]
+    shares = [(fit.explained, m) for fit, m in fits if fit is not None]
+    if not shares:
         return joint
-    share, torque = max(fits, key=lambda one: one[0])
-    why = f"no name says so, but it follows the motion best ({share:.0%} of its variance)"
+    share, torque = max(shares, key=lambda one: one[0])
+    why = f"no name, but it follows the motion best ({share:.0%} of its variance)"
     return replace(
         joint, columns={**joint.columns, "torque": torque}, why={**joint.why, "torque": why}
     )

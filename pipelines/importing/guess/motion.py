@@ -1,5 +1,4 @@
-"""Units of angle and velocity: from names, from what integrates to what, from the encoder's steps,
-from ranges."""
+"""Units of angle and velocity: from names, integrals, the encoder's steps, and ranges."""
 
 from dataclasses import dataclass
 
@@ -7,21 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.importing.guess.register import are_whole
 from pipelines.importing.quantities.consistency import Agreement, integral_agreement
+from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS
 
+FROM_NAME = "from its name"
+"""Reason for a unit that is in the name of its column."""
 NEAR = 0.12
-"""By so much a slope may be off that of two units: drives filter their velocities."""
+"""Largest relative error of a slope, as drives filter their velocities."""
 MANY = 100.0
-"""So many counts are no degrees."""
+"""Least reach of whole numbers that are surely counts, not degrees."""
 CLEAR = 0.7
-"""Share of the variance that has to be in common for a slope to count."""
+"""Least share of the variance that angle and velocity share if they are of one joint."""
 LEAST_GEAR, MOST_GEAR = 1.5, 1000.0
-"""Ratios that a gear has between a motor and a joint."""
+"""Usual ratios of a gear between motor and joint."""
 WHOLE = 0.01
-"""So near to a whole number, as its share, a ratio is taken for it: drives filter their
-velocities."""
+"""Relative distance within which a gear ratio is rounded to a whole number."""
 VELOCITY_OF = {
     "rad": "rad/s",
     "mrad": "mrad/s",
@@ -38,14 +38,14 @@ ANGLES, VELOCITIES = (
     ("rad", "deg", "rev", "m", "mm"),
     ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s"),
 )
-"""Units that a log may be in without saying so."""
+"""Units that are tried where no name has one."""
 TURNS = {"rad": 2.0 * np.pi, "mrad": 2000.0 * np.pi, "deg": 360.0, "rev": 1.0}
 """A full turn in each unit."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """Units of an angle and of its velocity, each with why and whether it is sure."""
+    """Units of an angle and its velocity, each with its reason and whether it is sure."""
 
     angle: str
     why: str
@@ -55,7 +55,7 @@ class Units:
     velocity_sure: bool = True
     velocity_sign: int = 1
     gear: float = 1.0
-    """Turns of what the velocity is of for one of what the angle is of."""
+    """Turns of the velocity's shaft for one turn of the angle's."""
 
 
 def guess_units(
@@ -65,17 +65,28 @@ def guess_units(
     velocity: NDArray | None,
     velocity_named: str | None,
 ) -> Units:
-    """Return the units of an angle and its velocity, (n,) each as logged; names say more than
-    numbers."""
+    """Return the units of an angle and its velocity; names take precedence over numbers.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle : (n,) array
+        Angle as logged.
+    named : str or None
+        Unit in the name of its column.
+    velocity : (n,) array or None
+        Velocity as logged.
+    velocity_named : str or None
+        Unit in the name of its column.
+    """
     unit, why, sure = _angle_unit(angle, named)
     if velocity is None:
         return Units(unit, why, sure)
     agreement = integral_agreement(time_s, angle, velocity)
     if agreement is None or agreement.explained < CLEAR:
         share = 0.0 if agreement is None else agreement.explained
-        doubt = (
-            f"does not integrate to the angle ({share:.0%} of its variance): is it of this joint?"
-        )
+        doubt = f"does not integrate to the angle ({share:.0%} of its variance)"
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
     if unit == "counts":
         return Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
@@ -85,22 +96,20 @@ def guess_units(
 def _velocity_of_counts(named: str | None, slope: float) -> tuple[str, str, bool, int]:
     sign = int(np.sign(slope))
     if named:
-        return named, "its name says so", True, sign
+        return named, FROM_NAME, True, sign
     if abs(abs(slope) - 1.0) < NEAR:
         return "counts/s", f"integrates to {slope:.4g} of the angle", True, sign
-    why = "the angle is in counts; in what the velocity is, their slope alone does not say"
+    why = "the angle is in counts, so their slope does not show the velocity's unit"
     return "counts/s", why, False, sign
 
 
 def _from_slope(
     agreement: Agreement, unit: str, why: str, sure: bool, velocity_named: str | None
 ) -> Units:
-    """Return the pair of units that explains how much velocity integrates to a unit of angle."""
+    """Return the pair of units that explains the integral of velocity per unit of angle."""
     slope, sign = abs(agreement.slope), int(np.sign(agreement.slope))
-    said = (
-        f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its"
-        " variance)"
-    )
+    explained = f"of the angle ({agreement.explained:.0%} of its variance)"
+    reason = f"integrates to {agreement.slope:.4g} {explained}"
     fitting = [
         (one, other)
         for one in dict.fromkeys((*ANGLES, unit))
@@ -110,39 +119,30 @@ def _from_slope(
     ]
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
-        of_it = sign * _turns(slope, *same[0])
-        in_units = (
-            f"integrates to {of_it:.4g} of the angle ({agreement.explained:.0%} of its variance)"
-        )
+        in_units = f"integrates to {sign * _turns(slope, *same[0]):.4g} {explained}"
         return Units(unit, why, sure, same[0][1], in_units, True, sign)
     if fitting and not sure:
         other, velocity = fitting[0]
-        return Units(other, f"fits the velocity, which {said}", False, velocity, said, False, sign)
-    if sure and velocity_named and (ratio := _gear(slope, unit, velocity_named)):
-        geared = f"{said}, as of a motor that turns {ratio:g} times for one turn of the joint"
-        if misnamed := _misnamed(slope, unit, velocity_named):
-            geared += f"; or it is in {misnamed}, whatever its name says"
-        return Units(unit, why, sure, velocity_named, geared, False, sign, ratio)
-    return Units(
-        unit,
-        why,
-        sure,
-        velocity_named or VELOCITY_OF[unit],
-        f"{said}, which no units explain",
-        False,
-        sign,
-    )
+        why = f"fits the velocity, which {reason}"
+        return Units(other, why, False, velocity, reason, False, sign)
+    ratio = _gear(slope, unit, velocity_named) if sure and velocity_named else None
+    if ratio and velocity_named:
+        reason += f", as of a motor that turns {ratio:g} times for one turn of the joint"
+        misnamed = _misnamed(slope, unit, velocity_named)
+        if misnamed:
+            reason += f"; or it is in {misnamed} despite its name"
+        return Units(unit, why, sure, velocity_named, reason, False, sign, ratio)
+    velocity = velocity_named or VELOCITY_OF[unit]
+    return Units(unit, why, sure, velocity, f"{reason}, which no units explain", False, sign)
 
 
 def _turns(slope: float, unit: str, velocity: str) -> float:
-    """Return how far what a velocity is of goes while what an angle is of goes one, in those
-    units."""
+    """Return the turns of the velocity's shaft for one of the angle's, in those units."""
     return slope * UNITS[velocity].factor / UNITS[unit].factor
 
 
 def _gear(slope: float, unit: str, velocity: str) -> float | None:
-    """Return the gear that a slope tells where both units are known, in few digits; None where it
-    would be none."""
+    """Return the gear ratio of a slope where both units are known; None if it is unusual."""
     if UNITS[unit].dimension != "angle" or UNITS[velocity].dimension != "angular velocity":
         return None
     ratio = _turns(slope, unit, velocity)
@@ -151,8 +151,7 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
 
 
 def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
-    """Return the unit that a speed would be in were it no motor's; None where none makes such a
-    slope."""
+    """Return another unit of the velocity that explains a slope without a gear, if any."""
     fitting = (
         other
         for other in VELOCITIES
@@ -166,8 +165,19 @@ def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
 def counts_in_a_turn(
     time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str
 ) -> float | None:
-    """Return the counts in a turn of what the velocity is of, an angle (n,) being in counts; None
-    where none says."""
+    """Return the counts in a turn of the velocity's shaft; None where it does not integrate.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle : (n,) array
+        Angle in counts.
+    velocity : (n,) array
+        Velocity as logged.
+    velocity_unit : str
+        Its unit.
+    """
     if UNITS[velocity_unit].dimension != "angular velocity":
         return None
     agreement = integral_agreement(time_s, angle, velocity)
@@ -178,7 +188,7 @@ def counts_in_a_turn(
 
 def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
     if named is not None:
-        return named, "its name says so", True
+        return named, FROM_NAME, True
     known = angle[np.isfinite(angle)]
     reach = float(np.max(np.abs(known)))
     if are_whole(known):
@@ -187,18 +197,14 @@ def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
     if by_step is not None:
         return by_step
     if reach > LARGEST_ANGLE_RAD:
-        return (
-            "deg",
-            f"reaches {reach:.4g}, which in rad would be {reach / (2 * np.pi):.1f} turns",
-            False,
-        )
-    in_degrees = f"in degrees that would be {np.radians(reach):.2g} rad"
-    return "rad", f"reaches {reach:.4g}; {in_degrees}. No name says its unit", False
+        turns = reach / (2 * np.pi)
+        return "deg", f"reaches {reach:.4g}, in rad {turns:.1f} turns", False
+    in_degrees = f"in degrees only {np.radians(reach):.2g} rad"
+    return "rad", f"reaches {reach:.4g}, {in_degrees}; no name has its unit", False
 
 
 def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
-    """Return the unit in which an encoder's steps divide a turn into a power of two; None where
-    none does."""
+    """Return the unit in which an encoder's steps divide a turn into a power of two, if any."""
     steps = np.abs(np.diff(np.unique(known)))
     steps = steps[steps > 1e-9 * np.ptp(known)] if len(steps) else steps
     if len(steps) < 5:

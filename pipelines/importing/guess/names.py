@@ -1,5 +1,4 @@
-"""What the name of a column says: its quantity, its joint, its unit, and whether it was
-measured."""
+"""The meaning of a column's name: quantity, joint, unit, and whether it was measured."""
 
 import re
 import unicodedata
@@ -34,8 +33,7 @@ WORDS: dict[str, frozenset[str]] = {
         "force": "force load kraft last",
     }.items()
 }
-"""Words for each quantity, English, German and French; the first that has one of a name's is
-meant."""
+"""Words for each quantity, English, German and French; the first that matches a name counts."""
 COMMANDED = _words(
     "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll"
     " sollwert consigne"
@@ -46,32 +44,32 @@ ENABLED = _words("enable enabled servoon")
 """Words of a switch of the drive; ``servo_on`` and the like are two."""
 SWITCHED = _words("servo drive motor torque power")
 DRIVES = _words("motor drive servo mot moteur antrieb actuator aktor")
-"""What is fed by a current: ``motor_A`` is one, ``joint_A`` is a joint."""
+"""Words before a unit of current: ``motor_A`` is a current, ``joint_A`` a joint."""
 SOMETHING_ELSE = _words(
     "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag"
     " limit bus supply battery imu gyro grenze fehler schleppfehler schleppabstand abweichung"
     " nummer zustand modus zwischenkreis batterie versorgung ecart erreur etat"
 )
-"""Words that make of a torque or a position something else."""
+"""Words that change the meaning of a torque or a position."""
 CONTAINERS = _words("state status")
-"""Those of them that are what holds it in ``state.q``, a name within a name."""
+"""Those of them that are only the container in a nested name, as in ``state.q``."""
 TALLIES = _words(
     "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu"
     " index fifo buffer queue missed lost dropped crc zyklus takt"
 )
-"""Words of what is counted, or told in counts, and is no angle."""
+"""Words of quantities in counts that are no angles."""
 NOISE = _words(
     "joint joints axis motor drive epos j m data value values log state states of in raw abs"
     " absolute wrapped present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur"
     " axe articulation de du la le en"
 )
-"""Words that tell nothing of which joint it is."""
+"""Words that are no part of a joint's name."""
 JOINTS = {"huefte": "hip", "hueft": "hip", "hanche": "hip", "knie": "knee", "genou": "knee"}
-"""A leg's joints, whose names exoid knows."""
+"""Translations of a leg's joints."""
 SLIDES = _words("position displacement travel stroke weg hub course")
-"""Words of what may be in metres; the m of ``theta_m`` is a motor's."""
+"""Words of positions in metres; the m of ``theta_m`` is a motor's."""
 TWIN = re.compile(r"#\d+$")
-"""What tells columns of one name apart."""
+"""Number of columns with the same name."""
 UMLAUTS = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
 )
@@ -79,7 +77,7 @@ SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
 AXES = _words("x y z")
 SIGNS = _words("n v w s f")
-"""Formula signs, which are no joint's name where a unit says what they stand for: ``n (1/min)``."""
+"""Symbols that are no joint's name where a unit follows, as in ``n (1/min)``."""
 DIMENSIONS = {
     **{
         quantity: {dimension for dimension, of in QUANTITIES.items() if of == quantity}
@@ -89,19 +87,19 @@ DIMENSIONS = {
     "torque": {"torque", "force", "current", "voltage", "share"},
     "force": {"force", "share"},
 }
-"""Dimensions of the units that each quantity may be told in."""
+"""Dimensions of the units that each quantity may have."""
 KNOWN = frozenset().union(*WORDS.values(), COMMANDED, FILTERED, MEASURED, NOISE, SOMETHING_ELSE)
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a column's name says of it."""
+    """The meaning of a column's name."""
 
     column: str
     quantity: str
-    """One of WORDS, ``reference``, ``enabled``, or empty where the name tells nothing."""
+    """One of WORDS, ``reference``, ``enabled``, or empty where unknown."""
     joint: str
-    """What is left of the name: the joint's name or number."""
+    """Name or number of the joint: the words with no other meaning."""
     unit: str | None
     commanded: bool
     filtered: bool
@@ -109,101 +107,102 @@ class Meaning:
 
     @property
     def rank(self) -> int:
-        """How good it is as a measurement: what was measured, what may have been, what was
-        filtered, commanded."""
+        """Order of preference: measured, perhaps measured, filtered, commanded."""
         return 3 * self.commanded + 2 * self.filtered + (not self.measured)
 
 
 def meanings(names: Iterable[str]) -> list[Meaning]:
-    """Return what each name says."""
+    """Return the meaning of each name."""
     return [meaning(name) for name in names]
 
 
 def meaning(name: str) -> Meaning:
-    """Return what a name says."""
+    """Return the meaning of a name."""
     plain = TWIN.sub("", name)
-    told = unit_in(plain)
-    words = _split(told.rest if told else plain)
+    in_name = unit_in(plain)
+    words = _split(in_name.rest if in_name else plain)
     quantity = _quantity(set(words))
-    if told is not None and not (told.decides or _confirms(told, quantity, set(words))):
-        told, words = None, _split(plain)
+    if in_name and not (in_name.decides or _confirms(in_name, quantity, set(words))):
+        in_name, words = None, _split(plain)
         quantity = _quantity(set(words))
-    said = set(words) - _containers(plain)
-    if told is not None:
-        quantity = told.quantity or (quantity if told.unit else "")
+    distinct = set(words) - _containers(plain)
+    unit = None
+    if in_name:
+        unit = in_name.unit
+        quantity = in_name.quantity or (quantity if unit else "")
         words = [word for word in words if word not in SIGNS]
-    commanded = bool(said & COMMANDED)
-    if said & SOMETHING_ELSE or {"i", "d"} <= said:
+    commanded = bool(distinct & COMMANDED)
+    if distinct & SOMETHING_ELSE or {"i", "d"} <= distinct:
         quantity = ""
-    elif said & ENABLED or ("on" in said and said & SWITCHED):
-        quantity, words = (
-            "enabled",
-            [word for word in words if word not in ENABLED | SWITCHED | {"on"}],
-        )
+    elif distinct & ENABLED or ("on" in distinct and distinct & SWITCHED):
+        quantity = "enabled"
+        words = [word for word in words if word not in ENABLED | SWITCHED | {"on"}]
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
-    unit = (
-        told.unit
-        if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ())
-        else None
-    )
+    if unit and UNITS[unit].dimension not in DIMENSIONS.get(quantity, ()):
+        unit = None
     return Meaning(
-        name, quantity, _joint(words), unit, commanded, bool(said & FILTERED), bool(said & MEASURED)
+        name,
+        quantity,
+        _joint(words),
+        unit,
+        commanded,
+        filtered=bool(distinct & FILTERED),
+        measured=bool(distinct & MEASURED),
     )
 
 
 def _containers(name: str) -> set[str]:
-    """Return the words of a name within a name that tell only what holds it."""
+    """Return the words of a nested name that are only its container."""
     outer, _, inner = name.replace("/", ".").rpartition(".")
     return set(_split(outer)) & CONTAINERS - set(_split(inner))
 
 
-def in_counts(found: Meaning) -> Meaning | None:
-    """Return a column as an angle where its name says nothing but that it is in counts; None where
-    it says else."""
-    told = unit_in(TWIN.sub("", found.column))
-    if found.quantity or told is None or told.unit != "counts":
+def in_counts(column: Meaning) -> Meaning | None:
+    """Return a column as an angle if its name has a unit of counts and no other meaning."""
+    in_name = unit_in(TWIN.sub("", column.column))
+    if column.quantity or in_name is None or in_name.unit != "counts":
         return None
-    words = [word for word in _split(told.rest) if word not in SIGNS]
+    words = [word for word in _split(in_name.rest) if word not in SIGNS]
     if set(words) & (SOMETHING_ELSE | TALLIES) or _quantity(set(words)):
         return None
-    return replace(found, quantity="angle", joint=_joint(words), unit="counts")
+    return replace(column, quantity="angle", joint=_joint(words), unit="counts")
 
 
 def _joint(words: Iterable[str]) -> str:
-    """Return what words leave of a name that others know all of: the joint's."""
+    """Return the words without another meaning, joined: the joint's name."""
     return "_".join(JOINTS.get(word, word) for word in words if word not in KNOWN)
 
 
 def _quantity(words: set[str]) -> str:
-    """Return what words say, empty where they say nothing."""
-    found = [quantity for quantity, known in WORDS.items() if known & words]
-    if not found:
+    """Return the quantity of some words, empty where unknown."""
+    quantities = [quantity for quantity, known in WORDS.items() if known & words]
+    if not quantities:
         return ""
-    # The current position is where it is now.
-    proper = [quantity for quantity in found if WORDS[quantity] & words - SYMBOLS - {"current"}]
-    return proper[0] if "current" in words and proper else found[0]
+    # "Current" may mean present, as in "current position".
+    others = [one for one in quantities if WORDS[one] & words - SYMBOLS - {"current"}]
+    return others[0] if "current" in words and others else quantities[0]
 
 
-def _confirms(told: UnitInName, quantity: str, words: set[str]) -> bool:
-    """Tell whether a letter or a word that may be a unit fits what the other words say."""
-    if told.unit == "m":
+def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
+    """Return whether a letter or word that may be a unit fits the other words."""
+    if in_name.unit == "m":
         return bool(words & SLIDES)
-    if told.quantity == "temperature":
+    if in_name.quantity == "temperature":
         return quantity == "temperature" or "t" in words
-    if told.quantity == "time":
-        return quantity == "time" or (not quantity and told.unit != "s")
-    if not told.quantity:
+    if in_name.quantity == "time":
+        return quantity == "time" or (not quantity and in_name.unit != "s")
+    if not in_name.quantity:
         return quantity in ("torque", "current")
-    if told.quantity == "force" and "f" in words:
+    if in_name.quantity == "force" and "f" in words:
         return True
-    if told.unit == "A" and not quantity:
+    if in_name.unit == "A" and not quantity:
         return bool(words & DRIVES)
-    return told.quantity == ("angle" if words & COMMANDED and not quantity else quantity)
+    return in_name.quantity == ("angle" if words & COMMANDED and not quantity else quantity)
 
 
 def _split(name: str) -> list[str]:
-    """Return the words of a name in plain small letters, compounds like Motordrehzahl apart."""
+    """Return the words of a name in lower case, with compounds like Motordrehzahl split."""
     plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)
     plain = "".join(
         letter
@@ -215,18 +214,13 @@ def _split(name: str) -> list[str]:
 
 
 def _words_in(bracket: re.Match[str]) -> str:
-    """Return what stands in brackets where it is words, ``(hip)``, and nothing where it is a unit
-    that nobody knows."""
-    return (
-        f" {bracket[1]} "
-        if re.fullmatch(r"[^\W\d_]{3,}(\s+[^\W\d_]{3,})*|\d*", bracket[1].strip())
-        else " "
-    )
+    """Return the words in brackets, as in ``(hip)``; a blank for an unknown unit."""
+    is_words = re.fullmatch(r"[^\W\d_]{3,}(\s+[^\W\d_]{3,})*|\d*", bracket[1].strip())
+    return f" {bracket[1]} " if is_words else " "
 
 
 def _apart(word: str) -> list[str]:
-    """Return the parts of a compound whose last is known, and whose first is or leaves no doubt
-    about the last."""
+    """Return the parts of a compound whose last part is known, and long or after a known one."""
     if word not in KNOWN and word[:-3] in SYMBOLS | AXES and word[-3:] in COMMANDED:
         return [word[:-3], word[-3:]]  # xref
     if word in KNOWN or len(word) < 6:

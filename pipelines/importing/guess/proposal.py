@@ -1,21 +1,21 @@
-"""A map that is proposed: each line with its reason, and whether it is sure."""
+"""A proposed map: each line with its reason, and whether it is sure."""
 
 import json
 from dataclasses import dataclass, field
 from typing import Any
 
 COLUMN = 44
-"""Where reasons begin."""
+"""Column of the text at which reasons begin."""
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """Something that somebody who knows the machine must look at."""
+    """A choice to be checked by a person who knows the machine."""
 
     key: str
     why: str
     blocks: bool
-    """Whether the map cannot be used before it is answered."""
+    """Whether the map cannot be used before it is filled in."""
 
 
 @dataclass
@@ -27,23 +27,23 @@ class Proposal:
     _table: str = ""
 
     def remark(self, text: str) -> None:
-        """Add a line that is for the reader alone."""
+        """Add a comment."""
         self.lines.append(f"# {text}")
 
     def table(self, heading: str, where: str) -> None:
-        """Begin a table; ``where`` is what doubts about its keys call it."""
+        """Begin a table; ``where`` is its name in doubts."""
         self.lines += ["", heading]
         self._table = where
 
     def key(self, name: str, value: Any, why: str = "", sure: bool = True) -> None:
-        """Add a key with its value and why it is so."""
+        """Add a key with its value and the reason for it."""
         if not sure:
             self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks=False))
         text = f"{name} = {json.dumps(value, ensure_ascii=False)}"
         self.lines.append(_with_reason(text, why if sure else f"UNSURE: {why}"))
 
     def unknown(self, name: str, why: str, blocks: bool = True) -> None:
-        """Add a key whose value no log tells, as a comment to be filled in."""
+        """Add a key whose value is in no log, as a comment to be filled in."""
         self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks))
         self.lines.append(_with_reason(f"# {name} = ", f"FILL IN: {why}"))
 

@@ -1,4 +1,4 @@
-"""Which column is the clock, and in which unit."""
+"""Choose the column of the clock, and its unit."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -7,20 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.importing.guess.motion import FROM_NAME
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.time import clock
 from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9
-"""Share of the steps of a clock that go forward."""
-ALIKE, UNEVEN = 2.0, 0.1
-"""Stamps have as many rows as usual, and are as far apart, within this factor; of how many may have
-others."""
+"""Least share of the steps of a clock that go forward."""
+USUAL = 2.0
+"""Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
+UNEVEN = 0.1
+"""Largest share of stamps of a coarse clock that are not usual."""
 NEAR = 0.1
-"""By so much the rates of two clocks of the same rows may differ, as a share."""
-SAID = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
-"""Why a unit is that which the file tells."""
+"""Largest relative difference between the rates of two clocks of the same rows."""
+TYPES = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
+"""Reasons for units that are given by the type of a column."""
 
 
 @dataclass(frozen=True)
@@ -35,114 +37,123 @@ class TimeGuess:
     wraps_at: float | None
     restarts: bool
     rate_hz: float | None = None
-    """Of rows that are uniform, where the clock is too coarse to tell them apart."""
+    """Rate of uniform rows, where the clock is too coarse; else None."""
     pause_s: float = 0.0
-    """The longest that a coarse clock went on without rows."""
+    """Longest step of a coarse clock without rows, s."""
 
     def stamps(self, values: NDArray) -> NDArray:
-        """Return the stamps of rows (n,) in the clock's unit, from what stands in its column."""
-        return (
-            values
-            if self.rate_hz is None
-            else np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
-        )
+        """Return the stamps of rows (n,) in the clock's unit, from the values of its column."""
+        if self.rate_hz is None:
+            return values
+        return np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
 
 
 def guess_time(
-    meanings: Sequence[Meaning], columns: Mapping[str, NDArray], told: Mapping[str, str]
+    meanings: Sequence[Meaning], columns: Mapping[str, NDArray], typed: Mapping[str, str]
 ) -> TimeGuess | None:
-    """Return the clock among columns (n,), in ``told`` units where the file says them; None where
-    none is one."""
-    advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
-    named_so = [meaning for meaning in meanings if meaning.quantity == "time"]
+    """Return the clock of a log.
+
+    Parameters
+    ----------
+    meanings : sequence of Meaning
+        Meanings of the columns' names.
+    columns : mapping of str to (n,) array
+        The columns.
+    typed : mapping of str to str
+        Units of columns that are dates or durations.
+
+    Returns
+    -------
+    TimeGuess or None
+        None where no column is a clock.
+    """
+    advancing = [m for m in meanings if _advances(columns[m.column])]
     coarse = [
         m
-        for m in named_so
-        if _stands_still(columns[m.column]) and _is_even(columns[m.column].astype(float))
+        for m in meanings
+        if m.quantity == "time"
+        and _stands_still(columns[m.column])
+        and _is_even(columns[m.column].astype(float))
     ]
-    named = [meaning for meaning in advancing if meaning.quantity == "time"]
-    candidates = named or _finer(advancing, coarse, columns, told) or coarse or advancing
-    for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
-        values = columns[found.column].astype(float)
-        step = _step(values, found in coarse)
-        fitting = clock.usual_units(step)
-        unit = _unit(found, told)
-        if unit is None and not fitting:
-            continue
-        chosen = unit or fitting[0]
-        rate_hz = _rate_hz(step, chosen)
-        rate = f"{rate_hz:.4g} Hz"
-        said = SAID.get(told.get(found.column, ""), "its name says so") if unit else ""
-        why = (
-            f"{said}: {rate}"
-            if said
-            else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
-        )
-        called_so = found.quantity == "time"
-        wraps_at, restarts = _breaks(values, chosen)
-        usual = _is_usual(rate_hz)
-        why += "" if called_so else "; no name says which column is the time"
-        why += (
-            ""
-            if usual
-            else (
-                ", at which no machine is sampled: is it"
-                f" {' or '.join(fitting) or 'another column'}?"
-            )
-        )
-        pause_s = _longest_pause(values) * UNITS[chosen].factor if found in coarse else 0.0
-        even = rate_hz if found in coarse else None
-        return TimeGuess(
-            found.column,
-            chosen,
-            why,
-            called_so,
-            called_so and usual,
-            wraps_at,
-            restarts,
-            even,
-            pause_s,
-        )
+    named = [m for m in advancing if m.quantity == "time"]
+    candidates = named or _finer(advancing, coarse, columns, typed) or coarse or advancing
+    for meaning in sorted(candidates, key=lambda m: m.unit is None):
+        guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
+        if guess is not None:
+            return guess
     return None
 
 
-def _unit(found: Meaning, told: Mapping[str, str]) -> str | None:
-    """Return the unit of a clock that is known: what the file tells goes before what its name
-    says."""
-    named = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
-    return told.get(found.column, named)
+def _guess(
+    meaning: Meaning, values: NDArray, coarse: bool, typed: Mapping[str, str]
+) -> TimeGuess | None:
+    """Return a column as a clock; None where no unit gives a usual rate."""
+    step = _step(values, coarse)
+    fitting = clock.usual_units(step)
+    known = _unit(meaning, typed)
+    if known is None and not fitting:
+        return None
+    unit = known or fitting[0]
+    rate_hz = _rate_hz(step, unit)
+    is_usual, is_named = _is_usual(rate_hz), meaning.quantity == "time"
+    if known:
+        why = f"{TYPES.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+    else:
+        why = f"steps of {step:.4g} are {rate_hz:.4g} Hz in {unit}, and no rate in another"
+    if not is_named:
+        why += "; no name shows which column is the time"
+    if not is_usual:
+        why += f", no usual rate: is it {' or '.join(fitting) or 'another column'}?"
+    wraps_at, restarts = _breaks(values, unit)
+    return TimeGuess(
+        meaning.column,
+        unit,
+        why,
+        sure=is_named,
+        unit_sure=is_named and is_usual,
+        wraps_at=wraps_at,
+        restarts=restarts,
+        rate_hz=rate_hz if coarse else None,
+        pause_s=_longest_pause(values) * UNITS[unit].factor if coarse else 0.0,
+    )
+
+
+def _unit(meaning: Meaning, typed: Mapping[str, str]) -> str | None:
+    """Return the known unit of a clock; the type of the column takes precedence over its name."""
+    named = meaning.unit if meaning.unit and UNITS[meaning.unit].dimension == "time" else None
+    return typed.get(meaning.column, named)
 
 
 def _finer(
     advancing: Sequence[Meaning],
     coarse: Sequence[Meaning],
     columns: Mapping[str, NDArray],
-    told: Mapping[str, str],
+    typed: Mapping[str, str],
 ) -> list[Meaning]:
-    """Return the clocks without a name that tell the same rate as a coarse one; what else rises has
-    another."""
+    """Return the clocks without a name that have the rate of a coarse one."""
     rates = [
         rate
         for m in coarse
-        for _, rate in _usual_rates(m, _step(columns[m.column].astype(float), True), told)
+        for _, rate in _usual_rates(m, _step(columns[m.column].astype(float), True), typed)
     ]
     finer = []
-    for found in advancing if rates else ():
-        values = columns[found.column].astype(float)
-        own = [] if found.quantity else _usual_rates(found, _step(values, False), told)
+    for meaning in advancing if rates else ():
+        values = columns[meaning.column].astype(float)
+        own = [] if meaning.quantity else _usual_rates(meaning, _step(values, False), typed)
         if any(
             abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1]
             for unit, hz in own
             for rate in rates
         ):
-            finer.append(found)
+            finer.append(meaning)
     return finer
 
 
-def _usual_rates(found: Meaning, step: float, told: Mapping[str, str]) -> list[tuple[str, float]]:
-    """Return the units that a clock of such a step may be in, each with its rate, Hz, where
-    machines have such."""
-    unit = _unit(found, told)
+def _usual_rates(
+    meaning: Meaning, step: float, typed: Mapping[str, str]
+) -> list[tuple[str, float]]:
+    """Return the units of a clock of such a step that give usual rates, with the rates, Hz."""
+    unit = _unit(meaning, typed)
     rates = [(one, _rate_hz(step, one)) for one in ([unit] if unit else clock.usual_units(step))]
     return [(one, rate) for one, rate in rates if _is_usual(rate)]
 
@@ -155,34 +166,30 @@ def _is_usual(rate_hz: float) -> bool:
     return clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
 
 
-def write_time(proposal: Proposal, found: TimeGuess) -> None:
+def write_time(proposal: Proposal, guess: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
-    if found.rate_hz is not None:
+    if guess.rate_hz is not None:
         why = (
-            f"several rows have one stamp of {found.column}; taken for uniform, {found.unit} for"
-            " its unit"
+            f"several rows have one stamp of {guess.column}; taken for uniform, with {guess.unit}"
+            " as its unit"
         )
-        if found.pause_s:
-            why += f"; but none came for {found.pause_s:.3g} s, which `rate_hz` leaves no gap for"
-        proposal.key("rate_hz", float(f"{found.rate_hz:.6g}"), why, sure=False)
+        if guess.pause_s:
+            why += f"; but none came for {guess.pause_s:.3g} s, which `rate_hz` ignores"
+        proposal.key("rate_hz", float(f"{guess.rate_hz:.6g}"), why, sure=False)
         return
-    proposal.key("column", found.column, _how_it_goes(found), found.sure)
-    proposal.key("unit", found.unit, found.why, found.unit_sure)
-    if found.wraps_at:
-        proposal.key("wraps_at", found.wraps_at, "goes back where such a counter is full")
-    elif found.restarts:
-        proposal.key(
-            "restarts",
-            "longest",
-            'the clock starts over; "split" makes a recording of each run',
-            sure=False,
-        )
-
-
-def _how_it_goes(found: TimeGuess) -> str:
-    but = ", but starts over" if found.wraps_at or found.restarts else ""
-    return "goes forward" + but + ("" if found.sure else ", as no other does")
+    why = "goes forward"
+    if guess.wraps_at or guess.restarts:
+        why += ", but starts over"
+    if not guess.sure:
+        why += ", as no other does"
+    proposal.key("column", guess.column, why, guess.sure)
+    proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
+    if guess.wraps_at:
+        proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
+    elif guess.restarts:
+        why = 'the clock starts over; "split" makes a recording of each run'
+        proposal.key("restarts", "longest", why, sure=False)
 
 
 def _advances(values: NDArray) -> bool:
@@ -195,8 +202,7 @@ def _advances(values: NDArray) -> bool:
 
 
 def _stands_still(values: NDArray) -> bool:
-    """Tell whether a column (n,) is a clock that is too coarse for its rows: it never goes back,
-    and seldom on."""
+    """Return whether a column (n,) is a clock too coarse for its rows, that never goes back."""
     if values.dtype.kind not in "iuf" or len(values) < 10:
         return False
     steps = np.diff(values.astype(float))
@@ -204,34 +210,42 @@ def _stands_still(values: NDArray) -> bool:
 
 
 def _stamps(values: NDArray) -> tuple[NDArray, NDArray]:
-    """Return how many rows each stamp of a coarse clock (n,) has, (k,), and how far it is to the
-    next, (k,).
+    """Return the rows of each stamp of a coarse clock, and its distance from the next.
 
-    Rows before the first step and after the last are of stamps that were not seen whole.
+    The first and the last stamp are left out, as their rows may not be complete.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Stamps.
+
+    Returns
+    -------
+    (k,) array, (k,) array
+        Numbers of rows, and steps in the clock's unit.
     """
     begins = np.flatnonzero(np.diff(values)) + 1
     return np.diff(begins), np.diff(values[begins])
 
 
-def _alike(numbers: NDArray) -> NDArray:
-    """Return which of some numbers (k,) are near their median."""
+def _near_median(numbers: NDArray) -> NDArray:
+    """Return a mask of the numbers (k,) within a factor of their median."""
     median = np.median(numbers)
-    return (numbers * ALIKE >= median) & (numbers <= ALIKE * median)
+    return (numbers * USUAL >= median) & (numbers <= USUAL * median)
 
 
 def _is_even(values: NDArray) -> bool:
-    """Tell whether stamps of a coarse clock (n,) have much the same number of rows."""
+    """Return whether most stamps of a coarse clock (n,) have a similar number of rows."""
     rows, _ = _stamps(values)
-    return not len(rows) or bool(np.mean(~_alike(rows)) <= UNEVEN)
+    return not len(rows) or bool(np.mean(~_near_median(rows)) <= UNEVEN)
 
 
 def _longest_pause(values: NDArray) -> float:
-    """Return the longest step of a coarse clock (n,) that is none of its own; 0 where there is
-    none."""
+    """Return the longest unusual step of a coarse clock (n,); 0 where there is none."""
     _, steps = _stamps(values)
-    return (
-        float(np.max(steps[steps > ALIKE * np.median(steps)], initial=0.0)) if len(steps) else 0.0
-    )
+    if not len(steps):
+        return 0.0
+    return float(np.max(steps[steps > USUAL * np.median(steps)], initial=0.0))
 
 
 def _step(values: NDArray, coarse: bool) -> float:
@@ -240,23 +254,23 @@ def _step(values: NDArray, coarse: bool) -> float:
         rows, steps = _stamps(values)
         if not len(rows):
             return float((values[-1] - values[0]) / (len(values) - 1))
-        # Around the medians: these alone would round the rows of a stamp, of which there are three
-        # or four by turns.
-        usual = _alike(rows) & _alike(steps)
-        return (
-            float(np.sum(steps[usual]) / np.sum(rows[usual]))
-            if usual.any()
-            else np.median(steps) / np.median(rows)
-        )
+        # A mean of the usual stamps: a median would round, as stamps may have three or four rows
+        # in turn.
+        usual = _near_median(rows) & _near_median(steps)
+        if usual.any():
+            return float(np.sum(steps[usual]) / np.sum(rows[usual]))
+        return np.median(steps) / np.median(rows)
     steps = np.diff(values)
     return float(np.median(steps[steps > 0]))
 
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
-    """Return where the clock is full, where it looks so, and whether it starts over."""
+    """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
     runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values, [])
     full = [
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)
     ]
-    return (full[0], False) if full and full[0] and len(set(full)) == 1 else (None, len(runs) > 1)
+    if full and full[0] and len(set(full)) == 1:
+        return full[0], False
+    return None, len(runs) > 1

@@ -1,4 +1,4 @@
-"""Does torque do work with the motion, and where does gravity say that down is."""
+"""Fit a torque to a motion, for its sign and the direction of gravity."""
 
 from dataclasses import dataclass
 
@@ -8,50 +8,59 @@ from numpy.typing import NDArray
 from pipelines.importing.quantities.consistency import whole_rows
 
 WINDOW_S = 0.1
-"""Of the parabola whose bend is the acceleration: short against a swing, long against an encoder's
-steps."""
+"""Length of the parabola whose curvature is the acceleration, s.
+
+It is short against a swing, and long against an encoder's steps.
+"""
 
 FEWEST = 50
-"""Rows from which a fit of five numbers says something."""
+"""Least number of rows for a fit of five parameters."""
 
 
 @dataclass(frozen=True)
 class TorqueFit:
-    """Torque of one joint as inertia, gravity and friction of that joint alone."""
+    """Torque of one joint as its inertia, gravity and friction, without other joints."""
 
     explained: float
-    """Share of the torque's variance."""
+    """Share of the torque's variance that the fit explains."""
     inertia: float
     friction: float
-    """Torque for each rad/s², and with the direction of motion; in the torque's own unit."""
+    """Torque per rad/s², and Coulomb friction; in the torque's own unit."""
     down_rad: float
-    """Angle at which gravity's torque vanishes and the joint would hang."""
+    """Angle at which the joint hangs, as gravity's torque vanishes, rad."""
     gravity_share: float
-    """Gravity's torque, in rms over that of all the torque."""
+    """RMS of gravity's torque relative to that of the whole torque."""
     reach_rad: float
-    """How far the joint moved; in a small motion gravity cannot be told from a constant torque."""
+    """Range of the angle, rad; in a small range gravity resembles a constant torque."""
 
     @property
     def backwards(self) -> bool:
-        """Whether both inertia and friction would be negative: the torque has the wrong sign."""
+        """Whether inertia and friction are negative, so that the torque has the wrong sign."""
         return self.inertia < 0.0 and self.friction < 0.0
 
 
 def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFit | None:
-    """Fit a ddq + b sgn dq + c sin q + d cos q + e to a torque (n,); None where nothing moves, or
-    not for long."""
+    """Fit ``tau = a ddq + b sgn dq + c sin q + d cos q + e`` by least squares.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle_rad : (n,) array
+        Angle, rad, NaN where missing.
+    torque : (n,) array
+        Torque in any unit, NaN where missing.
+
+    Returns
+    -------
+    TorqueFit or None
+        None where nothing moves, or the log is too short.
+    """
     time_s, angle_rad, torque = whole_rows(time_s, angle_rad, torque)
-    half = (
-        max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s)))))
-        if len(time_s) > FEWEST
-        else 0
-    )
-    if (
-        not half
-        or len(time_s) < FEWEST + 2 * half
-        or np.ptp(angle_rad) == 0.0
-        or np.ptp(torque) == 0.0
-    ):
+    if len(time_s) <= FEWEST or np.ptp(angle_rad) == 0.0 or np.ptp(torque) == 0.0:
+        return None
+    half = max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s)))))
+    if len(time_s) < FEWEST + 2 * half:
         return None
     before, at, after = angle_rad[: -2 * half], angle_rad[half:-half], angle_rad[2 * half :]
     first, last = time_s[half:-half] - time_s[: -2 * half], time_s[2 * half :] - time_s[half:-half]
@@ -66,8 +75,7 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
         regular
     ]
     tau = mean[regular]
-    # Little motion makes cos q a constant: the shortest of all solutions then shares it between
-    # both.
+    # In a small motion cos q is nearly constant. The solution of least norm is then still unique.
     a, b, c, d, e = np.linalg.lstsq(Y, tau, rcond=1e-8)[0]
     residual = tau - Y @ np.array([a, b, c, d, e])
     gravity = Y[:, 2:4] @ np.array([c, d])

@@ -1,5 +1,4 @@
-"""The unit that a column's name tells: in brackets, ``I_q (mA)``, after a slash, ``I/mA``, or as a
-word, ``I_mA``."""
+"""The unit in a column's name: in brackets, ``I_q (mA)``, after a slash, or as a word, ``I_mA``."""
 
 import re
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ QUANTITIES = {
     "voltage": "voltage",
     "temperature": "temperature",
 }
-"""What is measured in a unit of each dimension; a share may be of anything."""
+"""Quantity that is measured in each dimension; a share may be of anything."""
 OTHERS = (
     *(
         f"{angle}/s{square}"
@@ -46,47 +45,48 @@ OTHERS = (
         "Ohm",
     ),
 )
-"""Units of what no map asks for."""
+"""Units of quantities that no map has."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 
 
 @dataclass(frozen=True)
 class UnitInName:
-    """A unit that a name tells, and what is left of the name without it."""
+    """A unit in a name, and the rest of the name."""
 
     rest: str
     unit: str | None
-    """None where what stands there is a unit of something else."""
+    """None for a unit of a quantity that no map has."""
     decides: bool
-    """Whether it says by itself what the column is; a letter or a word may mean something else, and
-    only confirms."""
+    """Whether it determines the quantity; a letter or a word may mean something else."""
 
     @property
     def quantity(self) -> str:
-        """What is measured in it; empty where it does not say."""
+        """Quantity that is measured in it; empty where unknown."""
         return QUANTITIES.get(UNITS[self.unit].dimension, "") if self.unit else ""
 
 
 def unit_in(name: str) -> UnitInName | None:
-    """Return the unit in a name; None where it tells none."""
+    """Return the unit in a name; None where it has none."""
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
-        if text in OTHERS or (unit := _written(text)):
-            rest = f"{name[: bracket.start()]} {name[bracket.end() :]}"
-            return UnitInName(rest, None if text in OTHERS else unit, decides=True)
-    found = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
-    if not found:
+        unit = None if text in OTHERS else _written(text)
+        if unit or text in OTHERS:
+            return UnitInName(_without(name, bracket), unit, decides=True)
+    matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
+    if not matches:
         return None
-    unit = _written(found[-1][0])
-    rest = f"{name[: found[-1].start()]} {name[found[-1].end() :]}"
-    return UnitInName(
-        rest, unit, found[-1].re is _WORD and (unit is None or _is_plain(found[-1][0], unit))
-    )
+    last = matches[-1]
+    unit = _written(last[0])
+    decides = last.re is _WORD and (unit is None or _is_plain(last[0], unit))
+    return UnitInName(_without(name, last), unit, decides)
+
+
+def _without(name: str, match: re.Match[str]) -> str:
+    return f"{name[: match.start()]} {name[match.end() :]}"
 
 
 def _is_plain(text: str, unit: str) -> bool:
-    """Tell whether a word without brackets can hardly be anything but that unit: ticks are of
-    clocks, ms of speed."""
+    """Return whether a word without brackets is clearly that unit, unlike ``ticks`` or ``ms``."""
     return UNITS[unit].dimension not in ("time", "counts") and text.lower() not in (
         "rev",
         "turn",
@@ -95,12 +95,12 @@ def _is_plain(text: str, unit: str) -> bool:
 
 
 def _written(text: str) -> str | None:
-    """Return the unit that is written so, in letters of either case but for a single one."""
+    """Return the unit that is written so; case counts for single letters only."""
     return _FORMS.get(text) or (_FOLDED.get(text.casefold()) if len(text) > 1 else None)
 
 
 def _forms() -> dict[str, str]:
-    """Return how each unit may be written, ``rad_s`` and ``deg_per_s`` among them."""
+    """Return the spellings of each unit, such as ``rad_s`` and ``deg_per_s``."""
     forms = {name: name for name in UNITS if name != "iso8601"} | ALIASES
     for name, unit in list(forms.items()):
         forms |= {name.replace("/", per): unit for per in ("_", "_per_", " per ") if "/" in name}
@@ -117,7 +117,7 @@ _ALONE = [
     for text in [*_FORMS, *OTHERS, *(text.replace("/", "_") for text in OTHERS)]
     if len(text) > 1
 ]
-# `in` and `min` are words, and a minimum; in brackets they are units.
+# `in` and `min` are also words, so they are units in brackets only.
 _ANY = "|".join(
     re.escape(text) for text in sorted(_ALONE, key=len, reverse=True) if text not in ("in", "min")
 )

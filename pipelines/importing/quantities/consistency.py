@@ -7,16 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 SPAN = 20
-"""Samples over which a velocity is integrated: long against the noise of an angle, short against
-drift."""
+"""Samples over which a velocity is integrated: long against noise, short against drift."""
 MOST = 200_000
-"""Rows that are looked at, from the middle of the log."""
-MOST_SCREENED, FEWEST_SCREENED = 2_000_000, 1_000
-"""Numbers that all columns may have together where all pairs of many are compared, and rows that
-each has at least."""
+"""Greatest number of rows that are compared, from the middle of the log."""
+MOST_SCREENED = 2_000_000
+"""Greatest number of values, of all columns together, by which all pairs are compared."""
+FEWEST_SCREENED = 1_000
+"""Rows of each column that are compared at least."""
 BLOCK = 256
-LIKELY, MOST_LIKELY = 0.5, 100
-"""Share of the variance above which a pair wants a second look, and how many do at most."""
+"""Columns that are compared with all others at a time."""
+LIKELY = 0.5
+"""Share of the variance above which a pair of columns is a candidate."""
+MOST_LIKELY = 100
+"""Greatest number of candidate pairs."""
 
 
 @dataclass(frozen=True)
@@ -28,70 +31,87 @@ class Agreement:
 
 
 def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Agreement | None:
-    """Compare steps of an angle (n,) with the integral of a velocity (n,) over them, in any units.
+    """Compare the steps of an angle with the integral of a velocity over them.
 
-    ``slope`` is velocity's integral for a unit of angle: 1 where units and signs agree, -1 where
-    signs differ. None where nothing moves.
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle, velocity : (n,) array
+        Columns in any units, NaN where missing.
+
+    Returns
+    -------
+    Agreement or None
+        Its slope is the velocity's integral per unit of angle: 1 where units and signs agree, -1
+        where signs differ. None where nothing moves, or the log is too short.
     """
     time_s, angle, velocity = whole_rows(time_s, angle, velocity)
     if len(time_s) < 5 * SPAN:
         return None
-    return _through_origin(angle[SPAN:] - angle[:-SPAN], _way(time_s, velocity))
+    return _through_origin(angle[SPAN:] - angle[:-SPAN], _travel(time_s, velocity))
 
 
 def likeliest_integrals(
     time_s: NDArray, angles: Sequence[NDArray], velocities: Sequence[NDArray]
 ) -> list[tuple[int, int]]:
-    """Return which of many angles (n,) and velocities (n,) may agree as `integral_agreement` has
-    it, by their numbers.
+    """Return the pairs of many angles and velocities that may agree (`integral_agreement`).
 
-    All are compared at once, at fewer instants and with straight lines where a column has no
-    number: what is left wants a second look.
+    All pairs are compared at once, at fewer instants, with missing values interpolated. The pairs
+    returned are candidates, to be compared one by one.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angles, velocities : sequence of (n,) array
+        Columns in any units, NaN where missing.
+
+    Returns
+    -------
+    list of (int, int)
+        Indices of the angle and the velocity of each pair.
     """
     time_s, *columns = _middle(time_s, *angles, *velocities)
     if len(time_s) < 5 * SPAN:
         return []
     some = slice(None, None, -(-len(time_s) // max(FEWEST_SCREENED, MOST_SCREENED // len(columns))))
-    whole = [_on_straight_lines(column) for column in columns]
-    steps = _of_length_one([(angle[SPAN:] - angle[:-SPAN])[some] for angle in whole[: len(angles)]])
-    ways = _of_length_one([_way(time_s, velocity)[some] for velocity in whole[len(angles) :]])
+    whole = [_interpolated(column) for column in columns]
+    steps = _unit_rows([(angle[SPAN:] - angle[:-SPAN])[some] for angle in whole[: len(angles)]])
+    travels = _unit_rows([_travel(time_s, velocity)[some] for velocity in whole[len(angles) :]])
     likely: list[tuple[float, int, int]] = []
     for first in range(0, len(steps), BLOCK):  # thousands of columns have millions of pairs
-        # Backwards no velocity is one.
-        shares = np.square(np.maximum(steps[first : first + BLOCK] @ ways.T, 0.0))
+        # A velocity cannot integrate to the negative angle.
+        shares = np.square(np.maximum(steps[first : first + BLOCK] @ travels.T, 0.0))
         best = np.argsort(shares, axis=None)[-MOST_LIKELY:]
         rows, others = np.unravel_index(best[shares.flat[best] > LIKELY], shares.shape)
-        found = (
+        candidates = (
             (float(shares[i, j]), first + int(i), int(j)) for i, j in zip(rows, others, strict=True)
         )
-        likely = sorted([*likely, *found], reverse=True)[:MOST_LIKELY]
+        likely = sorted([*likely, *candidates], reverse=True)[:MOST_LIKELY]
     return sorted((angle, velocity) for _, angle, velocity in likely)
 
 
-def _on_straight_lines(values: NDArray) -> NDArray:
-    """Return values (n,) with what is between two of them where there is none; zeros where no two
-    are known."""
+def _interpolated(values: NDArray) -> NDArray:
+    """Return values (n,) with missing ones interpolated; zeros where fewer than two are known."""
     known = np.isfinite(values)
-    # What moves somewhere in the log may have no number in its middle.
+    # A column that moves somewhere in the log may have no number in its middle.
     if np.count_nonzero(known) < 2:
         return np.zeros_like(values)
-    return (
-        values
-        if known.all()
-        else np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
-    )
+    if known.all():
+        return values
+    return np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
 
 
-def _of_length_one(rows: Sequence[NDArray]) -> NDArray:
-    """Return vectors (n,) as the rows of a matrix, each divided by its length; those of no length
-    are left."""
+def _unit_rows(rows: Sequence[NDArray]) -> NDArray:
+    """Return vectors (n,) as rows of a matrix, each scaled to length one unless it is zero."""
     matrix = np.array(rows)
     lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
     return np.divide(matrix, lengths, out=np.zeros_like(matrix), where=lengths > 0.0)
 
 
-def _way(time_s: NDArray, velocity: NDArray) -> NDArray:
-    """Return how far a velocity (n,) goes in each span of samples."""
+def _travel(time_s: NDArray, velocity: NDArray) -> NDArray:
+    """Return the integral of a velocity (n,) over each span of samples, (n - SPAN,)."""
     travel = np.concatenate(
         [[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))]
     )
@@ -99,7 +119,7 @@ def _way(time_s: NDArray, velocity: NDArray) -> NDArray:
 
 
 def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
-    """Return y = slope x; the mean of both regressions' slopes, for both columns have noise."""
+    """Fit y = slope x by the geometric mean of both regressions, as both columns have noise."""
     xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
     if xx == 0.0 or yy == 0.0 or xy == 0.0:
         return None
@@ -107,11 +127,22 @@ def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
 
 
 def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
-    """Return mean and mean magnitude, W, of torque (n,) N·m times the derivative of the angle (n,)
-    rad at times (n,) s.
+    """Return the mean and the mean magnitude of a drive's power.
 
-    What a drive delivers between two instants of equal state can only have gone into friction: the
-    mean is positive where the signs of both columns agree.
+    The energy that a drive delivers between two equal states is lost to friction. The mean is thus
+    positive where the signs of angle and torque agree.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle, torque : (n,) array
+        Angle, rad, and torque, N·m; or position, m, and force, N.
+
+    Returns
+    -------
+    (float, float)
+        Mean and mean magnitude, W; zeros where the log is too short.
     """
     time_s, angle, torque = whole_rows(time_s, angle, torque)
     if len(time_s) < 5 * SPAN:
@@ -123,8 +154,7 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:
-    """Return the rows of columns (n,), from the middle of the log, in which every column has a
-    number."""
+    """Return the rows of columns (n,) in which each has a number, from the middle of the log."""
     columns = _middle(*columns)
     known = np.all([np.isfinite(column) for column in columns], axis=0)
     return [column[known] for column in columns]

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.expression import Expression
-from pipelines.importing.quantities.numbers import numbers
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
 from pipelines.settings.import_map import ReadingSettings
 from pipelines.settings.units import Unit, unit_named
 
 
 def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
-    """Return the columns that a reading is made of, its clock's not among them."""
+    """Return the columns that a reading is computed from, without its clock."""
     if reading.column is not None:
         return (reading.column,)
     return Expression(str(reading.expression), f"{where}.expression").names
@@ -27,42 +27,55 @@ def quantity(
     where: str,
     findings: list[Finding],
 ) -> NDArray:
-    """Return the quantity (n,) in SI: sign x gain x unit(scale x raw - zero), NaN where the log has
-    none.
+    """Return a reading as a quantity: sign x gain x unit(scale x raw - zero).
 
-    ``gain`` is the drive train's: counts per turn, gear ratio, torque constant.
+    Parameters
+    ----------
+    reading : ReadingSettings
+        Columns, unit and corrections from the map.
+    gain : float
+        Gain of the drive train: counts per turn, gear ratio, torque constant.
+    columns : mapping of str to (n,) array
+        Columns of the log.
+    where : str
+        Name of the quantity in findings.
+    findings : list of Finding
+        Extended by those about this reading.
+
+    Returns
+    -------
+    (n,) array
+        The quantity in SI, NaN where the log has none.
     """
     raw = _raw(reading, columns, where, findings)
     if reading.signed_bits is not None:
         raw = signed(raw, reading.signed_bits, where, findings)
     if reading.range is not None:
-        raw = _believed(raw, reading.range, where, findings)
+        raw = _within(raw, reading.range, where, findings)
     if reading.wraps_at is not None:
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
         raw = unwrapped(raw, reading.wraps_at, where, findings, near)
     unit = unit_named(reading.unit)
-    assert unit is not None, "was looked at with the map"
-    if reading.wraps_at is None and (full := full_at(raw, _turns(reading, unit))) is not None:
-        seen = f"steps by {full:.6g} from one row to the next, as a counter does that is full"
-        findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
+    assert unit is not None, "the map checks its units"
+    if reading.wraps_at is None:
+        full = full_at(raw, _turns(reading, unit))
+        if full is not None:
+            seen = f"steps by {full:.6g} from one row to the next, as a full counter does"
+            findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
 
 
-def turn_of_its_counter(reading: ReadingSettings, gain: float) -> float | None:
-    """Return what the quantity is after which the counter starts anew, in SI; None of what does
-    not."""
+def counter_turn(reading: ReadingSettings, gain: float) -> float | None:
+    """Return the change of a quantity, SI, in a turn of its counter; None without a counter."""
+    if reading.wraps_at is None:
+        return None
     unit = unit_named(reading.unit)
-    assert unit is not None, "was looked at with the map"
-    return (
-        None
-        if reading.wraps_at is None
-        else abs(gain * unit.factor * reading.scale * reading.wraps_at)
-    )
+    assert unit is not None, "the map checks its units"
+    return abs(gain * unit.factor * reading.scale * reading.wraps_at)
 
 
 def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
-    """Return the raw reading that is a full turn of what an encoder sits on, where the reading is
-    one's."""
+    """Return the raw reading of a full turn of an encoder; nothing for other quantities."""
     counts = getattr(reading, "counts_per_turn", None) if unit.dimension == "counts" else None
     turn = 2.0 * np.pi / unit.factor if unit.dimension == "angle" else counts
     return () if turn is None else (abs(turn / reading.scale),)
@@ -77,11 +90,11 @@ def _raw(
     return expression({name: numbers(columns[name], where, findings) for name in expression.names})
 
 
-def _believed(
+def _within(
     raw: NDArray, limits: tuple[float, float], where: str, findings: list[Finding]
 ) -> NDArray:
     outside = (raw < limits[0]) | (raw > limits[1])
     if outside.any():
         seen = f"{counted(int(outside.sum()), 'row')} outside {limits[0]:g} … {limits[1]:g}"
-        findings.append(Finding(where, seen, "taken for missing"))
+        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
     return np.where(outside, np.nan, raw)

@@ -21,30 +21,29 @@ OPERATORS: dict[type, Callable] = {
     ast.USub: operator.neg,
 }
 MOST_OPERATIONS = 100
-"""In one expression; what machines write by the thousand, nobody could check."""
+"""In one expression; nobody could check a longer one."""
 LARGEST = sys.float_info.max
 QUOTED = re.compile(r"`([^`]*)`")
 
 
 class Expression:
-    """Numbers and columns with + - * / and parentheses; a name that is no word stands in
-    backquotes."""
+    """Numbers and columns with + - * / and parentheses; backquotes hold other names."""
 
     def __init__(self, text: str, where: str) -> None:
         self._text, self._where = text, where
         self._quoted: list[str] = []
         try:
             self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
-        # The parser's, by what it is fed.
+        # The parser raises each of these, depending on the text.
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise self._refusal() from error
-        self._refuse_what_is_more(self._tree)
+        self._check(self._tree)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns that it is made of."""
-        found = (self._name(node) for node in ast.walk(self._tree) if isinstance(node, ast.Name))
-        return tuple(dict.fromkeys(found))
+        """Its columns, each once."""
+        names = (self._name(node) for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+        return tuple(dict.fromkeys(names))
 
     def __call__(self, columns: Mapping[str, NDArray]) -> NDArray:
         """Return the value, (n,) float64; a column of one row counts as a constant."""
@@ -72,7 +71,7 @@ class Expression:
             case _:
                 return float(node.value)
 
-    def _refuse_what_is_more(self, tree: ast.expr) -> None:
+    def _check(self, tree: ast.expr) -> None:
         for node in ast.walk(tree):
             number = isinstance(node, ast.Constant) and _is_number(node.value)
             known = (
@@ -83,8 +82,7 @@ class Expression:
                 raise self._refusal()
         if sum(hasattr(node, "op") for node in ast.walk(tree)) > MOST_OPERATIONS:
             raise self._refusal(
-                f", at most {MOST_OPERATIONS} of them; write what they make into a column of"
-                " its own"
+                f", at most {MOST_OPERATIONS} of them; compute a column of its own instead"
             )
         if not self.names:
             raise self._refusal(", one column at least")

@@ -1,4 +1,4 @@
-"""What a file holds, as numbers: text that is none is told of, and counts as missing."""
+"""A file's values as numbers; text that is no number is reported, and counts as missing."""
 
 import re
 
@@ -9,26 +9,41 @@ from numpy.typing import NDArray
 from pipelines.importing.finding import Finding, counted
 
 LONGEST = 20
-"""Letters of a text that a finding shows."""
+"""Greatest length of a text in a finding."""
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
 """A number with marks between its thousands."""
 DAYS_FIRST = re.compile(r"^\s*(\d\d)\.(\d\d)\.(\d{4})")
 TAKEN_FOR_MISSING = "taken for missing"
-"""What is made of a text where a number should be."""
+"""Treatment of a text where a number should be."""
 
 
 def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
-    """Return the values (n,) as float64, NaN where there is no number."""
+    """Return values as numbers.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Values as the file has them.
+    where : str
+        Name of the quantity in findings.
+    findings : list of Finding
+        Extended by one for each kind of text.
+
+    Returns
+    -------
+    (n,) array of float64
+        NaN where there is no number.
+    """
     if values.dtype.kind in "biuf":
         return values.astype(float, copy=False)
-    # As text: to pandas a date is a number of nanoseconds, and to nobody who named its column for
-    # an angle.
+    # As text, because pandas would convert dates to nanoseconds. A date in a column for an angle is
+    # no number.
     text = pd.Series(values.astype(str).astype(object) if values.dtype.kind in "mM" else values)
     if _have_thousands(text):
         findings.append(Finding(where, "commas between thousands", "read without them"))
         text = text.str.replace(",", "")
-    found = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
-    words = np.isnan(found) & pd.notna(values)
+    result = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+    words = np.isnan(result) & pd.notna(values)
     if words.any():
         row = int(np.argmax(words))
         seen = (
@@ -36,15 +51,14 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
             f" {str(values[row])[:LONGEST]!r} in row {row}"
         )
         findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
-    return found
+    return result
 
 
 def _have_thousands(text: pd.Series) -> bool:
-    """Tell whether numbers have commas between their thousands: all texts with a comma are such,
-    and one has a point.
+    """Return whether numbers have commas between their thousands.
 
-    Without a point in one of them a comma may be a decimal one. What has no comma, a number or a
-    word, says nothing.
+    All texts with a comma must be such numbers, and one of them must have a decimal point. Without
+    it a comma may be a decimal one.
     """
     written = text.dropna()
     if not pd.api.types.is_string_dtype(written):
@@ -56,18 +70,27 @@ def _have_thousands(text: pd.Series) -> bool:
 
 
 def whole_nanoseconds(values: NDArray) -> NDArray:
-    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where
-    there is none.
+    """Return dates such as ``2026-01-31 12:00:00.125`` as nanoseconds since 1970.
 
-    ``31.01.2026 12:00:00,125`` is such a date, too: with points between them, days come first
-    everywhere. Times of day without a date are those of one day, and durations are since its
-    beginning.
+    In ``31.01.2026 12:00:00,125`` the day comes first, as points separate the parts. Times of day
+    without a date are those of 1 January 1970.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Dates, durations, times of day, or numbers, which are returned as they are.
+
+    Returns
+    -------
+    (n,) array of int64
+        Nanoseconds; float64 with NaN where some are no dates.
     """
     if values.dtype.kind in "iuf":
         return values
     if values.dtype.kind in "mM":
         whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
-        return np.where(np.isnat(values), np.nan, whole) if np.isnat(values).any() else whole
+        missing = np.isnat(values)
+        return np.where(missing, np.nan, whole) if missing.any() else whole
     text = pd.Series(values).astype("string")
     text = text.str.replace(DAYS_FIRST, r"\3-\2-\1", regex=True).str.replace(",", ".", regex=False)
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
@@ -76,8 +99,12 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
             "1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True
         )
     stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
-    return (
-        stamps.to_numpy()
-        if dates.notna().all()
-        else stamps.where(dates.notna()).to_numpy(dtype=float)
-    )
+    if dates.notna().all():
+        return stamps.to_numpy()
+    return stamps.where(dates.notna()).to_numpy(dtype=float)
+
+
+def are_whole(values: NDArray) -> bool:
+    """Return whether values (n,) are whole numbers, with at most 1 % of exceptions."""
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool(np.mean(known == np.round(known)) > 0.99)

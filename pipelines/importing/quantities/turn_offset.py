@@ -1,5 +1,4 @@
-"""In which turn of its counter each log of a map begins: what starts anew tells its place within a
-turn, not which."""
+"""The turn in which the counters of several logs begin, which no counter shows by itself."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,31 +9,42 @@ from pipelines.importing.finding import Finding
 
 
 class Beginnings:
-    """Where the counters of the logs that were looked at began."""
+    """First readings of the counters in the logs imported so far."""
 
     def __init__(self) -> None:
         self._first: dict[str, tuple[float, str]] = {}
 
-    def look_at(
+    def check(
         self, log: str, columns: Mapping[str, NDArray], turns: Mapping[str, float]
     ) -> Iterator[Finding]:
-        """Yield what begins more than half a turn from where the first log did: it would be nearer
-        in another turn.
+        """Report counters that begin more than half a turn from where those of the first log did.
 
-        ``columns`` (n,) are in SI, and ``turns`` what a turn of each counter is in SI.
+        Parameters
+        ----------
+        log : str
+            Name of the log in findings.
+        columns : mapping of str to (n,) array
+            The recording's columns, SI.
+        turns : mapping of str to float
+            A turn of each counter, SI.
+
+        Yields
+        ------
+        Finding
+            One for each such counter.
         """
         for name, turn in turns.items():
             known = columns[name][np.isfinite(columns[name])]
             if not len(known):
                 continue
             begins = float(known[0])
-            first, of = self._first.setdefault(name, (begins, log))
+            first, first_log = self._first.setdefault(name, (begins, log))
             away = round((begins - first) / turn)
             if away:
                 seen = (
-                    f"begins at {begins:.4g} and in {of} at {first:.4g}, about {abs(away)} of its"
-                    " counter's turns apart"
+                    f"begins at {begins:.4g} and in {first_log} at {first:.4g}, about {abs(away)}"
+                    " of its counter's turns apart"
                 )
                 yield Finding(
-                    name, seen, "kept; if all logs begin alike, say with begins_at at which reading"
+                    name, seen, "kept; if all logs begin at the same reading, set begins_at to it"
                 )

@@ -1,5 +1,4 @@
-"""Counters: registers logged without their sign, and readings that start anew at 0 when they are
-full."""
+"""Counters: registers logged without their sign, and readings that wrap around at 0."""
 
 from collections.abc import Iterable
 
@@ -7,17 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 
 REGISTERS = tuple(2.0**bits for bits in range(8, 33))
-"""Where counters of whole numbers are full."""
+"""Moduli of counters of whole numbers."""
 
 
 def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> NDArray:
-    """Return what a signed register holds, (n,), that was logged as if it had no sign (two's
-    complement).
+    """Return the values of a signed register that was logged as unsigned (two's complement).
 
-    What no register of so many bits can hold is missing: 4.2949673e9 was a number near 2^32 before
-    its last digits were lost, and its sign is known but not its value.
+    A value that the register cannot hold becomes NaN. An example is 4.2949673e9, a number near 2^32
+    that lost its last digits: its sign is known, but not its value.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings from 0 to ``2**bits - 1``.
+    bits : int
+        Bits of the register.
+    where : str
+        Name of the quantity in findings.
+    findings : list of Finding
+        Extended by those about this register.
+
+    Returns
+    -------
+    (n,) array
+        Readings with their sign.
     """
     impossible = (values >= 2.0**bits) | (values < -(2.0 ** (bits - 1)))
     if impossible.any():
@@ -26,7 +41,7 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
             f"{counted(int(impossible.sum()), 'row')} that {bits} bits cannot hold, the first"
             f" {first:.10g}"
         )
-        findings.append(Finding(where, seen, "taken for missing"))
+        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
     negative = values >= 2.0 ** (bits - 1)
     if (negative & ~impossible).any():
         share = np.count_nonzero(negative & ~impossible) / len(values)
@@ -35,18 +50,31 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
             " below 0"
         )
         findings.append(Finding(where, seen, f"less 2^{bits} there"))
-    found = np.where(negative, values - 2.0**bits, values)
-    return np.where(impossible, np.nan, found)
+    return np.where(impossible, np.nan, np.where(negative, values - 2.0**bits, values))
 
 
 def unwrapped(
     values: NDArray, modulus: float, where: str, findings: list[Finding], near: float = 0.0
 ) -> NDArray:
-    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half
-    of it.
+    """Return a counter without its wraparounds, so that no step exceeds half the modulus.
 
-    Which turn it begins in no counter tells: it is the one in which its first reading lies nearest
-    to ``near``.
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    modulus : float
+        Reading at which the counter starts again at 0.
+    where : str
+        Name of the quantity in findings.
+    findings : list of Finding
+        Extended by those about this counter.
+    near : float, optional
+        The counter begins in the turn in which its first reading lies nearest to it.
+
+    Returns
+    -------
+    (n,) array
+        Readings that go on across wraparounds.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -55,8 +83,8 @@ def unwrapped(
     turns = -np.round(np.diff(values[known], prepend=first) / modulus)
     wraps = int(np.count_nonzero(turns))
     turns[0] = -np.round((first - near) / modulus)
-    found = values.copy()
-    found[known] = values[known] + modulus * np.cumsum(turns)
+    unwrapped_values = values.copy()
+    unwrapped_values[known] = values[known] + modulus * np.cumsum(turns)
     if wraps:
         findings.append(
             Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on")
@@ -64,19 +92,30 @@ def unwrapped(
     if turns[0]:
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
-        told = (
+        action = (
             f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at in the map names"
             " another"
         )
-        findings.append(Finding(where, seen, told))
-    return found
+        findings.append(Finding(where, seen, action))
+    return unwrapped_values
 
 
 def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
-    """Return at which reading a counter (n,) was full that nobody counted on; None where none was.
+    """Return the modulus at which a counter wraps around; None where it does not.
 
-    It is one of ``turns`` or, of whole numbers, of registers, and with it counted on the steps at
-    which the counter starts anew are as small as all others.
+    Unwrapped at the modulus, the largest steps must become as small as all others.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    turns : iterable of float
+        Moduli that are tried, in addition to those of registers where readings are whole.
+
+    Returns
+    -------
+    float or None
+        The smallest modulus that fits.
     """
     known = values[np.isfinite(values)]
     steps = np.abs(np.diff(known))
@@ -85,11 +124,7 @@ def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
         return None
     moved = 1.5 * float(np.max(steps[~far]))
     whole = bool(np.all(known == np.round(known)))
-    return next(
-        (
-            modulus
-            for modulus in sorted((*turns, *(REGISTERS if whole else ())))
-            if moved < 0.25 * modulus and np.median(np.abs(steps[far] - modulus)) <= moved
-        ),
-        None,
-    )
+    for modulus in sorted((*turns, *(REGISTERS if whole else ()))):
+        if moved < 0.25 * modulus and np.median(np.abs(steps[far] - modulus)) <= moved:
+            return modulus
+    return None

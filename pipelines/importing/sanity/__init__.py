@@ -1,1 +1,1 @@
-"""Whether what was imported can be the motion of a machine."""
+"""Check whether imported recordings can be the motion of a machine."""

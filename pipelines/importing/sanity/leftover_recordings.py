@@ -1,5 +1,4 @@
-"""What stands in the folder after an import: what an earlier one left, and what a verdict still
-lacks."""
+"""The folder after an import: recordings of an earlier map, and recordings still missing."""
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -10,50 +9,52 @@ from pipelines.mechanics.machine import mechanisms_of
 from pipelines.settings.import_map import ImportMap
 
 NEEDED = {"train": "to fit to", "validate": "to judge on"}
-
+"""Purposes of recordings without which there is no verdict."""
 
 Metadata = Mapping[str, Mapping[str, Any]]
-"""That of the imported recordings in a folder, by their names (``imported_in``)."""
+"""Metadata of the imported recordings in a folder, by name (``imported_in``)."""
 
 
-def no_longer_made(found: Metadata, made: Collection[str]) -> list[str]:
-    """Return the files found that were made of the same logs as ``made`` were, by a map that named
-    them so."""
-    logs = {sha for name in made for sha in found[name]["imported"]["sha256"]}
+def outdated(imported: Metadata, current: Collection[str]) -> list[str]:
+    """Return the files of the same logs as the current recordings, but from an earlier map."""
+    logs = {sha for name in current for sha in imported[name]["imported"]["sha256"]}
     return [
         f"{name}.parquet"
-        for name, told in found.items()
-        if name not in made and not logs.isdisjoint(told["imported"]["sha256"])
+        for name, metadata in imported.items()
+        if name not in current and not logs.isdisjoint(metadata["imported"]["sha256"])
     ]
 
 
 def unused(settings: ImportMap, files: Collection[Path]) -> Iterator[str]:
-    """Yield which recordings of a map are of none of the files."""
+    """Yield a message for each recording of a map that fits none of the files."""
     for number, recording in enumerate(settings.recording):
         if not any(map(recording.is_of, files)):
             yield (
-                f'recording[{number}] ({recording.purpose}) is of "{recording.files}", and no file'
-                " given is; left out"
+                f"recording[{number}] ({recording.purpose}): no given file matches"
+                f' "{recording.files}"; left out'
             )
 
 
-def lacks(found: Metadata, made: Collection[str], map_path: Path) -> Iterator[str]:
-    """Yield what keeps the recordings in a folder from a verdict."""
-    purposes = {told["purpose"] for told in found.values()}
-    for purpose, what in NEEDED.items():
+def missing_for_verdict(
+    imported: Metadata, current: Collection[str], map_path: Path
+) -> Iterator[str]:
+    """Yield a message for each reason why the recordings in a folder give no verdict."""
+    purposes = {metadata["purpose"] for metadata in imported.values()}
+    for purpose, use in NEEDED.items():
         if purpose not in purposes:
             yield (
-                f"`exoid run` lacks a recording {what}: add a [[recording]] to {map_path} with "
-                f'purpose = "{purpose}", and a span of its own or the files that it is of'
+                f"`exoid run` lacks a recording {use}: add a [[recording]] to {map_path} with "
+                f'purpose = "{purpose}", and a span or files of its own'
             )
-    yield from dict.fromkeys(filter(None, (_unknown_mechanism(found[name]) for name in made)))
+    messages = (_unknown_mechanism(imported[name]) for name in current)
+    yield from dict.fromkeys(filter(None, messages))
 
 
-def _unknown_mechanism(told: Mapping[str, Any]) -> str:
-    joints = joints_of(told)
+def _unknown_mechanism(metadata: Mapping[str, Any]) -> str:
+    joints = joints_of(metadata)
     if mechanisms_of(joints):
         return ""
     return (
-        f"`exoid run` ends at the motions of these: {in_words(joints)} make no mechanism that exoid"
-        " could fit; leave joints out of the map"
+        f"`exoid run` stops after filtering: {in_words(joints)} make no mechanism that exoid can"
+        " fit; leave joints out of the map"
     )

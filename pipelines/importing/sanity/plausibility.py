@@ -1,4 +1,4 @@
-"""What an imported recording says of itself that cannot be right: told, never mended."""
+"""Report implausible values in an imported recording, without correcting them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -11,26 +11,35 @@ from pipelines.importing.quantities.consistency import MOST, integral_agreement,
 from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
-ALIKE = 0.5
-"""Share of the variance that velocity and angle must have in common before their slope is
-judged."""
-OFF = 0.15
-"""By so much the slope between both may be off 1: a filter in the drive, a late sample."""
+LEAST_EXPLAINED = 0.5
+"""Share of the variance that velocity and angle must share before their slope is judged."""
+SLOPE_TOLERANCE = 0.15
+"""Largest deviation of that slope from 1, for a filter in the drive or a late sample."""
 STRONGEST = {"torque": 1e3, "force": 1e5}
-"""N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in
-another unit."""
+"""N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
-"""Play and bending of a gear or a screw are as much: of a joint that moves less nothing is
-learnt."""
+"""Least motion of a joint from which inertia can be seen, about the play of a gear or screw."""
 FAR = 20.0
-"""Times further off the middle than 99 % of a column's rows: no motion or load of a machine does
-that once."""
+"""Distance from the median, relative to that of 99 % of the rows, that marks an outlier."""
 GIVES_BACK = 0.2
-"""Share of the mean magnitude of power that a drive may take out of a motion, on the whole."""
+"""Share of the mean magnitude of power that the drives may absorb on average."""
 
 
-def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
-    """Yield what is not plausible about a recording's columns, (n,) each in SI units."""
+def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
+    """Report implausible values.
+
+    Parameters
+    ----------
+    columns : mapping of str to (n,) array
+        The recording's columns, SI.
+    settings : ImportMap
+        The map, with its joints and geometry.
+
+    Yields
+    ------
+    Finding
+        One for each implausible value.
+    """
     for joint in settings.joint:
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
@@ -40,23 +49,18 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     yield from _power(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     known = mechanisms_of(joints)
-    if (
-        any(mechanism.has_length for mechanism in known)
-        and settings.geometry.thigh_length_m is None
-    ):
-        why = "later stages take that of exoid.toml, or of the paper's leg"
+    has_length = any(mechanism.has_length for mechanism in known)
+    if has_length and settings.geometry.thigh_length_m is None:
         yield Finding(
-            "geometry", "no thigh_length_m, from the first joint's axis to the second's", why
+            "geometry",
+            "no thigh_length_m, from the first joint's axis to the second's",
+            "later stages take that of exoid.toml, or of the paper's leg",
         )
     if not known:
-        seen = (
-            f"{in_words(joints)}, and of the mechanisms that exoid knows none has these:"
-            f" {known_in_words()}"
-        )
         yield Finding(
             "joints",
-            seen,
-            "kept; exoid filter takes them, exoid identify and exoid diagnose do not",
+            f"{in_words(joints)} make no known mechanism, which are: {known_in_words()}",
+            "kept; exoid filter accepts them, exoid identify and exoid diagnose do not",
         )
 
 
@@ -65,26 +69,25 @@ def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             yield Finding(
-                name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it"
+                name, f"is {columns[name][0]:.6g} in every row", "it carries no information"
             )
 
 
 def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     name, (least, unit) = joint.joint.column("angle"), SHORTEST[joint.kind]
-    way = float(np.ptp(columns[name]))
-    if 0.0 < way < least:
+    reach = float(np.ptp(columns[name]))
+    if 0.0 < reach < least:
         seen = (
-            f"moves over {way:.3g} {unit} only, and what a joint does within {least:g} {unit} shows"
-            " no mass"
+            f"moves over {reach:.3g} {unit} only, expected {least:g} {unit} or more to see inertia"
         )
         yield Finding(name, seen, "kept; check its unit, scale and gear_ratio")
 
 
 def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
-    """Tell of single readings far beyond what nearly all others are."""
+    """Report single readings far from nearly all others."""
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
-        some = _thinned(columns[name])
+        some = _every_kth(columns[name])
         middle = float(np.median(some))
         usual = float(np.quantile(np.abs(some - middle), 0.99))
         least, most = middle - FAR * usual, middle + FAR * usual
@@ -98,19 +101,19 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
             yield Finding(name, seen, "kept; if it is a slip, a range at the reading leaves it out")
 
 
-def _thinned(values: NDArray) -> NDArray:
-    """Return every k-th of the values (n,), enough of them for a quantile."""
+def _every_kth(values: NDArray) -> NDArray:
+    """Return every k-th of the values (n,), still enough for a quantile."""
     return values[:: max(1, len(values) // MOST)]
 
 
 def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     quantity, unit = ("torque", "N·m") if joint.kind == "revolute" else ("force", "N")
     name = joint.joint.column("torque")
-    reach = float(np.quantile(np.abs(_thinned(columns[name])), 0.99))
+    reach = float(np.quantile(np.abs(_every_kth(columns[name])), 0.99))
     if reach > STRONGEST[quantity]:
         seen = (
-            f"reaches {reach:.4g} {unit}, and drives of legs, arms and robots at most some"
-            f" {STRONGEST[quantity]:g}"
+            f"reaches {reach:.4g} {unit}, expected at most about {STRONGEST[quantity]:g} {unit} of"
+            " a drive"
         )
         yield Finding(
             name,
@@ -121,20 +124,20 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     name, angle = joint.joint.column("velocity"), joint.joint.column("angle")
-    found = (
-        integral_agreement(columns["time_s"], columns[angle], columns[name])
-        if name in columns
-        else None
-    )
-    if found is not None and found.explained > ALIKE and abs(found.slope - 1.0) > OFF:
-        seen = f"integrates to {found.slope:.3g} times the way that {angle} goes"
+    if name not in columns:
+        return
+    agreement = integral_agreement(columns["time_s"], columns[angle], columns[name])
+    if agreement is None or agreement.explained <= LEAST_EXPLAINED:
+        return
+    if abs(agreement.slope - 1.0) > SLOPE_TOLERANCE:
+        seen = f"integrates to {agreement.slope:.3g} times the change of {angle}"
         yield Finding(
             name, seen, "kept; check unit, sign and gear_ratio of both, and the unit of time"
         )
 
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
-    """Tell of drives that together brake: one alone may, where another moves what it carries."""
+    """Report drives that brake on average; a single one may, where another one moves it."""
     powers = [
         mean_power(
             columns["time_s"],
@@ -145,8 +148,5 @@ def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> I
     ]
     mean, size = (sum(values) for values in zip(*powers, strict=True))
     if mean < -GIVES_BACK * size:
-        seen = (
-            f"the drives take {-mean:.3g} W out of the motion on the whole, as friction leaves them"
-            " nothing to take"
-        )
+        seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")

@@ -1,5 +1,4 @@
-"""How a text file is written: encoding, delimiter, decimal point, comments, and where its header
-stands."""
+"""The dialect of a text file: encoding, delimiter, decimal point, comments, header."""
 
 import csv
 import re
@@ -13,21 +12,20 @@ from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import unit_named
 
 LOOKED_AT = 2**16
-"""Bytes at the beginning of a file that tell how it is written."""
+"""Bytes at the beginning of a file from which its dialect is derived."""
 DELIMITERS = (",", ";", "\t", "|", " ")
 RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|\0]")
-"""What else may stand between numbers, looked at where none of ``DELIMITERS`` makes a table."""
+"""Other delimiters, tried where none of ``DELIMITERS`` gives a table."""
 COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
 STRAY = 0.1
 """Share of NUL bytes up to which a file may be a text with slips; of UTF-16 they are half."""
 ENOUGH = 0.5
-"""Share of a row's fields that are numbers, in a row of data; the others are dates, states and
-comments."""
+"""Least share of numbers among the fields of a row of data; others are dates and states."""
 
 UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
-"""What may be a unit where nobody knows it: in brackets, or short."""
+"""What may be an unknown unit: in brackets, or short."""
 
 
 @dataclass(frozen=True)
@@ -45,23 +43,23 @@ class Dialect:
 
     @property
     def separator(self) -> str:
-        """What pandas calls it; any white space counts as one delimiter."""
+        """The delimiter for pandas; any white space counts as one."""
         return r"\s+" if self.delimiter == " " else self.delimiter
 
     @property
     def in_words(self) -> str:
-        """Delimiter and decimal point as messages have them."""
+        """Delimiter and decimal point, for messages."""
         named = {"\t": "tabs", " ": "spaces"}.get(self.delimiter, repr(self.delimiter))
         return f"{named} between fields and decimal {self.decimal!r}"
 
 
 def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
-    """Look at the first lines of a text file; what the settings say is not looked for.
+    """Derive the dialect of a text file from its first lines, as far as it is not given.
 
     Raises
     ------
     InputError
-        Where the file is no text, or no table of numbers is in it.
+        If the file is no text, or has no table of numbers.
     """
     with open(path, "rb") as file:
         start = file.read(LOOKED_AT)
@@ -83,7 +81,7 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
             lines[skipped:], sorted(set(RARE.findall("".join(lines[skipped:])))), settings
         )
     if not guesses:
-        raise InputError(_why_there_is_none(lines, settings))
+        raise InputError(_no_table(lines, settings))
     table = max(guesses, key=lambda guess: guess.fields_of_numbers)
     names = settings.columns or table.header(lines[skipped:])
     if len(names) != table.width:
@@ -94,9 +92,10 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     if names == table.numbered:
         notes.append("no header: columns are named c1, c2, ...")
     comment = settings.comment or _comment(lines)
-    if twice := [name for name, times in Counter(names).items() if times > 1]:
+    twice = [name for name, times in Counter(names).items() if times > 1]
+    if twice:
         notes.append(
-            f"columns that stand twice are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
+            f"columns with the same name are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
         )
     return Dialect(
         encoding,
@@ -104,7 +103,7 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         table.decimal,
         comment,
         skipped + table.first,
-        _told_apart(names),
+        _numbered_twins(names),
         tuple(notes),
     )
 
@@ -112,7 +111,8 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
 def _tables(
     lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings
 ) -> list["_Table"]:
-    return [table for delimiter in delimiters if (table := _Table.of(lines, delimiter, settings))]
+    tables = [_Table.of(lines, delimiter, settings) for delimiter in delimiters]
+    return [table for table in tables if table is not None]
 
 
 def _encoding(start: bytes) -> str:
@@ -122,8 +122,8 @@ def _encoding(start: bytes) -> str:
     nuls = start.count(b"\0")
     if nuls and not _is_stray(nuls, start):
         raise InputError(
-            f"is no text (it starts with {start[:8]!r}), nor of another format that exoid knows: "
-            "text, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bag; export it as one of these"
+            f"is in no known format (it starts with {start[:8]!r}); export it as text, .mat,"
+            " Parquet, JSON, HDF5, MCAP or ROS 2 bag"
         )
     try:
         start[:-4].decode("utf-8")  # the last character may be cut in two
@@ -133,8 +133,7 @@ def _encoding(start: bytes) -> str:
 
 
 def _is_stray(nuls: int, start: bytes) -> bool:
-    """Tell whether NUL bytes are slips in a text, as where a disk was full: few, and after a header
-    without any."""
+    """Return whether NUL bytes are faults in a text, as of a full disk: few, none in the header."""
     return nuls < STRAY * len(start) and b"\0" not in start.partition(b"\n")[0]
 
 
@@ -143,14 +142,14 @@ def _comment(lines: Sequence[str]) -> str | None:
     return next((mark for mark in COMMENTS if starts[mark]), None)
 
 
-def _why_there_is_none(lines: Sequence[str], settings: SourceSettings) -> str:
+def _no_table(lines: Sequence[str], settings: SourceSettings) -> str:
     if not any(line.strip() for line in lines):
         return "is empty, expected a table of numbers; record it again"
     how = f" with delimiter {settings.delimiter!r}" if settings.delimiter else ""
     header = lines[settings.skip_rows or 0 :][:1]
     return (
         f"holds no rows of two numbers or more{how} after {header[0][:60]!r}; "
-        "check that it is a log, or say in the map's [source] how it is written"
+        "check that it is a log, or describe it in the map's [source]"
         if header
         else "has fewer lines than source.skip_rows; lower it"
     )
@@ -158,7 +157,7 @@ def _why_there_is_none(lines: Sequence[str], settings: SourceSettings) -> str:
 
 @dataclass(frozen=True)
 class _Table:
-    """The rows of numbers that a delimiter would make."""
+    """The rows of numbers that a delimiter gives."""
 
     delimiter: str
     decimal: str
@@ -169,12 +168,13 @@ class _Table:
 
     @classmethod
     def of(cls, lines: Sequence[str], delimiter: str, settings: SourceSettings) -> "_Table | None":
-        """Return the table that a delimiter makes of some lines; None where there is none."""
-        decimals = (
-            [settings.decimal] if settings.decimal else ["."] if delimiter == "," else [".", ","]
-        )
-        found = [table for decimal in decimals if (table := cls._with(lines, delimiter, decimal))]
-        return max(found, key=lambda table: table.fields_of_numbers, default=None)
+        """Return the table that a delimiter gives; None where there is none."""
+        if settings.decimal:
+            decimals = [settings.decimal]
+        else:
+            decimals = ["."] if delimiter == "," else [".", ","]
+        tables = [cls._with(lines, delimiter, decimal) for decimal in decimals]
+        return max(filter(None, tables), key=lambda table: table.fields_of_numbers, default=None)
 
     @classmethod
     def _with(cls, lines: Sequence[str], delimiter: str, decimal: str) -> "_Table | None":
@@ -191,12 +191,14 @@ class _Table:
 
     @property
     def numbered(self) -> tuple[str, ...]:
-        """Names of columns that have none."""
+        """Names of columns without a header."""
         return tuple(f"c{k + 1}" for k in range(self.width))
 
     def header(self, lines: Sequence[str]) -> tuple[str, ...]:
-        """Return the names above the rows: the last line of as many fields, and if that is of units
-        the one before."""
+        """Return the names above the rows: the last line with as many fields as a row.
+
+        If that line holds units, they are appended to the names in the line before.
+        """
         above = [
             _fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter)
             for line in lines[: self.first]
@@ -239,9 +241,8 @@ def _is_number(field: str, decimal: str) -> bool:
     return re.fullmatch(rf"[-+]?(\d+({point}\d*)?|{point}\d+)([eE][-+]?\d+)?", field) is not None
 
 
-def _told_apart(names: Sequence[str]) -> tuple[str, ...]:
-    """Give names that stand twice a number: of two ``q`` the first is ``q#1``, the other
-    ``q#2``."""
+def _numbered_twins(names: Sequence[str]) -> tuple[str, ...]:
+    """Add numbers to names that occur twice: two columns ``q`` become ``q#1`` and ``q#2``."""
     times, seen = Counter(names), Counter[str]()
     apart = []
     for name in names:

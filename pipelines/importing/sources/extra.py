@@ -7,17 +7,17 @@ from pipelines.errors import InputError
 
 
 def library(name: str) -> ModuleType:
-    """Return a library of the extra ``import``; where it is not installed, say how to install it.
+    """Return a library of the extra ``import``.
 
     Raises
     ------
     InputError
-        Where it is not installed.
+        If it is not installed, with the command that installs it.
     """
     try:
         return importlib.import_module(name)
     except ImportError as error:
         package = name.partition(".")[0]
         raise InputError(
-            f"to read it exoid needs {package}, which is not installed; pip install 'exoid[import]'"
+            f"needs {package}, which is not installed; pip install 'exoid[import]'"
         ) from error

@@ -1,4 +1,4 @@
-"""Columns with plain names out of whatever is nested: ``hip.position``, ``q[0]``."""
+"""Columns of nested content, with plain names: ``hip.position``, ``q[0]``."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import prod
@@ -10,8 +10,7 @@ from pipelines.importing.sources.source import Columns
 
 
 def flattened(content: Any, name: str = "") -> Columns:
-    """Return every array (n,) of numbers, or of text, below an object; what is something else is
-    left out."""
+    """Return every array (n,) of numbers or text in nested content; other values are left out."""
     return dict(_columns(content, name))
 
 
@@ -35,15 +34,14 @@ def _is_list_of_records(content: Any) -> bool:
 
 
 def _transposed(records: Sequence[Mapping]) -> dict[str, list]:
-    """Return a list of every key; a record that lacks one has no value there."""
+    """Return a list of values for each key; a record without the key has no value there."""
     keys = dict.fromkeys(key for record in records for key in record)
     columns = {key: [record.get(key) for record in records] for key in keys}
     return {key: _filled(values) for key, values in columns.items()}
 
 
 def _filled(values: list) -> list:
-    """Give records, and lists of numbers, where there are none, so that what is below them has as
-    many rows."""
+    """Replace missing records and lists by empty ones, so that all columns have as many rows."""
     whole = next((value for value in values if isinstance(value, Mapping | list)), None)
     if whole is None:
         return values

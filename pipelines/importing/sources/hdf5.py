@@ -1,4 +1,4 @@
-"""Logs in HDF5, MATLAB's v7.3 among them."""
+"""Logs in HDF5, including MATLAB v7.3."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,37 +18,36 @@ MATLAB_CLASSES_OF_NUMBERS = frozenset(
 
 
 def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Source:
-    """Return the log in an HDF5 file; a data set in groups has a name with slashes,
-    ``run1/hip/angle``.
+    """Return the log in an HDF5 file; names have slashes, as in ``run1/hip/angle``.
 
     Raises
     ------
     InputError
-        Where the file is damaged.
+        If the file is damaged.
     """
     h5py = library("h5py")
     try:
         with h5py.File(path) as file:
-            below = _group(file, settings.table)
-            sets = _data_sets(below)
+            group = _group(file, settings.table)
+            sets = _data_sets(group)
             columns = {
                 name: data
                 for data in sets
-                for name in flattened(_values(below[data], sample=True), data)
+                for name in flattened(_values(group[data], sample=True), data)
             }
     except OSError as error:
         raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
 
     def load(names: Sequence[str]) -> Columns:
         with h5py.File(path) as file:
-            below = _group(file, settings.table)
+            group = _group(file, settings.table)
             wanted = dict.fromkeys(columns[name] for name in names)
-            found = {
+            values_of = {
                 name: values
                 for data in wanted
-                for name, values in flattened(_values(below[data]), data).items()
+                for name, values in flattened(_values(group[data]), data).items()
             }
-        return {name: found[name] for name in names}
+        return {name: values_of[name] for name in names}
 
     return Source(path, format, tuple(columns), load)
 
@@ -62,8 +61,8 @@ def _group(file: Any, table: str | None) -> Any:
         )
     if not hasattr(file[table], "visititems"):
         raise InputError(
-            f"source.table names {table!r}, which is a data set, expected the group that holds it;"
-            " leave source.table out and name the data set as a column"
+            f"source.table names {table!r}, which is a data set, expected a group; remove"
+            " source.table and name the data set as a column"
         )
     return file[table]
 
@@ -73,7 +72,7 @@ def _data_sets(group: Any) -> list[str]:
     names: list[str] = []
 
     def visit(name: str, item: Any) -> None:
-        # MATLAB keeps the content of its cells below #refs#, under names that say nothing.
+        # MATLAB keeps the content of its cells below #refs#, under meaningless names.
         if hasattr(item, "dtype") and not name.startswith("#") and _is_of_numbers(item):
             names.append(name)
 
@@ -90,8 +89,7 @@ def _is_of_numbers(data: Any) -> bool:
 
 
 def _values(data: Any, sample: bool = False) -> np.ndarray:
-    """Return a data set's values, of which a few rows tell the shape; MATLAB's have their axes the
-    other way round."""
+    """Return a data set's values, a few rows for a sample; axes of MATLAB's are transposed."""
     if "MATLAB_class" in data.attrs and data.ndim > 1:
         return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
     return np.empty(data.shape, dtype=data.dtype) if sample else data[()]

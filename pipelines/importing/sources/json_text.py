@@ -18,13 +18,13 @@ def open_json(path: Path, settings: SourceSettings) -> Source:
     Raises
     ------
     InputError
-        Where it is no JSON, nested too deep to be a log, or nothing in it has a name.
+        If it is no JSON, nested too deeply, or without names.
     """
     try:
         columns = _flattened(_content(path), settings.table)
     except RecursionError as error:
         raise InputError(
-            "nests lists or tables deeper than any log does; write it again, flatter"
+            "nests lists or tables too deeply; write it again with fewer levels"
         ) from error
     if set(columns) == {""}:
         raise InputError(
@@ -49,19 +49,14 @@ def _content(path: Path) -> Any:
 
 
 def _flattened(content: Any, table: str | None) -> Columns:
-    """Return columns by their names below the table; where none is named, of the only one that has
-    records."""
+    """Return the columns below a table; without a name, of the only one that has records."""
     if table is None:
         columns = flattened(content)
-        prefixes = {name.partition(".")[0] for name, values in columns.items() if len(values) > 1}
-        if (
-            isinstance(content, Mapping)
-            and len(prefixes) == 1
-            and isinstance(content[next(iter(prefixes))], list)
-        ):
-            table = next(iter(prefixes))
-        else:
+        tops = {name.partition(".")[0] for name, values in columns.items() if len(values) > 1}
+        top = next(iter(tops), "")
+        if len(tops) != 1 or not isinstance(content, Mapping) or not isinstance(content[top], list):
             return columns
+        table = top
     below = content
     for key in table.split("."):
         if not isinstance(below, Mapping) or key not in below:

@@ -15,20 +15,21 @@ V73 = b"MATLAB 7.3"
 
 
 def open_matlab(path: Path, settings: SourceSettings) -> Source:
-    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a
-    matrix numbered ones.
+    """Return the log in a .mat file.
+
+    Fields of a struct have dotted names, columns of a matrix numbered ones.
 
     Raises
     ------
     InputError
-        Where the file is damaged, or has not the variable that the map names.
+        If the file is damaged, or lacks the variable that the map names.
     """
     with open(path, "rb") as file:
         if file.read(len(V73)) == V73:
             return open_hdf5(path, settings, "MATLAB v7.3")
     try:
         content = scipy.io.loadmat(path, simplify_cells=True)
-    except Exception as error:  # scipy tells of a damaged file by whatever error its bytes lead to
+    except Exception as error:  # scipy raises errors of any class for a damaged file
         raise InputError(
             f"is a damaged .mat file ({type(error).__name__}: {error}); save it again, with -v7 or"
             " -v7.3"

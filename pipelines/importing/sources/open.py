@@ -1,4 +1,4 @@
-"""The right reader for a file, by its content rather than its name."""
+"""Choose the reader of a file by its content, not its name."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ BEGINNINGS = {
     b"\x89MCAP0": open_rosbag,
     b"SQLite format 3\0": open_rosbag,
 }
-"""What a file of a format starts with."""
+"""First bytes of a file, by format."""
 
 
 def open_source(path: Path, settings: SourceSettings) -> Source:
@@ -29,7 +29,7 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
     Raises
     ------
     InputError
-        Where there is no such file, or it is of no format that exoid knows, or damaged.
+        If there is no such file, or it is damaged or of an unknown format.
     """
     if not path.exists():
         raise InputError(f"no such file; {similar_file(path) or 'check the name'}")
@@ -39,11 +39,10 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
                 "is a folder, expected a log or the folder of a ROS 2 bag; name a file in it"
             )
         return _with_columns(open_rosbag(path, settings))
-    # It is read more than once, and what nobody writes to is waited for without end.
+    # The file is read more than once, and an idle pipe would block without end.
     if not path.is_file():
         raise InputError(
-            "is a pipe or a device, expected a file; write what comes out of it to one, and name"
-            " that"
+            "is a pipe or a device, expected a file; write its content to a file and name that"
         )
     with open(path, "rb") as file:
         start = file.read(64)
@@ -63,7 +62,7 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
 def _with_columns(source: Source) -> Source:
     if not source.names:
         raise InputError(
-            f"holds no column of numbers that exoid could read as {source.format}; "
+            f"holds no column of numbers, read as {source.format}; "
             "export it with plain arrays (of a MATLAB table, table2struct or writetable)"
         )
     return source

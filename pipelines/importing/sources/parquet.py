@@ -16,20 +16,21 @@ from pipelines.settings.import_map import SourceSettings
 
 
 def open_parquet(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list
-    numbered ones.
+    """Return the log in a Parquet file.
+
+    Fields of a struct have dotted names, elements of a list numbered ones.
 
     Raises
     ------
     InputError
-        Where the file is damaged, or two of its columns have one name.
+        If the file is damaged, or two of its columns have one name.
     """
     schema = _opened(path).schema_arrow
     _refuse_twins(schema.names)
     empty = _unnested(schema.empty_table())
     _refuse_twins(empty.column_names)
     if any(pa.types.is_nested(field.type) for field in empty.schema):
-        with _damage_told():
+        with _damage_reported():
             columns = flattened(_opened(path).read().to_pydict())
         return Source(
             path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names}
@@ -42,7 +43,7 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
             for top in file.schema_arrow.names
             if any(f"{name}.".startswith(f"{top}.") for name in names)
         ]
-        with _damage_told():
+        with _damage_reported():
             table = _unnested(file.read(columns=tops))
         return {name: _numpy(table.column(name)) for name in names}
 
@@ -50,18 +51,18 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
 
 
 def _opened(path: Path) -> pq.ParquetFile:
-    with _damage_told():
+    with _damage_reported():
         return pq.ParquetFile(path)
 
 
 @contextmanager
-def _damage_told() -> Iterator[None]:
-    """Say of whatever a damaged file makes the library say that the file is damaged."""
+def _damage_reported() -> Iterator[None]:
+    """Raise one error for all that the library raises for a damaged file."""
     try:
         yield
     except (pa.ArrowException, OSError) as error:
         if isinstance(error, OSError) and error.errno is not None:
-            raise  # the system's word: no permission, no such file
+            raise  # from the system: no permission, no such file
         raise InputError(
             f"is a damaged or truncated Parquet file ({error}); copy it again"
         ) from error
@@ -70,10 +71,7 @@ def _damage_told() -> Iterator[None]:
 def _refuse_twins(names: Sequence[str]) -> None:
     twins = [name for name, times in Counter(names).items() if times > 1]
     if twins:
-        raise InputError(
-            f"has two columns {twins[0]!r}, and nobody knows which is meant; rename one and write"
-            " it again"
-        )
+        raise InputError(f"has two columns {twins[0]!r}; rename one and write the file again")
 
 
 def _unnested(table: pa.Table) -> pa.Table:
@@ -83,7 +81,7 @@ def _unnested(table: pa.Table) -> pa.Table:
 
 
 def _numpy(column: pa.ChunkedArray) -> NDArray:
-    """Return the values; instants and durations to the nanosecond."""
+    """Return a column's values; dates and durations in nanoseconds."""
     if pa.types.is_timestamp(column.type):
         column = column.cast(pa.timestamp("ns", column.type.tz))
     elif pa.types.is_duration(column.type):

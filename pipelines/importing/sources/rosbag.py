@@ -1,5 +1,4 @@
-"""Logs of ROS 2: sensor_msgs/JointState out of bags (.mcap, .db3, or the folder that holds
-them)."""
+"""Logs of ROS 2: sensor_msgs/JointState from bags (.mcap, .db3, or their folder)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,7 +25,7 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
     Raises
     ------
     InputError
-        Where it cannot be read.
+        If it cannot be read.
     """
     highlevel, typesys = library("rosbags.highlevel"), library("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.LATEST)
@@ -40,7 +39,7 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
             )
     except InputError:
         raise
-    except Exception as error:  # a damaged bag makes its library fail in any way
+    except Exception as error:  # the library raises errors of any class for a damaged bag
         raise InputError(
             f"is no ROS 2 bag that can be read ({error}); record or copy it again"
         ) from error
@@ -55,7 +54,7 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
 
 
 def _topic(reader: Any, named: str | None) -> str:
-    """Return the topic that is named, or the only one of joint states."""
+    """Return the topic in the map, or the only one with joint states."""
     topics = list(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == JOINT_STATE))
     if not topics:
         others = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections) or "nothing"
@@ -74,8 +73,10 @@ def _topic(reader: Any, named: str | None) -> str:
 
 
 def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
-    """Return a column of each joint's quantity; messages may name their joints in any order, or
-    only some."""
+    """Return a column for each joint's quantity.
+
+    Messages may have their joints in any order, and lack some.
+    """
     stamps: list[int] = []
     received: list[int] = []
     values: dict[str, dict[int, float]] = {}

@@ -11,16 +11,16 @@ Columns = dict[str, NDArray]
 
 @dataclass(frozen=True)
 class Source:
-    """A log whose columns are read when they are asked for."""
+    """A log whose columns are read on demand."""
 
     path: Path
     format: str
     names: tuple[str, ...]
-    """Of its columns; what is nested has dotted names, what is an array has numbered ones."""
+    """Names of its columns: dotted where nested, numbered where part of an array."""
     load: Callable[[Sequence[str]], Columns]
     """Return the named columns, each (n,) as the file has them; a constant has one row."""
     notes: tuple[str, ...] = ()
-    """How it was read, where that was found by looking at it."""
+    """How it was read, as far as that was derived from its content."""
 
     def __str__(self) -> str:
         return str(self.path)

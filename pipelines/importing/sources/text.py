@@ -1,4 +1,4 @@
-"""Logs in text files: comma-separated values and all their relatives."""
+"""Logs in text files, such as comma-separated values."""
 
 import re
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
 BEYOND = "\0beyond"
-"""A column after the last, in which nothing may stand."""
+"""A column after the last, which must be empty."""
 CHUNK = 2**17
-"""Rows that are parsed at a time; the columns that nobody asked for are gone before the next."""
+"""Rows that are parsed at a time, to keep only the columns that are needed."""
 
 
 def open_text(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a text file, in the dialect that was found or told."""
+    """Return the log in a text file, in the given or derived dialect."""
     dialect = find_dialect(path, settings)
     return Source(
         path, "text", dialect.names, lambda names: _load(path, dialect, names), dialect.notes
@@ -30,7 +30,7 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
     parts: list[Columns] = []
     wanted = list(dict.fromkeys(names))
     try:
-        # All columns: told to read only some, pandas would not see that a row has too many.
+        # All columns are read, as otherwise pandas would not report rows with too many fields.
         reader = pd.read_csv(
             path,
             sep=dialect.separator,
@@ -48,39 +48,36 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
         )
         with reader:
             for part in reader:
-                if part[BEYOND].notna().any():
-                    raise InputError(
-                        _too_many_fields(f"row {part[BEYOND].notna().idxmax()}", dialect)
-                    )
-                # Each column by itself: out of a table of thousands it takes long to take one.
+                excess = part[BEYOND].notna()
+                if excess.any():
+                    raise InputError(_too_many_fields(f"row {excess.idxmax()}", dialect))
+                # Copies, as slicing one column from a table of thousands is slow later on.
                 parts.append({name: part[name].to_numpy().copy() for name in wanted})
     except (pd.errors.ParserError, ValueError) as error:
-        raise InputError(_why_not(str(error), dialect)) from error
+        raise InputError(_parse_error(str(error), dialect)) from error
     return {name: _joined([part.pop(name) for part in parts]) for name in wanted}
 
 
-def _why_not(error: str, dialect: Dialect) -> str:
-    """Say what pandas means."""
-    if line := re.search(r"in line (\d+), saw", error):
+def _parse_error(error: str, dialect: Dialect) -> str:
+    """Return pandas' error in plain words."""
+    line = re.search(r"in line (\d+), saw", error)
+    if line:
         return _too_many_fields(f"line {line[1]}", dialect)
-    if row := re.search(r"EOF inside string starting at row (\d+)", error):
-        return (
-            f"line {int(row[1]) + 1} opens a quotation mark that nothing closes; close it, or drop"
-            " the line"
-        )
-    return f"cannot be read as text ({error}); export it anew"
+    row = re.search(r"EOF inside string starting at row (\d+)", error)
+    if row:
+        return f"line {int(row[1]) + 1} has an unclosed quotation mark; close it, or drop the line"
+    return f"cannot be read as text ({error}); export it again"
 
 
 def _too_many_fields(where: str, dialect: Dialect) -> str:
     return (
-        f"{where} has more than the {len(dialect.names)} fields of the others, and nobody knows"
-        " which is which; mend it, or say in the map's [source] how the file is written (read with"
-        f" {dialect.in_words})"
+        f"{where} has more than the {len(dialect.names)} fields of the others (read with"
+        f" {dialect.in_words}); correct it, or describe the file in the map's [source]"
     )
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
-    """Return the chunks of a column in one; what was text in one of them is none in the others."""
+    """Return the chunks of a column as one; where one has text, all keep their objects."""
     if len({part.dtype for part in parts}) > 1 and all(part.dtype != object for part in parts):
         return np.concatenate([part.astype(float) for part in parts])
     return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""A log's clock: brought to seconds, cut where it starts over, put in order, and told of."""
+"""A log's clock: converted to seconds, divided where it starts over, and sorted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,33 +14,41 @@ from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 
-RESTART_S, RESTART_PERIODS, RESTART_ROWS = 1.0, 20, 20
-"""A clock that steps back by more than the longer of the first two starts over, and one that stays
-behind for more rows than the third; a smaller step is of rows that arrived out of order."""
-LEAD_ROWS, LEAD_PERIODS, LEAD_S = 5, 20, 0.2
-"""So few rows, so long before the rest, are no part of the run."""
+RESTART_S, RESTART_PERIODS = 1.0, 20
+"""A clock that steps back by more than the longer of these, s and samples, starts over.
+
+A smaller step back is of rows that arrived out of order.
+"""
+RESTART_ROWS = 20
+"""A clock that stays behind its latest stamp for more rows than these starts over, too."""
+LEAD_ROWS = 5
+"""At most so many rows at the beginning are left out if they are long before the rest."""
+LEAD_PERIODS, LEAD_S = 20, 0.2
+"""Long before is more than the longer of these, samples and s."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
-"""Where counters are full."""
+"""Moduli of counters."""
 FEW = 100
-"""Stamps by which a column of text is known for one of dates."""
+"""Stamps from which the content of a text column is derived."""
 LONGEST = 29
-"""Letters of a stamp that are shown: a date to the nanosecond."""
+"""Greatest length of a stamp in a message: a date to the nanosecond."""
 NEAR = 0.01
+"""Distance from its modulus, as a share, within which a counter is full."""
 BACKWARDS = 0.9
+"""Share of steps back from which a clock runs backwards."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
-"""Between these a machine is sampled; three decades, so that of s, ms, us and ns only one fits."""
+"""Usual rates of machines: three decades, so that only one of s, ms, us and ns fits."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Rows over which the clock went on, in the order of time."""
+    """Rows over which the clock goes forward, in the order of time."""
 
     rows: NDArray
-    """(n,) their numbers in the file."""
+    """(n,) row numbers in the file."""
     time_s: NDArray
-    """(n,) strictly increasing; 0 where the run begins."""
+    """(n,) times since the run's first row, s; strictly increasing."""
     began_s: float
-    """Time of its first row since the file's first stamp."""
+    """Time of its first row since the file's first stamp, s."""
     findings: tuple[Finding, ...] = ()
     """About this run alone."""
 
@@ -49,8 +57,7 @@ class Run:
 
 
 def usual_units(step: float) -> list[str]:
-    """Return the units in which a step from one stamp to the next makes a rate that machines are
-    sampled at."""
+    """Return the units in which a step between stamps gives a usual rate of machines."""
     return [
         unit
         for unit in ("s", "ms", "us", "ns")
@@ -58,45 +65,50 @@ def usual_units(step: float) -> list[str]:
     ]
 
 
-def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
-    """Refuse dates (n,) whose unit is one of numbers, and numbers whose unit is that of dates.
+def check_unit(raw: NDArray, column: str, unit: str) -> None:
+    """Refuse dates with the unit of numbers, and numbers with the unit of dates.
+
+    Parameters
+    ----------
+    raw : (n,) array
+        Stamps as the file has them.
+    column, unit : str
+        Name of their column, and its unit in the map.
 
     Raises
     ------
     SettingsError
-        Where that is so, with the unit to set.
+        If they do not fit, with the unit to set.
     """
-    holds = _held(raw)
-    # Dates and durations that a file tells as such are whole nanoseconds too.
+    content = _content(raw)
     fits = {
         "dates": unit == "iso8601",
         "durations": False,
         "plain numbers": unit != "iso8601",
         "": True,
-    }[holds]
+    }[content]
+    # Typed dates and durations in a file are whole nanoseconds, too.
     if fits or (raw.dtype.kind in "mM" and unit == "ns"):
         return
     known = raw[~pd.isna(raw)]
-    right = {"dates": ["iso8601"], "durations": ["ns"]}.get(holds) or _usual(
-        numbers(known, column, [])
-    )
+    right = {"dates": ["iso8601"], "durations": ["ns"]}.get(content)
+    if right is None:
+        right = _likely_units(numbers(known, column, []))
     raise SettingsError(
-        f"{column!r} holds {holds}, the first {str(known[0])[:LONGEST]!r}, and time.unit = {unit!r}"
-        f" in the map says otherwise; set it to {' or '.join(right)}"
+        f"{column!r} holds {content}, the first {str(known[0])[:LONGEST]!r}, but the map has"
+        f" time.unit = {unit!r}; set it to {' or '.join(right)}"
     )
 
 
-def _usual(known: NDArray) -> list[str]:
-    """Return the units in which stamps (n,) that are numbers make a usual rate; all of them where
-    in none."""
+def _likely_units(known: NDArray) -> list[str]:
+    """Return the units in which numeric stamps (n,) give a usual rate; else all units."""
     steps = np.diff(known)
     steps = steps[steps > 0.0]
     return (usual_units(float(np.median(steps))) if len(steps) else []) or ["s", "ms", "us", "ns"]
 
 
-def _held(raw: NDArray) -> str:
-    """Return what a column (n,) of stamps holds: dates, durations or plain numbers; nothing where
-    it does not say."""
+def _content(raw: NDArray) -> str:
+    """Return the kind of stamps (n,): dates, durations or plain numbers; empty where unknown."""
     if raw.dtype.kind in "biufmM":
         return {"M": "dates", "m": "durations"}.get(raw.dtype.kind, "plain numbers")
     some = raw[~pd.isna(raw)][:FEW]
@@ -106,70 +118,110 @@ def _held(raw: NDArray) -> str:
 
 
 def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDArray:
-    """Return time stamps (n,) as numbers in the map's unit; whole numbers stay whole, for
-    nanoseconds since 1970 are more than a float64 can tell apart.
+    """Return time stamps as numbers in the map's unit.
+
+    Whole numbers stay integers, as float64 cannot represent every nanosecond since 1970.
+
+    Parameters
+    ----------
+    raw : (n,) array
+        Stamps as the file has them.
+    settings : TimeSettings
+        Unit of the stamps.
+    findings : list of Finding
+        Extended by those about the stamps.
+
+    Returns
+    -------
+    (n,) array
+        int64, or float64 with NaN where a stamp is missing.
 
     Raises
     ------
     InputError
-        Where whole numbers are larger than any clock counts.
+        If there is no date, or a stamp does not fit into int64.
     """
-    found = whole_nanoseconds(raw) if settings.unit == "iso8601" or raw.dtype.kind in "mM" else raw
-    if settings.unit == "iso8601" and len(raw) and not np.isfinite(found).any():
+    dates = settings.unit == "iso8601"
+    values = whole_nanoseconds(raw) if dates or raw.dtype.kind in "mM" else raw
+    if dates and len(raw) and not np.isfinite(values).any():
         raise InputError(
-            f"has {str(raw[0])[:LONGEST]!r} where a date should be, expected dates as 2026-01-31"
-            " 12:00:00.125; write them so, or correct time.column or time.unit in the map"
+            f"has {str(raw[0])[:LONGEST]!r}, expected a date such as 2026-01-31 12:00:00.125;"
+            " correct time.column or time.unit in the map"
         )
-    return whole(found) if found.dtype.kind in "iu" else numbers(found, "time", findings)
+    return whole(values) if values.dtype.kind in "iu" else numbers(values, "time", findings)
 
 
-def whole(found: NDArray) -> NDArray:
-    """Return whole stamps (n,) as int64: of narrower numbers, and of those without a sign, a
-    difference wraps round.
+def whole(values: NDArray) -> NDArray:
+    """Return whole stamps as int64, in which differences do not wrap around.
+
+    Parameters
+    ----------
+    values : (n,) array of integers
+        Stamps of any width, with or without sign.
+
+    Returns
+    -------
+    (n,) array of int64
+        The same stamps.
 
     Raises
     ------
     InputError
-        Where they are larger than that holds.
+        If a stamp does not fit.
     """
-    if found.dtype.kind == "u" and len(found) and found.max() > np.iinfo(np.int64).max:
+    if values.dtype.kind == "u" and len(values) and values.max() > np.iinfo(np.int64).max:
         raise InputError(
-            f"has the time stamp {found.max()}, more than any clock counts; correct time.column in"
-            " the map, or mark stamps that are missing as such"
+            f"has the time stamp {values.max()}, too large for a clock; correct time.column in the"
+            " map, or mark missing stamps as such"
         )
-    return found.astype(np.int64)
+    return values.astype(np.int64)
 
 
 def seconds(
-    found: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]
+    values: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]
 ) -> NDArray:
-    """Return stamps (n,) as seconds since ``origin``, which is a stamp too; NaN where there is
-    none."""
+    """Return stamps as times since an origin.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Stamps in the map's unit.
+    origin : float
+        Stamp at time 0.
+    settings : TimeSettings
+        Unit of the stamps, and the modulus of the clock if it wraps around.
+    findings : list of Finding
+        Extended by one about wraparounds.
+
+    Returns
+    -------
+    (n,) array
+        Times, s, NaN where a stamp is missing.
+    """
     unit = unit_named(settings.unit)
-    assert unit is not None, "was looked at with the map"
-    since = (found - origin).astype(float)
+    assert unit is not None, "the map checks its units"
+    since = (values - origin).astype(float)
     if settings.wraps_at is not None:
-        since = _counted_on(since, settings.wraps_at, findings)
+        since = _unwrapped(since, settings.wraps_at, findings)
     return since * unit.factor
 
 
-def first_stamp(found: NDArray) -> float:
-    """Return the first of the stamps (n,) that is one, as it stands in the file.
+def first_stamp(values: NDArray) -> float:
+    """Return the first of the stamps (n,) that is not missing.
 
     Raises
     ------
     InputError
-        Where none is.
+        If all are missing.
     """
-    known = found if found.dtype.kind in "iu" else found[np.isfinite(found)]
+    known = values if values.dtype.kind in "iu" else values[np.isfinite(values)]
     if not len(known):
         raise InputError("no row has a time stamp; correct time.column or time.unit in the map")
     return known[0]
 
 
-def _counted_on(since: NDArray, modulus: float, findings: list[Finding]) -> NDArray:
-    """Undo wraps: a clock that steps back by more than half of where it is full has gone on in
-    truth."""
+def _unwrapped(since: NDArray, modulus: float, findings: list[Finding]) -> NDArray:
+    """Undo wraparounds, which are steps back by more than half the modulus."""
     known = np.isfinite(since)
     wraps = np.diff(since[known], prepend=since[known][0]) < -0.5 * modulus
     if wraps.any():
@@ -185,22 +237,33 @@ def _counted_on(since: NDArray, modulus: float, findings: list[Finding]) -> NDAr
 
 
 def uniform(rows: int, rate_hz: float, findings: list[Finding]) -> Run:
-    """Return the run of a log without a clock, whose rows are known to come at a rate."""
+    """Return the run of a log without a clock, of ``rows`` rows at a given rate."""
     findings.append(
         Finding(
             "time",
             "no clock in the log",
-            f"rows taken for uniform at {rate_hz:g} Hz, as the map says",
+            f"rows taken for uniform at {rate_hz:g} Hz, by the map",
         )
     )
     return Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
 
 
 def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
-    """Return the runs of a log whose stamps (n,) may repeat, go back and start over; each strictly
-    increases.
+    """Divide a log into runs whose times strictly increase.
 
-    ``raw`` are the stamps as they stand in the file, to tell a clock that was full.
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s, which may be missing, repeat, go back and start over.
+    raw : (n,) array
+        Stamps as the file has them, which show whether a counter was full.
+    findings : list of Finding
+        Extended by those about the clock.
+
+    Returns
+    -------
+    list of Run
+        Runs of at least two rows, in the order of the file.
     """
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
@@ -210,7 +273,7 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
             )
         )
     _refuse_backwards(time_s[rows])
-    rows = _without_strays(rows, time_s, findings)
+    rows = _without_outliers(rows, time_s, findings)
     begins = _begins(time_s[rows])
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
@@ -218,12 +281,12 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
         findings.append(
             Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]])))
         )
-    found = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
-    return [run for run in found if len(run) > 1]
+    parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
+    return [run for run in parts if len(run) > 1]
 
 
 def runs_backwards(time: NDArray) -> bool:
-    """Tell whether a clock (n,) goes back at nine steps of ten."""
+    """Return whether a clock (n,) goes back at nine steps of ten."""
     steps = np.diff(time)
     return bool(len(steps)) and bool(np.mean(steps < 0.0) > BACKWARDS)
 
@@ -232,7 +295,7 @@ def _refuse_backwards(time: NDArray) -> None:
     if runs_backwards(time):
         raise InputError(
             f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
-            " last; turn the order of its rows round, or correct time.column in the map"
+            " last; reverse the order of its rows, or correct time.column in the map"
         )
 
 
@@ -242,8 +305,8 @@ def _period(time_s: NDArray) -> float:
     return float(np.median(steps)) if len(steps) else np.inf
 
 
-def _without_strays(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> NDArray:
-    """Leave out single stamps far off, between two that follow each other."""
+def _without_outliers(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> NDArray:
+    """Leave out single stamps far from both neighbours, which are close to each other."""
     time = time_s[rows]
     far = max(RESTART_S, RESTART_PERIODS * _period(time))
     step = np.diff(time)
@@ -261,19 +324,21 @@ def _without_strays(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> 
 
 
 def _begins(time: NDArray) -> list[int]:
-    """Return where a clock begins: at the first row, and wherever it starts over."""
+    """Return the first row, and each row at which the clock starts over."""
     far = max(RESTART_S, RESTART_PERIODS * _period(time))
     cuts = [0, *(np.flatnonzero(np.diff(time) < -far) + 1), len(time)]
     begins = []
     for first, last in pairwise(cuts):
         begins.append(int(first))
-        while (behind := _stays_behind(time[begins[-1] : last])) is not None:
+        behind = _stays_behind(time[first:last])
+        while behind is not None:
             begins.append(begins[-1] + behind)
+            behind = _stays_behind(time[begins[-1] : last])
     return begins
 
 
 def _stays_behind(time: NDArray) -> int | None:
-    """Return from where on time stays behind what it was for many rows; None where it nowhere
+    """Return the row from which time stays behind its maximum for many rows; None where it never
     does."""
     late = time < np.maximum.accumulate(time)
     edges = np.flatnonzero(np.diff(late, prepend=False, append=False))
@@ -283,26 +348,23 @@ def _stays_behind(time: NDArray) -> int | None:
 
 
 def full_register(before: float, after: float) -> float | None:
-    """Return at how much a counter is full that goes back from one stamp to another; None where
-    neither says so."""
+    """Return the modulus of a counter that goes back from one stamp to the next, if any fits."""
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
     if not near:
         return None
-    return 2.0 * near[0] if after < 0.0 else near[0]  # with a sign it goes on at the lowest number
+    # A counter with a sign continues at its lowest number, below zero.
+    return 2.0 * near[0] if after < 0.0 else near[0]
 
 
 def _if_full(before: float, after: float) -> str:
     full = full_register(before, after)
-    return (
-        f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}"
-        if full
-        else "another run begins"
-    )
+    if full is None:
+        return "another run begins"
+    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}"
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:
-    """Return rows in the order of time, one of each stamp, without a few that stand long before the
-    rest."""
+    """Return rows in the order of time, one for each stamp, without a few long before the rest."""
     findings: list[Finding] = []
     time = time_s[rows]
     back = np.count_nonzero(np.diff(time) < 0.0)
@@ -314,10 +376,11 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
                 "time", f"goes back a little, {counted(int(back), 'time')}", "rows put in order"
             )
         )
-    again = np.diff(time, prepend=-np.inf) <= 0.0
-    if again.any():
-        findings.append(_repeated(int(again.sum()), len(rows), int(rows[np.argmax(again)])))
-        rows, time = rows[~again], time[~again]
+    repeated = np.diff(time, prepend=-np.inf) <= 0.0
+    if repeated.any():
+        first_repeated = int(rows[np.argmax(repeated)])
+        findings.append(_repeated_stamps(int(repeated.sum()), len(rows), first_repeated))
+        rows, time = rows[~repeated], time[~repeated]
     first = _lead(time)
     if first:
         seen = f"{counted(first, 'row')} {time[first] - time[first - 1]:.3g} s before the rest"
@@ -325,21 +388,19 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
     return Run(rows[first:], time[first:] - time[first], float(time[first]), tuple(findings))
 
 
-def _repeated(again: int, rows: int, first: int) -> Finding:
+def _repeated_stamps(count: int, rows: int, first: int) -> Finding:
     seen = (
-        f"{counted(again, 'row')} ({again / rows:.1%}) with the stamp of another, the first is row"
+        f"{counted(count, 'row')} ({count / rows:.1%}) with the stamp of another, the first is row"
         f" {first}"
     )
-    advice = (
-        ""
-        if again < 0.05 * rows
-        else "; if rows are uniform and the clock is coarse, set time.rate_hz in place of it"
-    )
+    advice = ""
+    if count >= 0.05 * rows:
+        advice = "; if rows are uniform and the clock is coarse, set time.rate_hz in place of it"
     return Finding("time", seen, f"the first of each kept{advice}")
 
 
 def _lead(time: NDArray) -> int:
-    """Return how many rows stand long before the rest."""
+    """Return the number of rows at the beginning that are long before the rest."""
     steps = np.diff(time[: LEAD_ROWS + 1])
     far = np.flatnonzero(steps > max(LEAD_S, LEAD_PERIODS * _period(time)))
     return int(far[-1]) + 1 if len(far) else 0
@@ -353,19 +414,25 @@ class Sampling:
     gaps: Sequence[tuple[float, int]]
     """First missing time (s) and how many samples are missing."""
     steps_s: tuple[float, float, float]
-    """The shortest step, the median, and the longest that is no gap."""
+    """Shortest, median and longest step, without gaps."""
     irregular: float
     """Share of the steps that are more than 2 % off the median."""
 
     @classmethod
     def of(cls, clock_s: NDArray, kept_s: NDArray) -> "Sampling":
-        """Look at the steps of a clock (n,), and where of its samples only some (m,) are kept.
+        """Measure rate, gaps and regularity.
 
-        A gap is a step half as long again as 95 % of all steps are: where steps vary, a longer one
-        lost nothing.
+        A gap is a step more than 1.5 times as long as 95 % of all steps. The quantile allows for
+        clocks whose steps vary.
+
+        Parameters
+        ----------
+        clock_s : (n,) array
+            Times of all rows, s.
+        kept_s : (m,) array
+            Times of the rows that become a recording, s.
         """
-        # Of what was logged at several rates only a few rows are whole, and they have a rate of
-        # their own.
+        # In a log of several rates only a few rows have all values, and these have their own rate.
         steps = np.diff(clock_s if 2 * len(kept_s) > len(clock_s) else kept_s)
         median = float(np.median(steps))
         longest = 1.5 * max(median, float(np.quantile(steps, 0.95)))
@@ -387,6 +454,6 @@ class Sampling:
 
 
 def _rounded(rate_hz: float, samples: int) -> float:
-    """Return a whole number of Hz where over all samples that makes no difference."""
+    """Round to a whole number of Hz if the last sample moves by less than 1 % of a period."""
     whole = float(round(rate_hz))
     return whole if whole and abs(whole - rate_hz) * samples < 0.01 * rate_hz else rate_hz

@@ -1,7 +1,7 @@
-"""After how long a motion repeats: what differs between periods is noise, and what does not may be
-a cause."""
+"""Find the period of a motion, by which noise is separated from systematic errors."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,31 +12,45 @@ from scipy.signal import argrelmin, correlate
 from pipelines.importing.quantities.consistency import whole_rows
 
 POINTS = 20_000
-"""Instants that are looked at at most."""
-ANOTHER, MAYBE_ALIKE = 0.5, 0.5
-"""Half mean squared difference, in variances, above which a motion has become another, and below
-which it may be the same again."""
+"""Greatest number of instants that are compared."""
+DIFFERENT = 0.5
+"""Half mean squared difference, in variances, above which a motion differs from its beginning."""
+SIMILAR = 0.5
+"""The same, below which it may repeat."""
 REPEATS = 5e-4
-"""The same, of a usual pair of neighbouring periods, up to which a motion is repeated: 3 % in rms,
-for drives repeat their errors too, and a machine that swings by itself does not do so well."""
-AS_GOOD, AS_ROUND = 3.0, 1.1
-"""So often the least difference a shorter lag may leave that is preferred to the best, and a
-rounder one."""
+"""The same for the median pair of neighbouring periods of a periodic motion: 3 % in rms.
+
+Drives repeat their errors, too. A machine that swings freely does not repeat so well.
+"""
+AS_GOOD = 3.0
+"""Factor on the least difference up to which a shorter lag is preferred."""
+AS_ROUND = 1.1
+"""Factor on the least difference up to which a lag of fewer digits is preferred."""
 EQUAL = 1e-8
-"""A difference that is none: a sensor's steps and interpolation leave as much."""
+"""Difference due to a sensor's resolution and interpolation alone."""
 AT_REST = 0.01
-"""Share of the variance below which a stretch moves too little to repeat anything."""
+"""Share of the variance below which a period has too little motion to be compared."""
 MOST_LAGS = 100
+"""Greatest number of lags that are refined."""
 SMEARED = 0.01
 """Share of a lag by which a ramp or drift may shift it."""
 
 
 def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
-    """Return the period, s, of a motion (n, k) of k joints, in any units, at times (n,) s; None
-    where none repeats.
+    """Return the period of a motion.
 
-    A run shorter than two periods shows none, and neither does one whose periods differ by more
-    than a drive's errors.
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    motion : (n, k) array
+        Angles or set-points of k joints, in any units, NaN where missing.
+
+    Returns
+    -------
+    float or None
+        Period, s. None if the run is shorter than two periods, or its periods differ by more than a
+        drive's errors.
     """
     moving = [
         column
@@ -53,13 +67,11 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     columns = np.column_stack([np.interp(grid, time_s, column) for column in moving])
     columns = (columns - columns.mean(axis=0)) / np.maximum(columns.std(axis=0), 1e-300)
 
-    def unlike(lag: float) -> float:
-        return _of_a_usual_pair(columns, lag)
-
+    difference_at = partial(_median_difference, columns)
     near = [
-        _least(unlike, lag)
-        for lag in _candidates(_difference(columns))
-        if unlike(lag) < MAYBE_ALIKE
+        _refined(difference_at, lag)
+        for lag in _candidates(_mean_differences(columns))
+        if difference_at(lag) < SIMILAR
     ]
     best = min((difference for _, difference in near), default=np.inf)
     if best > REPEATS:
@@ -68,41 +80,57 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         (lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, EQUAL)
     )
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
-    as_good = (one for one in rounder if unlike(one / step) < max(AS_ROUND * least, EQUAL))
+    limit = max(AS_ROUND * least, EQUAL)
+    as_good = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
     return next(as_good, float(f"{step * lag:.6g}"))
 
 
-def _difference(columns: NDArray) -> NDArray:
-    """Return half the mean squared difference after each lag up to half the run, of the joint that
-    differs most."""
+def _mean_differences(columns: NDArray) -> NDArray:
+    """Return half the mean squared difference at each lag up to half the run, of the worst joint.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+        Motion of k joints, scaled to variance 1.
+
+    Returns
+    -------
+    (n // 2 + 1,) array
+        Difference in variances.
+    """
     n = len(columns)
     lags = np.arange(n // 2 + 1)
-    found = np.zeros(len(lags))
+    worst = np.zeros(len(lags))
     for column in columns.T:
         together = correlate(column, column, method="fft")[n - 1 : n + len(lags) - 1]
         power = np.concatenate([[0.0], np.cumsum(column**2)])
         both = power[n - lags] + power[n] - power[lags]
-        found = np.maximum(found, 0.5 * (both - 2.0 * together) / (n - lags))
-    return found
+        worst = np.maximum(worst, 0.5 * (both - 2.0 * together) / (n - lags))
+    return worst
 
 
-def _candidates(unlike: NDArray) -> list[float]:
-    """Return the lags after which a motion, once another one, is like itself again, the likest of
-    them."""
-    another = np.flatnonzero(unlike > ANOTHER)
-    if not len(another):
+def _candidates(differences: NDArray) -> list[float]:
+    """Return the lags of minima below SIMILAR after the first above DIFFERENT, the best first."""
+    different = np.flatnonzero(differences > DIFFERENT)
+    if not len(different):
         return []
-    (lags,) = argrelmin(np.append(unlike, np.inf))
-    lags = lags[(lags > another[0]) & (unlike[lags] < MAYBE_ALIKE)]
-    return [float(lag) for lag in lags[np.argsort(unlike[lags])[:MOST_LAGS]]]
+    (lags,) = argrelmin(np.append(differences, np.inf))
+    lags = lags[(lags > different[0]) & (differences[lags] < SIMILAR)]
+    return [float(lag) for lag in lags[np.argsort(differences[lags])[:MOST_LAGS]]]
 
 
-def _of_a_usual_pair(columns: NDArray, lag: float) -> float:
-    """Return how neighbouring periods differ but for a drift: the usual pair, for a ramp or a fault
-    spoils some.
+def _median_difference(columns: NDArray, lag: float) -> float:
+    """Return the difference of neighbouring periods without their means, the median of all pairs.
 
-    They are cut from the middle of the run, for ramps are at its ends; a lag between samples is
-    interpolated to.
+    Periods are cut from the middle of the run, as ramps are at its ends. The median is robust
+    against a ramp or a fault in some of them.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+        Motion of k joints.
+    lag : float
+        Length of a period in samples; values between samples are interpolated.
     """
     n, length = len(columns), int(lag)
     count = int(n / lag + 1e-6)
@@ -117,9 +145,8 @@ def _of_a_usual_pair(columns: NDArray, lag: float) -> float:
     return pairs[(len(pairs) - 1) // 2] if pairs else 1.0
 
 
-def _least(difference: Callable[[float], float], lag: float) -> tuple[float, float]:
-    """Return the lag near one, and between samples, that leaves least difference, and that
-    difference."""
+def _refined(difference: Callable[[float], float], lag: float) -> tuple[float, float]:
+    """Return the lag near a whole one, between samples, of least difference, and the difference."""
     bounds = (1.0 - SMEARED) * lag - 1.0, (1.0 + SMEARED) * lag + 1.0
     best = minimize_scalar(difference, bounds=bounds, method="bounded", options={"xatol": 0.02})
     return float(best.x), float(best.fun)

@@ -1,5 +1,4 @@
-"""A line: the connection that one device or several share, by TCP, RTU on a serial port, RTU over
-TCP or TLS."""
+"""A line: the connection that devices share, by TCP, RTU on a serial port, RTU over TCP or TLS."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,15 +10,17 @@ from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
 
 FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
-"""Above this rate the silence between two RTU frames is a fixed time, no longer 3.5 characters
-("Modbus over serial line specification and implementation guide" V1.02, 2.5.1.1)."""
+"""Above this rate the silence between RTU frames is a fixed time, else 3.5 characters.
+
+Source: "Modbus over serial line specification and implementation guide" V1.02, 2.5.1.1.
+"""
 
 
 class Line(Settings):
-    """What lines of every kind have."""
+    """Settings of lines of every kind."""
 
     has_transaction_ids: ClassVar[bool] = True
-    """Whether a reply names the request that it answers; among RTU frames none does."""
+    """Whether replies carry the identifier of their request; RTU frames have none."""
 
     @property
     def files(self) -> dict[str, Path]:
@@ -27,7 +28,7 @@ class Line(Settings):
         return {}
 
     def with_files_in(self, folder: Path) -> Self:
-        """Return the line with its files as seen from a rig file in a folder."""
+        """Return the line with the paths of its files relative to the folder of a rig file."""
         return self.model_copy(update={key: folder / file for key, file in self.files.items()})
 
 
@@ -46,11 +47,11 @@ class NetworkLine(Line):
 
     @property
     def place(self) -> str:
-        """Where it leads."""
+        """Host and port."""
         return f"{self.host}:{self.port}"
 
     def at(self, place: str) -> Self:
-        """Return the line with another place."""
+        """Return the line with another host and port."""
         host, _, port = place.rpartition(":")
         return self.model_copy(update={"host": host, "port": int(port)})
 
@@ -60,8 +61,7 @@ class NetworkLine(Line):
         return self.silence_s
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time that a request and its reply take, s; what a network takes is not
-        known."""
+        """Return the least time of a request and its reply, s; that of the network is unknown."""
         return self.quiet_s
 
 
@@ -72,14 +72,14 @@ class TcpLine(NetworkLine):
 
 
 class RtuOverTcpLine(NetworkLine):
-    """RTU frames through a TCP connection, as a serial device server passes them on."""
+    """RTU frames through a TCP connection, as of a serial device server."""
 
     has_transaction_ids = False
     transport: Literal["rtu_over_tcp"]
 
 
 class TlsLine(NetworkLine):
-    """Modbus TCP Security: the same frames, encrypted, between peers that show certificates."""
+    """Modbus TCP Security: encrypted frames between peers with certificates."""
 
     transport: Literal["tls"]
     port: int = Field(
@@ -106,18 +106,20 @@ class TlsLine(NetworkLine):
     def files(self) -> dict[str, Path]:
         """Files that it needs, by key."""
         names = ("ca", "certificate", "key", "rig_certificate", "rig_key")
-        return {name: file for name in names if (file := getattr(self, name)) is not None}
+        paths = {name: getattr(self, name) for name in names}
+        return {name: path for name, path in paths.items() if path is not None}
 
 
 def refuse_passphrase(key: Path | None) -> Callable[[], str]:
-    """Return what refuses a key that wants a passphrase: whoever asked for one would hold up a
-    moving leg."""
+    """Return a callback that refuses a key with a passphrase.
+
+    OpenSSL would otherwise prompt for the passphrase, and block while a leg moves.
+    """
 
     def refuse() -> str:
         raise SettingsError(
-            f"{key}: is protected by a passphrase, expected a key without one, as nobody is asked"
-            f" while a leg moves; `openssl pkey -in {key} -out FILE` makes one, to be kept where"
-            " nobody else may read it"
+            f"{key}: is protected by a passphrase, expected a key without one."
+            f" `openssl pkey -in {key} -out FILE` makes one; keep it private"
         )
 
     return refuse
@@ -144,17 +146,17 @@ class RtuLine(Line):
 
     @property
     def place(self) -> str:
-        """Where it leads."""
+        """Path of its port."""
         return self.serial_port
 
     def at(self, place: str) -> Self:
-        """Return the line on a virtual rig's pseudo-terminal."""
-        # Characters travel whole there: it knows no parity, and refuses to be set up with one.
+        """Return the line on the pseudo-terminal of a virtual rig."""
+        # A pseudo-terminal has no parity, and refuses to be set up with one.
         return self.model_copy(update={"serial_port": place, "parity": "none"})
 
     @property
     def character_s(self) -> float:
-        """Time that a character takes: a start bit, 8 of data, parity and stop bits."""
+        """Time of a character, s: a start bit, 8 data bits, parity and stop bits."""
         return (9 + (self.parity != "none") + self.stop_bits) / self.baud_rate
 
     @property
@@ -165,8 +167,7 @@ class RtuLine(Line):
         return 3.5 * self.character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time that a request and its reply take, ``characters`` long together,
-        s."""
+        """Return the least time of a request and its reply of so many characters together, s."""
         return characters * self.character_s + 2 * self.quiet_s
 
 

@@ -1,5 +1,4 @@
-"""``[plant]`` of a virtual rig: machine, person, and what disturbs the measurement. Pairs are hip,
-knee."""
+"""``[plant]`` of a virtual rig: machine, wearer and noise; pairs are of hip and knee."""
 
 from typing import Literal
 
@@ -23,7 +22,7 @@ class PlantEffect(Settings):
 
 
 class CuffSettings(Settings):
-    """How the leg hangs in its cuffs, and how well that is measured."""
+    """Forces of the leg in its cuffs, and the noise of their sensors."""
 
     carried_share: float = Field(
         0.2, ge=0.0, le=1.0, description="Share of the limb's weight carried along it."
@@ -42,7 +41,7 @@ class CuffSettings(Settings):
 
 
 class TemperatureSettings(Settings):
-    """How motors warm."""
+    """Heating of the motors."""
 
     ambient_c: float = Field(24.0, description="Temperature of the room.")
     heating_c_nm2: float = Field(0.01, ge=0.0, description="Final rise per joint torque squared.")
@@ -83,14 +82,14 @@ class PlantSettings(Settings):
         None,
         gt=0.0,
         description=(
-            "How long a drive may be told nothing before it slows down and disables itself."
+            "Time without a set-point after which a drive slows down and disables itself."
         ),
     )
     clock_ppm: Pair = Field(
         (0.0, 0.0), description="How much faster than the host's each drive's clock runs."
     )
     clock_offset_s: Pair = Field(
-        (0.0, 0.0), description="What each drive's clock says at the start."
+        (0.0, 0.0), description="Reading of each drive's clock at the start."
     )
     drive_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the drives' position loops.")
     kp_nm_rad: Pair = Field((1500.0, 600.0), description="Stiffness of the position loops.")
@@ -110,7 +109,7 @@ class PlantSettings(Settings):
     )
 
     def controllers(self) -> dict[str, dict]:
-        """Return the drives' loops as a recording's metadata tell them, by joint."""
+        """Return the drives' loops by joint, as in a recording's metadata."""
         pairs = zip(("hip", "knee"), self.kp_nm_rad, self.kd_nm_s_rad, self.limit_nm, strict=True)
         return {
             joint: {
