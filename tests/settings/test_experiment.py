@@ -112,8 +112,8 @@ def test_the_settings_page_is_current():
         (
             '[mechanism]\nname = "sinlge"\n',
             (
-                "mechanism: name: found 'sinlge' without joints, which only leg and single may"
-                " leave out; add [[mechanism.joints]], or correct the name: did you mean single?"
+                "mechanism: name: found 'sinlge' without joints, optional only for leg and"
+                " single; add [[mechanism.joints]], or correct the name: did you mean single?"
             ),
         ),
         (
