@@ -63,7 +63,7 @@ def test_what_is_for_legs_alone_refuses_a_slide_in_one_line(exoid, recordings, t
     outcome = exoid("design", "--config", chosen, "-o", tmp_path / "a.parquet")
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
     assert (
-        "mechanism: found single with axis (prismatic), expected a leg with hip and knee: `exoid"
+        "mechanism: found single with axis (prismatic), expected a leg with hip and knee for `exoid"
         in outcome.err
     )
     assert (
