@@ -157,14 +157,14 @@ def test_no_set_point_goes_out_that_is_no_number_or_outside_the_limits_whoever_s
 @pytest.mark.parametrize("angle", [float("nan"), 1.8])
 def test_a_drive_whose_angle_is_no_set_point_is_told_the_one_it_holds(rig_file, monkeypatch, angle):
     drive = first_drive(rig_file)
-    held = drive.tell.encode({"reference": 0.3, "control": ENABLE, "heartbeat": 0})
+    held = drive.write_block.encode({"reference": 0.3, "control": ENABLE, "heartbeat": 0})
 
     async def read(device, address, count):
-        assert (address, count) == (drive.tell.address, drive.tell.count)
+        assert (address, count) == (drive.write_block.address, drive.write_block.count)
         return held
 
     monkeypatch.setattr(Device, "read", read)
-    told = drive.tell.decode(asyncio.run(drive.idle_words(DISABLE, angle)))
+    told = drive.write_block.decode(asyncio.run(drive.idle_words(DISABLE, angle)))
     assert (told["reference"], told["control"]) == (pytest.approx(0.3), DISABLE)
 
 
@@ -215,7 +215,7 @@ def test_a_drive_is_told_with_every_write_that_the_host_lives(record, monkeypatc
             beats.append(int(told["heartbeat"]))
         hear(drive)
 
-    monkeypatch.setattr(Drive, "hear", remember)
+    monkeypatch.setattr(Drive, "receive", remember)
     control = 'control = { address = 202, type = "uint16" }'
     record(
         duration_s=1.0,

@@ -226,10 +226,12 @@ class Client:
             found = await asyncio.wait_for(device.read(100, count), HANG_S)
             expected = bytes([3, 2 * count]) + b"".join(word.to_bytes(2, "big") for word in found)
         elif rng.random() < 0.3:
-            await asyncio.wait_for(device.write(part.tell, [1, 2, 3]), HANG_S)
+            await asyncio.wait_for(device.write(part.write_block, [1, 2, 3]), HANG_S)
             expected = b"\x10\x00\xc8\x00\x03"
         else:
-            found = await asyncio.wait_for(device.exchange(part.tell, [1, 2, 3], part.told), HANG_S)
+            found = await asyncio.wait_for(
+                device.exchange(part.write_block, [1, 2, 3], part.read_block), HANG_S
+            )
             expected = b"\x17\x1c" + b"".join(word.to_bytes(2, "big") for word in found)
         if (
             bytes(replace(self.peer.asked, length=None, unit=unit, body=expected))

@@ -82,11 +82,11 @@ def test_a_write_is_done_when_what_was_written_is_confirmed():
         await client.open()
         drive = client.machine.drives[0]
         try:
-            await drive.device.write(drive.tell, [1, 2, 3])
+            await drive.device.write(drive.write_block, [1, 2, 3])
             client.peer.answer = lambda request: [
                 bytes(replace(request, length=None, body=b"\x10\x00\xc8\x00\x02"))
             ]
-            await drive.device.write(drive.tell, [1, 2, 3])
+            await drive.device.write(drive.write_block, [1, 2, 3])
         finally:
             await client.end()
 

@@ -36,6 +36,6 @@ def test_a_set_point_at_a_limit_is_not_rounded_beyond_it(rig_file, angle):
         return Machine(load_rig(rig_file(replace=COARSE)), with_sensors=False).drives[0]
 
     drive = asyncio.run(made())
-    told = drive.tell.decode(drive.words(drive.map.enable, angle))["reference"]
+    told = drive.write_block.decode(drive.words(drive.map.enable, angle))["reference"]
     assert -0.35 <= told <= 1.75
     assert told == pytest.approx(angle, abs=drive.map.write.reference.step)

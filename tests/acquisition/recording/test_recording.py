@@ -368,7 +368,7 @@ def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
                 for sample in await recorded.samples(SimpleNamespace(sequence=newest))
             ]
             await asyncio.sleep(0.001)
-        recorded.beside.end()
+        recorded.pending.end()
         return drive.begun, brought
 
     begun, brought = asyncio.run(run())
