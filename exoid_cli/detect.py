@@ -41,8 +41,7 @@ def detect(
         typer.Option(min=0.5, max=0.999, help="Probability of finding an effect of that size."),
     ] = 0.9,
 ) -> None:
-    """Say how large each cause must be to be seen with this motion and noise, and which causes look
-    alike.
+    """Say how large each cause must be to be detected, and which causes look alike.
 
     \b
     Examples:

@@ -52,8 +52,7 @@ def split(
         Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")
     ],
 ) -> None:
-    """Write one file a section and the graph's rules, so that make re-runs only what a change
-    touches.
+    """Write one file a section and the graph's rules, so that make re-runs what changed.
 
     \b
     Example:

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from pipelines.contracts import checks, contract_of, parquet, verdict
+from pipelines.contracts import checks, contract_of, parquet
 from pipelines.errors import ContractError
 from pipelines.validation.toml import read_toml
 
@@ -42,6 +42,8 @@ class Inspection:
 
 def inspect(path: Path) -> Inspection:
     """Describe a Parquet file, a JSON document or a TOML trajectory by its content."""
+    if path.suffix == ".parquet":
+        return _table(path)
     return _document(path) or _trajectory_toml(path) or _table(path)
 
 
@@ -97,28 +99,23 @@ DOCUMENTS = {
 
 
 def _document(path: Path) -> Inspection | None:
-    content = (
-        verdict.parsed(path)
-        if path.suffix == ".json" and path.is_file()
-        else _parsed(path, _read_json)
-    )
+    from pipelines.contracts import verdict  # its many models take time to build
+
+    is_json = path.suffix == ".json" and path.is_file()
+    content = verdict.parsed(path) if is_json else _parsed(path, _read_json)
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
         return None
-    fault = _fault_of(content, path)
+    fault = None
+    if content["contract"] == "verdict/1":
+        try:
+            verdict.check(content, str(path))
+        except ContractError as error:
+            fault = error
     contract, provenance = content.pop("contract"), content.pop("provenance", {})
     origin = {key: provenance.pop(key) for key in ORIGIN if key in provenance}
     return Inspection(
         str(path), contract, DOCUMENTS[contract], origin, content | provenance, fault=fault
     )
-
-
-def _fault_of(content: dict[str, Any], path: Path) -> ContractError | None:
-    try:
-        if content["contract"] == "verdict/1":
-            verdict.check(content, str(path))
-    except ContractError as error:
-        return error
-    return None
 
 
 def _trajectory_toml(path: Path) -> Inspection | None:

@@ -115,8 +115,7 @@ def refuse_place(path: Path, contract: str) -> None:
 
 
 def to_json(metadata: Mapping[str, Any], source: str) -> str:
-    """Return metadata as JSON text; NumPy's numbers and arrays become plain ones, paths become
-    text.
+    """Return metadata as JSON text, with NumPy's values and paths in JSON's types.
 
     Raises
     ------
