@@ -17,7 +17,7 @@ SEEDS ?= tuning
 SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants mutation check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
+.PHONY: help all test test-slow invariants mutation readability check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
 .PHONY: evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
@@ -38,6 +38,9 @@ invariants: $(INSTALLED) ## what keeps a leg safe, over 20,000 random sequences 
 
 mutation: $(VENV)/.mutation ## change numbers and limits one at a time, and see that a test fails each time; about an hour
 	$(BIN)/python tests/campaigns/mutation.py
+
+readability: $(INSTALLED) ## measure how readable the code is
+	$(BIN)/python tests/campaigns/readability.py
 
 check: $(INSTALLED) ## lint, formatting, types, direction of imports
 	$(BIN)/ruff check
