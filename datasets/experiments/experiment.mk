@@ -12,7 +12,7 @@ SETTINGS := $(OUT)/.settings
 all: # the rest of what it needs stands below, once its graph is known
 
 # Make writes these rules first, from the settings, and reads them again. Which file comes from which is written in
-# exoid, once: `exoid status` tells it too, and `exoid run` does the same without make.
+# exoid, once: `exoid status` shows it, too, and `exoid run` does the same without make.
 ifneq ($(MAKECMDGOALS),clean)
 include $(SETTINGS)/graph.mk
 endif

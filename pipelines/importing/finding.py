@@ -1,4 +1,4 @@
-"""An observation about a log, and what the import did about it."""
+"""An observation about a log, and the action that the import took."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

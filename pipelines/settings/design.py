@@ -71,7 +71,7 @@ class DesignSettings(Settings):
     criterion: Literal["log_det", "condition", "scaled_condition"] = Field(
         "log_det",
         description=(
-            "What makes a good excitation: log det of A'A/N, or the condition number of the"
+            "Quality of an excitation: log det of A'A/N, or the condition number of the"
             " regressor, raw (the paper's) or with its columns scaled to unit norm."
         ),
     )
@@ -80,7 +80,7 @@ class DesignSettings(Settings):
         JointBounds(), description="Angle, speed and acceleration, kept between samples too."
     )
     topology: Literal["ring", "global"] = Field(
-        "ring", description="Whose best each particle of the swarm follows."
+        "ring", description="Neighbours whose best a particle follows: those on a ring, or all."
     )
     particles: int = Field(128, ge=4, description="Size of the swarm.")
     iterations: int = Field(

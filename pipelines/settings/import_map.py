@@ -34,7 +34,7 @@ class SourceSettings(Settings):
     )
     decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
     comment: str | None = Field(
-        None, min_length=1, max_length=1, description="What a line to be skipped starts with."
+        None, min_length=1, max_length=1, description="First character of lines to be skipped."
     )
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
     columns: tuple[str, ...] | None = Field(
@@ -195,7 +195,7 @@ class JointReadingSettings(ReadingSettings):
         description="Turns of the motor for one of the joint, where the reading is the motor's.",
     )
     counts_per_turn: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="Encoder counts in a turn of what it sits on."
+        None, gt=0.0, le=LARGEST, description="Encoder counts in a turn of its shaft."
     )
     counts_per_m: float | None = Field(
         None, gt=0.0, le=LARGEST, description="Counts in a metre of a linear encoder."

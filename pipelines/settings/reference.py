@@ -24,10 +24,11 @@ Written by `make docs` from `pipelines/settings/`; change it there. Every key ma
 def reference() -> str:
     """Return the page as Markdown."""
     head = "| key | default | meaning |\n|---|---|---|\n"
+    tables = [(heading, model, list(rows_of(model))) for heading, model in sections_of(Experiment)]
     sections = [
         f"## {heading}\n\n{model.__doc__}\n\n{head}" + "\n".join(rows)
-        for heading, model in sections_of(Experiment)
-        if (rows := list(rows_of(model)))
+        for heading, model, rows in tables
+        if rows
     ]
     return "\n\n".join([INTRODUCTION.rstrip(), *sections]) + "\n"
 

@@ -309,7 +309,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
         ),
         (
             (
-                "enabled_mask = 0x0001                  # bits that tell whether the drive is"
+                "enabled_mask = 0x0001                  # bits that show whether the drive is"
                 " enabled ...\nenabled_value = 0x0001"
             ),
             "enabled_mask = 0x0008\nenabled_value = 0x0000",

@@ -70,7 +70,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     proposal.remark(
         f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`."
     )
-    proposal.remark("Check what is UNSURE, one of several choices. FILL IN what no log holds.")
+    proposal.remark("Check values that are UNSURE. FILL IN values that no log holds.")
     for note in source.notes:
         proposal.remark(f"Read as {source.format}: {note}.")
     write_time(proposal, time)

@@ -210,7 +210,7 @@ class _JointWriter:
             self._write_counting(quantity)
 
     def _if_it_slides(self) -> str:
-        """Return what else changes if a joint of unknown unit slides."""
+        """Return the keys that change if a joint of unknown unit slides."""
         if self.units.sure:
             return "no unit of length; prismatic if it slides"
         metric = {"angle": "m", "velocity": "m/s", "reference": "m"}

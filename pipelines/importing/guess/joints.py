@@ -40,7 +40,7 @@ class JointColumns:
 
     @property
     def drive(self) -> str | None:
-        """The quantity that shows best what its drive delivers, if any."""
+        """The quantity that shows best the torque or force of its drive, if any."""
         quantities = SLIDING if self.slides else TURNING
         return next((quantity for quantity in quantities if quantity in self.columns), None)
 

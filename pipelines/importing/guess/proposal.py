@@ -20,7 +20,7 @@ class Doubt:
 
 @dataclass
 class Proposal:
-    """The lines of a map in their order, and what is doubtful about them."""
+    """The lines of a map in their order, and the doubts about them."""
 
     lines: list[str] = field(default_factory=list)
     doubts: list[Doubt] = field(default_factory=list)

@@ -338,8 +338,7 @@ def _begins(time: NDArray) -> list[int]:
 
 
 def _stays_behind(time: NDArray) -> int | None:
-    """Return the row from which time stays behind its maximum for many rows; None where it never
-    does."""
+    """Return the row from which time stays behind its maximum for many rows, if any."""
     late = time < np.maximum.accumulate(time)
     edges = np.flatnonzero(np.diff(late, prepend=False, append=False))
     starts, ends = edges[::2], edges[1::2]

@@ -51,7 +51,7 @@ class DeviceSettings(Settings):
 
 
 class HumanDriveSettings(Settings):
-    """Limits of a joint with a wearer; what is left out is as without."""
+    """Limits of a joint with a wearer; others are as without."""
 
     angle_rad: tuple[float, float] | None = Field(None, description="Lowest and highest angle.")
     speed_rad_s: float | None = Field(None, gt=0.0, description="Highest speed, either way.")

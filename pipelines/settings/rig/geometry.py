@@ -7,7 +7,7 @@ from pipelines.settings.physical_bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 
 
 class GeometrySettings(Settings):
-    """Lengths of the leg in this rig; what is left out comes from exoid.toml."""
+    """Lengths of the leg in this rig; others come from exoid.toml."""
 
     thigh_length_m: float | None = Field(
         None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis."

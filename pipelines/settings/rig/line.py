@@ -89,11 +89,11 @@ class TlsLine(NetworkLine):
         None, description="Certificates that the device's is checked with; else the system's."
     )
     certificate: Path | None = Field(
-        None, description="What exoid shows a device that asks who it is."
+        None, description="exoid's certificate, for devices that ask for one."
     )
-    key: Path | None = Field(None, description="The key to it, without a passphrase.")
-    rig_certificate: Path | None = Field(None, description="What a virtual rig shows.")
-    rig_key: Path | None = Field(None, description="The key to that.")
+    key: Path | None = Field(None, description="Its private key, without a passphrase.")
+    rig_certificate: Path | None = Field(None, description="Certificate of a virtual rig.")
+    rig_key: Path | None = Field(None, description="Private key of the virtual rig.")
 
     @model_validator(mode="after")
     def _has_both_halves(self) -> Self:

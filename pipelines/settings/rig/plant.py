@@ -59,7 +59,7 @@ class PlantSettings(Settings):
     )
     coulomb_nm: Pair = Field((2.66, 4.72), description="Coulomb friction.")
     viscous_nm_s_rad: Pair = Field((4.15, 7.36), description="Viscous friction.")
-    effects: tuple[PlantEffect, ...] = Field((), description="What else the plant has, openly.")
+    effects: tuple[PlantEffect, ...] = Field((), description="Other effects of the plant.")
     sealed: str | None = Field(
         None,
         description=(
@@ -105,7 +105,7 @@ class PlantSettings(Settings):
     cuff: CuffSettings = Field(CuffSettings(), description="The cuffs.")
     temperature: TemperatureSettings = Field(TemperatureSettings(), description="The motors.")
     seed: int = Field(
-        0, ge=0, description="Of what is constant for this rig, such as its sensors' zeros."
+        0, ge=0, description="Seed of constants of this rig, such as its sensors' zeros."
     )
 
     def controllers(self) -> dict[str, dict]:

@@ -15,7 +15,7 @@ class Identity(Settings):
     """A register that identifies a device, and its value there."""
 
     address: int = Field(ge=0, le=65535, description="Address of the register.")
-    value: int = Field(ge=0, le=65535, description="What it holds on the right device.")
+    value: int = Field(ge=0, le=65535, description="Its value on the right device.")
 
 
 class DriveRead(Settings):
@@ -31,7 +31,8 @@ class DriveRead(Settings):
     temperature: Register | None = Field(None, description="Drive or motor temperature.")
     status: Register | None = Field(None, description="Status word.")
     reference: Register | None = Field(
-        None, description="Set-point that was in force; else what exoid sent is kept."
+        None,
+        description="Set-point that was in force; else recordings hold the one that exoid sent.",
     )
 
 
@@ -68,8 +69,8 @@ class DriveMap(Settings):
     own_scale: bool = Field(
         False,
         description=(
-            "Set-points mean the same place as angles though their type, order, scale or offset is"
-            " another; else that is taken for a slip, and refused."
+            "Set-points and angles agree although their type, order, scale or offset differ; else"
+            " a difference is refused."
         ),
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
@@ -85,12 +86,12 @@ class DriveMap(Settings):
     )
     faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
         default_factory=dict,
-        description="What a fault bit means, by its number; bit 0 is the lowest.",
+        description="Meaning of each fault bit, by its number; bit 0 is the lowest.",
     )
     enabled_mask: int = Field(
         0, ge=0, description="Bits of the status word that show whether it is enabled; 0: none."
     )
-    enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
+    enabled_value: int = Field(0, ge=0, description="Value of these bits while it is enabled.")
     ring: RingSettings | None = Field(
         None, description="The drive's own record of its latest samples, if it has one."
     )

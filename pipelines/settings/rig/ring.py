@@ -47,7 +47,7 @@ class RingSettings(Settings):
         le=MOST_REGISTERS["read"],
         description="Registers of 16 bits from one record to the next.",
     )
-    record: RingRecord = Field(description="What a record holds.")
+    record: RingRecord = Field(description="Registers of a record.")
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:

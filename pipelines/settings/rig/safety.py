@@ -12,7 +12,7 @@ LONGEST_RAMP_S = 60.0
 
 
 class HumanSafetySettings(Settings):
-    """What stops a run with a wearer; what is left out is as without."""
+    """Limits that stop a run with a wearer; others are as without."""
 
     cuff_force_n: float | None = Field(
         None, gt=0.0, description="Highest force on any axis of any cuff sensor."
