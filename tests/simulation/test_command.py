@@ -279,7 +279,7 @@ def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_t
     _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
     assert err.startswith(
         f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of"
-        f" {recording}; taken is that of its rows, "
+        f" {recording}; taken is that of its rows"
     )
 
 

@@ -389,7 +389,7 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
     def leap(device, function):
         shows(device, lambda true: replace(true, sequence=counter(true.sequence)))
         hip = device.rig.drives[0].servo
-        sent.extend([hip._told] if hip.enabled else [])
+        sent.extend([hip._set_point] if hip.enabled else [])
 
     why = stopped(
         shipped=shipped,
