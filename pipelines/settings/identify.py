@@ -23,7 +23,7 @@ class IdentifySettings(Settings):
     method: Method = Field(
         "weighted_least_squares",
         description=(
-            "Estimator of both steps; docs/estimators.md says which to use when. Instrumental"
+            "Estimator of both steps; docs/estimators.md explains the choice. Instrumental"
             " variables need set-points in the recording; they and output error hold whole runs in"
             " memory."
         ),

@@ -31,9 +31,7 @@ def open_json(path: Path, settings: SourceSettings) -> Source:
             "is a list of numbers without names, expected records with keys, or lists under names"
         )
     notes = (f"records under {settings.table}",) if settings.table else ()
-    return Source(
-        path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes
-    )
+    return Source.in_memory(path, "JSON", columns, notes)
 
 
 def _content(path: Path) -> Any:

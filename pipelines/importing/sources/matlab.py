@@ -43,6 +43,4 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
             )
         variables = variables[settings.table]
     columns = flattened(variables)
-    return Source(
-        path, "MATLAB", tuple(columns), lambda names: {name: columns[name] for name in names}
-    )
+    return Source.in_memory(path, "MATLAB", columns)

@@ -32,9 +32,7 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
     if any(pa.types.is_nested(field.type) for field in empty.schema):
         with _damage_reported():
             columns = flattened(_opened(path).read().to_pydict())
-        return Source(
-            path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names}
-        )
+        return Source.in_memory(path, "Parquet", columns)
 
     def load(names: Sequence[str]) -> Columns:
         file = _opened(path)

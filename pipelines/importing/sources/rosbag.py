@@ -44,13 +44,7 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
             f"is no ROS 2 bag that can be read ({error}); record or copy it again"
         ) from error
     notes = (f"topic {topic}",)
-    return Source(
-        path,
-        "ROS 2 bag",
-        tuple(columns),
-        lambda names: {name: columns[name] for name in names},
-        notes,
-    )
+    return Source.in_memory(path, "ROS 2 bag", columns, notes)
 
 
 def _topic(reader: Any, named: str | None) -> str:

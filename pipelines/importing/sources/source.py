@@ -22,5 +22,14 @@ class Source:
     notes: tuple[str, ...] = ()
     """How it was read, as far as that was derived from its content."""
 
+    @classmethod
+    def in_memory(
+        cls, path: Path, format: str, columns: Columns, notes: tuple[str, ...] = ()
+    ) -> "Source":
+        """Return a log whose columns, each (n,), have been read already."""
+        return cls(
+            path, format, tuple(columns), lambda names: {n: columns[n] for n in names}, notes
+        )
+
     def __str__(self) -> str:
         return str(self.path)
