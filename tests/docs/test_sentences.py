@@ -25,8 +25,6 @@ GENERATED = {
 """Pages that a program writes as a whole."""
 
 NOT_YET: dict[str, int] = {
-    "CHANGELOG.md": 87,
-    "CONTRIBUTING.md": 1,
     "docs/believe.md": 2,
     "docs/command-line.md": 2,
     "docs/contracts.md": 27,
@@ -48,8 +46,6 @@ NOT_YET: dict[str, int] = {
     "docs/simulation.md": 4,
     "docs/tutorial.md": 1,
     "docs/verdict.md": 3,
-    "docs/decisions/0001-effects.md": 3,
-    "docs/decisions/0003-workflow.md": 1,
 }
 """Sentences that are too long in pages that hold some still; a new one fails, and so does a page
 that has none and is still listed."""
