@@ -34,7 +34,6 @@ NOT_YET: dict[str, int] = {
     "docs/estimators.md": 10,
     "docs/export.md": 6,
     "docs/identification.md": 13,
-    "docs/import.md": 8,
     "docs/mechanisms.md": 4,
     "docs/own-effect.md": 3,
     "docs/real-data.md": 21,
