@@ -22,7 +22,6 @@ SIDES = {"left", "right"}
 NOT_YET: dict[str, int] = {
     "README.md": 3,
     "docs/believe.md": 12,
-    "docs/benchmarks.md": 3,
     "docs/blind-machines.md": 2,
     "docs/blind.md": 1,
     "docs/criteria.md": 18,
@@ -38,8 +37,6 @@ NOT_YET: dict[str, int] = {
     "docs/real-data.md": 31,
     "docs/report.md": 7,
     "docs/rig-check.md": 8,
-    "docs/rig-file.md": 4,
-    "docs/rig.md": 12,
     "docs/science.md": 7,
     "docs/simulation.md": 4,
     "docs/verdict.md": 9,
