@@ -1,1 +1,1 @@
-"""Diagnosis: what the simulation gets wrong, its physical cause, and what naming it gains."""
+"""Diagnosis: where the simulation is wrong, the physical cause, and the gain from naming it."""

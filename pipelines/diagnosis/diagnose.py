@@ -1,10 +1,10 @@
-"""The whole diagnosis: recordings in, a result out, in five steps.
+"""Run the whole diagnosis: recordings in, a result out, in five steps.
 
-1. *Training data*: the runs behind their filters; faults of acquisition are marked.
+1. *Training data*: the filtered runs, with faults of acquisition marked.
 2. *Library*: every cause and every unlisted law as columns of one regression.
-3. *Posterior*: how probable each set of causes and laws is.
+3. *Posterior*: the probability of each set of causes and laws.
 4. *Fit*: the named causes with the baseline, their shapes refined.
-5. *Validation*: errors and gains on runs that no fit has seen. Where these have an error above the
+5. *Validation*: errors and gains on runs that no fit has seen. Where their error is above the
    noise, steps 2 to 5 are repeated with causes sought on all runs.
 """
 
@@ -25,32 +25,37 @@ from pipelines.diagnosis.training_data import TrainingData, training_data
 from pipelines.mechanics.motion import Motion
 
 FIT_SHARE = 0.75
-"""Of the progress bar, where the fit begins."""
+"""Position of the progress bar at which the fit begins."""
 
 
 def diagnose(
     motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
 ) -> Diagnosis:
-    """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
+    """Find where rigid body with Coulomb and viscous friction is wrong, and the cause.
 
     The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
     every error. They may lower the probability of a cause that does harm there, and decide between
-    ties. Where what is named leaves an error above the noise there, causes are sought on all runs;
-    they are fitted to the training runs still.
+    ties. Where the named causes leave an error above the noise there, causes are sought on all
+    runs; they are still fitted to the training runs.
 
     Parameters
     ----------
     motions : sequence of Motion
         Runs of one machine, some to train and some to validate.
     report : callable, optional
-        Takes the share that is done, 0 to 1, and what is being done.
+        Takes the share that is done, 0 to 1, and the present step.
     known : sequence of str, optional
-        Labels of what the machine is known to have besides rigid body and friction.
+        Labels of effects that the machine is known to have besides rigid body and friction.
+
+    Returns
+    -------
+    Diagnosis
 
     Raises
     ------
     InputError
-        Where there is no run to train or to validate on, or no baseline can have what is ``known``.
+        Where there is no run to train or to validate on, or an effect in ``known`` cannot be part
+        of the baseline.
     """
     data = training_data(motions, known)
     prepared = prepare(data.train, data.baseline)
@@ -66,12 +71,12 @@ def diagnose(
 def _by_all_runs(
     data: TrainingData, prepared: Prepared, judged: JudgedFit, report: Report
 ) -> JudgedFit:
-    """Return what all runs together show, fitted to the training runs, where they show more than
-    these alone.
+    """Search all runs, and return that result where it improves on the training runs alone.
 
-    Its causes must predict the validation runs better. Where the training runs show something, all
-    runs must name other listed causes, and leave nothing unlisted. Where they show nothing and the
-    new causes fail, what all runs show is reported without a name.
+    Its causes are fitted to the training runs, and must predict the validation runs better. Where
+    the training runs show something, all runs must name other listed causes, and leave nothing
+    unlisted. Where they show nothing and the new causes fail, the finding of all runs is reported
+    without a name.
     """
     first = judged.selected
     runs = (*data.train, *data.validate)
@@ -95,7 +100,7 @@ def _in_the_rest(report: Report) -> Report:
 
 
 def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:
-    """Put the result together: intervals, parameters, simulation errors, reversals."""
+    """Assemble the result: intervals, parameters, simulation errors, reversals."""
     baseline, before, after = data.baseline, judged.before, judged.after
     validate = before.runs
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))

@@ -1,4 +1,4 @@
-"""The result of a diagnosis: everything that a verdict is written from."""
+"""The result of a diagnosis, from which the verdict is written."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,7 +30,7 @@ from pipelines.model import Column, unrealizable, upside_down
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A session, what is named, and the model with it."""
+    """A session, its named causes, and the model with them."""
 
     data: TrainingData
     prepared: Prepared
@@ -49,7 +49,8 @@ class Diagnosis:
     covariance: NDArray
     residuals: pd.DataFrame
     reversals: tuple[BuildUp, ...]
-    """Joints whose friction builds up over a travel where they reverse, which no fit looks at."""
+    """Joints whose friction builds up over a travel where they reverse, where no fit has
+    samples."""
     simulation_error: dict[str, NDArray | None]
     """(J,) rad of 1 s simulations with the baseline and with the extended model."""
 
@@ -60,7 +61,7 @@ class Diagnosis:
 
     @property
     def train(self) -> tuple[Run, ...]:
-        """The training runs, with the loads that the baseline makes."""
+        """The training runs, with joint loads computed from the baseline."""
         return self.prepared.runs
 
     @property
@@ -96,7 +97,7 @@ class Diagnosis:
 
     @property
     def unexplained(self) -> list[float | None]:
-        """Share of each joint's systematic power that is left; None where there was none."""
+        """Share of each joint's systematic power that remains; None where there was none."""
         floor, before, after = (
             self.floor_rms**2,
             self.before.errors.rms**2,
@@ -109,8 +110,10 @@ class Diagnosis:
 
     @property
     def left_over(self) -> list[bool]:
-        """Joints that end above the floor, with more than ``left_of_explained`` of their systematic
-        power."""
+        """Whether each joint ends above the floor, with a large part of its systematic power.
+
+        The part is more than ``left_of_explained``.
+        """
         shares = zip(self.unexplained, self.after.above(self.floor), strict=True)
         return [
             bool(above) and share is not None and share > CRITERIA.left_of_explained
@@ -119,12 +122,12 @@ class Diagnosis:
 
     @property
     def has_periods(self) -> bool:
-        """Whether some recording tells the period of its motion."""
+        """Whether some recording names the period of its motion."""
         return any(run.motion.period_s for run in (*self.train, *self.validate))
 
     @property
     def is_mostly_unexplained(self) -> bool:
-        """Whether most of some joint's mean square error is left above the noise floor."""
+        """Whether most of some joint's mean square error remains and is above the noise floor."""
         return bool(np.any(self.after.errors.rms**2 > 2.0 * self.floor_rms**2))
 
     @property
@@ -138,11 +141,11 @@ class Diagnosis:
 
     @cached_property
     def effects(self) -> dict[str, Effect]:
-        """The named effects as they were fitted, by label."""
+        """The fitted effects of the named causes, by label."""
         return {cause.label: cause.effect for cause in self.after.fit.causes}
 
     def effect_of(self, label: str) -> Effect:
-        """Return the effect of a label that the library has, at its most probable shape."""
+        """Return the effect of a label in the library, at its most probable shape."""
         assert self.selected.library is not None and self.selected.posterior is not None
         sets = (i for chosen in self.selected.posterior.sets for i in chosen)
         elements = self.selected.posterior.elements
@@ -151,29 +154,29 @@ class Diagnosis:
 
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
-        """What each run has for itself of the named causes, by label."""
+        """The per-run values of the named causes, by label."""
         return values_of_each_run(
             self.after.fit, self.baseline, self.uncertainty, self.train, self.validate
         )
 
     @cached_property
     def gains(self) -> dict[str, Gain]:
-        """What each named cause gains on the validation runs beside the others, by label."""
+        """The gain of each named cause on the validation runs, the others kept, by label."""
         return gains_of(self.without, self.after)
 
     @cached_property
     def torque_rms(self) -> NDArray:
-        """(J,) N·m that was measured, on the samples that the errors are of."""
+        """(J,) N·m rms of the measured torque, on the samples that errors are counted on."""
         return errors_of(self.validate, [run.measured for run in self.validate]).rms
 
     @property
     def collinear(self) -> list[str]:
-        """Which parameters of the extended model the training runs hardly tell apart, in words."""
+        """Nearly collinear parameters of the extended model on the training runs, in words."""
         fit = self.after.fit
         shapes = [(fit.causes[k].effect, i) for k, i, _ in self.uncertainty.shapes]
         own = (Column(effect, effect.shape[i], None) for effect, i in shapes)
         columns = [*fit.layout.columns, *own]
-        # Nobody asks for the zeros of the cuffs.
+        # The zeros of the force sensors are no result: they are projected out.
         zeros = [isinstance(column.effect, ForceSensorZero) for column in columns]
         names = [c.name for c, zero in zip(columns, zeros, strict=True) if not zero]
         normal = profiled(self.uncertainty.normal, np.flatnonzero(zeros))
@@ -182,7 +185,7 @@ class Diagnosis:
 
     @property
     def unrealizable(self) -> list[str]:
-        """Why no real machine has the extended model's rigid bodies; empty when one may."""
+        """Reasons why no real machine has the extended model's rigid bodies; empty if one may."""
         geometry = self.train[0].motion.geometry
         return unrealizable(self.parameters, self.baseline.machine, geometry)
 
@@ -199,5 +202,5 @@ class Diagnosis:
 
     @property
     def upside_down(self) -> list[str]:
-        """Which links the extended model has upside down; empty when none."""
+        """Links that the extended model has upside down; empty if none."""
         return upside_down(self.parameters, self.baseline.machine)

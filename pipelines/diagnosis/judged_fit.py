@@ -1,4 +1,4 @@
-"""The named causes fitted to the training runs, and judged on the validation runs."""
+"""Fit the named causes to the training runs, and judge them on the validation runs."""
 
 from dataclasses import dataclass
 
@@ -46,7 +46,7 @@ class JudgedFit:
     """Of the validation runs, up to a constant."""
 
     def predicts_better_than(self, other: "JudgedFit") -> bool:
-        """Tell whether it predicts the validation runs better than another, and not by chance."""
+        """Return whether it predicts the validation runs significantly better than another."""
         gained = self.log_likelihood - other.log_likelihood
         return (
             gained > CRITERIA.predicted_better
@@ -55,12 +55,12 @@ class JudgedFit:
 
 
 def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
-    """Fit the named causes, and judge them on the validation runs until no charge is left.
+    """Fit the named causes, and judge them on the validation runs until no charge remains.
 
-    The most harmful cause is charged first: beside it, what others do may seem to harm too. Of
-    causes that the searched runs cannot tell apart, those are charged that predict the validation
-    runs worse than the best of them. Last, each named cause is tested for being a look-alike
-    (``selection/look_alikes.py``); those that remain are fitted again, and not judged again.
+    The most harmful cause is charged first: in a model with it, other causes may seem to harm too.
+    Of causes that the searched runs cannot separate, those that predict the validation runs worse
+    than the best of them are charged. Last, each named cause is tested for being a look-alike
+    (``selection/look_alikes.py``). Those that remain are fitted again, and not judged again.
     """
     refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
@@ -87,9 +87,9 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
 
 
 def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float]:
-    """Return the share that each cause removes, by label.
+    """Return the share of the systematic error that each cause removes, by label.
 
-    A cause without which the error is at the noise floor is left out.
+    A cause is left out if the error without it is at the noise floor.
     """
     shares = {label: removed_share(less, after) for label, less in without.items()}
     return {label: share for label, share in shares.items() if share is not None}
@@ -98,7 +98,7 @@ def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float
 def _shortfalls(
     selected: Selected, after: Validated, refine: Refinement, prepared: Prepared, before: Validated
 ) -> dict[str, float]:
-    """Return how far each tie falls behind the best of its group on the validation runs.
+    """Return by how much each tie predicts the validation runs worse than the best of its group.
 
     Log likelihoods, by variant; of groups that were not compared yet.
     """
@@ -126,7 +126,7 @@ def _shortfalls(
 def _fitted(
     selected: Selected, refine: Refinement, prepared: Prepared, before: Validated
 ) -> tuple[Validated, dict[str, Validated]]:
-    """Return the named causes fitted, and the same without each of them, on the validation runs."""
+    """Fit the named causes, and the same without each of them, and validate each fit."""
     candidates = selected.candidates
     if not candidates:
         return before, {}

@@ -1,8 +1,8 @@
-"""The page docs/criteria.md: the numbers of the diagnosis, written from the code itself.
+"""Write the page docs/criteria.md: the numbers of the diagnosis, from the code itself.
 
-``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
-with the hyper-parameters (``make sensitivity``, ``make cross-validation``) stands in
-``criteria_measured.json`` beside this file.
+``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date. Measurements of
+the hyper-parameters (``make sensitivity``, ``make cross-validation``) are in
+``criteria_measured.json`` in the same folder.
 """
 
 import ast
@@ -24,30 +24,30 @@ MEASURED = PACKAGE / "criteria_measured.json"
 INTRODUCTION = f"""\
 # Criteria: the numbers of a diagnosis
 
-For those who want to know why a verdict came out as it did, or who change the decision. Written by
-`make docs` from the code. The first table has the hyper-parameters of the decision, of
+For readers who want to know the reasons of a verdict, or who change the decision. `make docs`
+writes this page from the code. The first table has the hyper-parameters of the decision, from
 `pipelines/diagnosis/criteria.py`. `make learn` learns all of them except
-{", ".join(f"`{name}`" for name in HELD)}: it maximises the log probability that the posterior gives
-to the truth, over simulated sessions. {LEARNED} [science.md](science.md#9-the-decision) has the
-equations in which they stand. The [other numbers](#other-numbers) of a diagnosis, of its noise
-model, its search and its checks of the data, stand at the end. """
+{", ".join(f"`{name}`" for name in HELD)}. It maximises the log probability that the posterior gives
+to the truth, over simulated sessions. {LEARNED} [science.md](science.md#9-the-decision) has their
+equations. The [other numbers](#other-numbers) of a diagnosis are at the end: those of its noise
+model, its search and its checks of the data. """
 OTHERS = """\
 ## Other numbers
 
-These are not learned. They concern physics, recording, numerical precision, or how much is
-reported. Each is defined at the head of its file in `pipelines/diagnosis`. Those by which figures
-are drawn are left out. """
+These are not learned. They concern physics, recording, numerical precision, or the length of
+reports. Each is defined at the head of its file in `pipelines/diagnosis`. Those of figures are not
+listed. """
 HEADINGS = {
     "data_faults": "Faults of acquisition",
     "evidence": "Noise and evidence",
     "candidates": "Candidates and their shapes",
     "selection": "Selection",
     "fit": "Fit and validation",
-    "dependence": "What the error depends on",
+    "dependence": "Dependence of the error",
     "detectability": "Detectability",
     "verdict": "Words of the verdict",
 }
-"""The heading of each folder's numbers; how figures are drawn is left out."""
+"""The heading of each folder's numbers; those of figures are left out."""
 
 
 def meanings() -> dict[str, str]:
@@ -74,8 +74,10 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
 
 
 def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Yield file, values by name, and meaning (empty without one) of the numbers that a folder's
-    files define."""
+    """Yield file, values by name and meaning of the numbers that a folder's files define.
+
+    The meaning is empty where a number has none.
+    """
     for path in sorted(folder.glob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
@@ -125,7 +127,7 @@ def reference() -> str:
 
 
 def _others() -> Iterator[str]:
-    """Yield the numbers beside the criteria, a section for each folder."""
+    """Yield the numbers other than the criteria, a section for each folder."""
     for folder, heading in HEADINGS.items():
         rows = [
             [
@@ -143,11 +145,11 @@ def _written(value: Any) -> str:
     if isinstance(value, tuple):
         return ", ".join(map(_written, value))
     short = f"{value:.4g}"
-    return short if float(short) != 1.0 else f"{value:.14g}"  # just short of one is not one
+    return short if float(short) != 1.0 else f"{value:.14g}"  # 0.999999 must not read as one
 
 
 def _measured() -> list[str]:
-    """Return what was measured with the values, a section each."""
+    """Return the measurements of the criteria, a section each."""
     measured = json.loads(MEASURED.read_text(encoding="utf-8"))
     return [
         f"## {title}\n\n{one['about']}\n\n{_table(one['columns'], one['rows'])}"
@@ -156,7 +158,7 @@ def _measured() -> list[str]:
 
 
 def keep(title: str, measured: dict[str, Any]) -> None:
-    """Write what was measured with the values as a section: ``about``, ``columns`` and ``rows``."""
+    """Write a measurement of the criteria as a section: ``about``, ``columns`` and ``rows``."""
     measurements = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
     MEASURED.write_text(
         json.dumps(measurements, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"

@@ -1,4 +1,4 @@
-"""A session made ready: eligible, its faults marked, downsampled, split by purpose, observed."""
+"""Prepare a session: check eligibility, mark faults, downsample, split by purpose, observe."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,35 +24,40 @@ WHY = {"train": "the model is fitted there", "validate": "the gain is measured t
 
 @dataclass(frozen=True)
 class TrainingData:
-    """The runs of one session, as everything after takes them."""
+    """The prepared runs of one session."""
 
     train: tuple[Run, ...]
     validate: tuple[Run, ...]
     baseline: Baseline
     faults: tuple[Fault, ...]
     noisy_angles: bool
-    """Whether only what is below 5 Hz is looked at, for the angles are noise above."""
+    """Whether only the band below 5 Hz is used, because the angles are noise above it."""
 
     @property
     def spoilt(self) -> list[Fault]:
-        """Faults of acquisition that keep physics from being looked at."""
+        """Faults of acquisition that prevent any statement about physics."""
         return [fault for fault in self.faults if fault.spoils]
 
 
 def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> TrainingData:
-    """Make a session's motions ready.
+    """Prepare a session's motions.
 
     Parameters
     ----------
     motions : sequence of Motion
         Runs of one machine, some to train and some to validate.
     known : sequence of str
-        Labels of what the machine is known to have besides rigid body and friction.
+        Labels of effects that the machine is known to have besides rigid body and friction.
+
+    Returns
+    -------
+    TrainingData
 
     Raises
     ------
     InputError
-        Where runs are missing or too short, or no baseline can have what is ``known``.
+        Where runs are missing or too short, or an effect in ``known`` cannot be part of the
+        baseline.
     """
     motions = on_one_scale(motions)
     refuse_unfit(motions)
@@ -78,7 +83,7 @@ def _of(runs: Sequence[Run], purpose: str) -> tuple[Run, ...]:
 
 
 def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
-    """Refuse motions of which none is to train or to validate, or a kind is to validate only."""
+    """Raise InputError without a training or a validation run, or with a kind to validate only."""
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     for purpose, why in WHY.items():
         if not any(m.purpose == purpose for m in motions):
@@ -96,7 +101,7 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
 
 
 def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> None:
-    """Refuse validation runs of which too little is usable to tell noise from error."""
+    """Raise InputError where too little of the validation runs is usable to estimate the noise."""
     joints = validate[0].motion.joints
     floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
     for j, joint in enumerate(joints):
@@ -108,5 +113,5 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
             )
             raise InputError(
                 f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few"
-                f" in a row to tell noise from error; validate on longer runs{wrong}"
+                f" in a row to separate noise from error; validate on longer runs{wrong}"
             )

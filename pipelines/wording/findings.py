@@ -10,7 +10,7 @@ from typing import Any
 
 LEAST = 0.01
 """Probability below which an alternative is not shown."""
-TIED = "one of these, which these data cannot tell apart"
+TIED = "one of these, which these data cannot separate"
 UNLISTED = "unlisted: "
 AGAINST = ", not named: the validation runs speak against it"
 

@@ -96,7 +96,7 @@ def test_the_path_leads_from_the_joint_over_the_family_to_the_cause(capsys):
 
 def test_tied_causes_are_printed_each_and_their_probabilities_add_up_to_the_joint_one(capsys):
     lines = probabilities(shown(capsys, **decision_of(ties=("parallel_spring", "end_stop"))))
-    (at,) = [k for k, (_, words, _) in enumerate(lines) if "cannot tell apart" in words]
+    (at,) = [k for k, (_, words, _) in enumerate(lines) if "cannot separate" in words]
     together, members = lines[at], lines[at + 1 : at + 4]
     assert [words for _, words, _ in members] == [
         "cogging at the knee",

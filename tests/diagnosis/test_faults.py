@@ -141,7 +141,7 @@ def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_su
     late = frame["time_s"] + np.random.default_rng(4).uniform(0.0, 1e-3, len(frame))
     session[SPOILED] = frame.assign(**coarse, time_s=late), metadata
     fault = next(f for f in faults_of(session) if f.channel == "time_s")
-    assert "too coarse to tell" in fault.what and not fault.spoils
+    assert "too coarse to show" in fault.what and not fault.spoils
 
 
 def test_stamps_that_are_wrong_by_less_than_the_angles_noise_spoil_nothing(session):

@@ -68,7 +68,9 @@ def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind
         and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
     )
     assert said["residual"]["depends_on"][0]["variable"] == "speed"
-    assert f"of what is left at the {joint} depends on the {joint}'s speed" in said["summary"]
+    assert (
+        f"of the remaining error at the {joint} depends on the {joint}'s speed" in said["summary"]
+    )
 
 
 @pytest.mark.xfail(

@@ -86,7 +86,7 @@ def test_too_little_to_validate_on_is_told_with_the_fault_that_leaves_it_out():
     torque = validate.torque.copy()
     torque[len(torque) // 10 :] = torque[len(torque) // 10]
     with pytest.raises(
-        InputError, match=r"too few in a row to tell noise from error.*torque is stuck"
+        InputError, match=r"too few in a row to separate noise from error.*torque is stuck"
     ):
         diagnose([train, replace(validate, torque=torque)])
 

@@ -87,9 +87,8 @@ def test_joints_that_hold_one_angle_between_them_are_refused(motions, times):
         diagnose([imported(copied(m)) for m in motions])
     assert (
         str(refused.value)
-        == f"run_0.parquet: hip and knee hold the same angles (knee's are {times:g} times hip's"
-        " throughout, but for their zeros), expected a measurement of its own of each joint;"
-        " correct their columns in the map"
+        == f"run_0.parquet: the knee's angle is a copy of the hip's (factor {times:g}), expected an"
+        " encoder column for each joint; correct their columns in the map"
     )
 
 

@@ -68,7 +68,7 @@ def test_a_reversed_sign_is_named_in_each_run_of_a_machine_of_one_joint(machine,
         assert fault.spoils and fault.channel.endswith(EFFORT)
         assert (
             f"the sign of {fault.channel} is reversed" in fault.what
-            and "mirror image" in fault.what
+            and "looks the same" in fault.what
         )
 
 

@@ -154,7 +154,7 @@ def nothing_missing(d, share, from_periods):
 def test_an_estimated_floor_that_is_most_of_the_torque_is_said_to_hide_what_may_be_missing(stuck):
     told = verdict(nothing_missing(stuck, 0.87, from_periods=False))
     assert told["status"] == "nothing_missing"
-    assert "but the floor itself is 87% of the torque: little could show." in told["finding"]
+    assert "but the floor itself is 87% of the torque and may hide effects." in told["finding"]
     assert any(
         "the noise floor of the hip is estimated as 87% of its torque" in caveat
         for caveat in told["caveats"]
@@ -286,7 +286,7 @@ def test_ties_are_one_answer_with_one_probability():
     tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
     assert (
         _in_words(tied)
-        == "parallel spring at the knee or base tilt, which these data cannot tell apart (together"
+        == "parallel spring at the knee or base tilt, which these data cannot separate (together"
         " 0.97)"
     )
 

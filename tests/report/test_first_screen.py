@@ -31,7 +31,7 @@ def cause(effect="cogging", joint="knee", ties=()):
         ([("base_tilt", None)], "cogging at the knee or base tilt"),
         (
             [("backlash", "knee"), ("backlash", "hip")],
-            "cogging at the knee or 2 others that these data cannot tell",
+            "cogging at the knee or 2 others that these data cannot separate",
         ),
     ],
 )
@@ -144,7 +144,7 @@ def test_the_path_and_the_three_cases_stand_on_the_first_screen(tmp_path):
         "something that repeats with the motion 0.97",
         "something at the knee 0.97",
         "a law of the knee&#39;s angle 0.97",
-        "one of these, which these data cannot tell apart 0.95",
+        "one of these, which these data cannot separate 0.95",
         "cogging at the knee 0.63",
         "parallel spring at the knee 0.32",
     ]

@@ -90,7 +90,7 @@ def test_the_verdict_stands_on_the_first_screen(opened, page_file):
             "The simulation misses cogging or parallel spring at the knee",
             "Missing from the simulation",
             "Is anything missing?",
-            "cannot tell apart",
+            "cannot separate",
             "repeats with the motion",
             "× floor",
         ):

@@ -1,4 +1,4 @@
-"""Evidence for causes besides what they do to the mean of the torque."""
+"""Evidence for causes other than their effect on the mean of the torque."""
 
 from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
@@ -6,10 +6,10 @@ from pipelines.effects import VoluntaryTorque
 
 
 def auxiliary_evidence(prepared: Prepared) -> dict[str, float]:
-    """Return the log likelihood ratio of each label besides what it does to the mean torque.
+    """Return the log likelihood ratio of each label from evidence other than the mean torque.
 
-    Of a wearer's pushes it is what cuffs and drives share; a rhythm that is fitted explains some of
-    it too.
+    For a wearer's pushes it is the part that cuffs and drives share. A rhythm that is fitted
+    explains some of it too.
     """
     ratios = cuff_coherence(prepared.runs, prepared.residuals)
     return {

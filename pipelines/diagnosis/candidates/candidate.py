@@ -15,15 +15,15 @@ from pipelines.effects import EFFECTS, Effect, Parameter
 from pipelines.model import BASELINE, Term, TermColumns
 
 WORN = ("mass_off_axis", "payload_change")
-"""Effects of the structure that the person may carry instead: then in their runs only, and felt by
+"""Structural effects that the person may carry instead: then in their runs only, and measured by
 the cuffs."""
 NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
-"""Units of what is counted along a joint's way."""
+"""Units of quantities that are counted along a joint's travel."""
 WAVES = 1.5
-"""Fewest waves of a ripple within the angles that are swept: with fewer it does not repeat, and
-together with a spring it fits any function of the angle."""
+"""Fewest waves of a ripple within the swept angles. With fewer it does not repeat, and together
+with a spring it fits any function of the angle."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,12 @@ class Candidate:
 
     effect: Effect
     shapes: tuple[tuple[float, ...], ...]
-    """One for each run; they differ in parameters that each run has for itself."""
+    """One for each run; they differ in per-run parameters only."""
     directions: tuple[tuple[float, ...], ...] = ()
-    """Shapes that have a column each, where the effect is in proportion to them; empty where it has
+    """Shapes that have a column each, where the effect is proportional to them; empty where it has
     one shape."""
     bodies: tuple[float, ...] = ()
-    """Baseline values (b,) with whose rigid bodies the library simulates a transmission; empty: the
+    """Baseline values (b,) whose rigid bodies the library simulates a transmission with; empty: the
     baseline's own."""
 
     @property
@@ -46,12 +46,11 @@ class Candidate:
         return self.effect.label
 
     def term(self, run: int) -> Term:
-        """Return the candidate as a term of a run's model, its amplitudes nought."""
+        """Return the candidate as a term of a run's model, with zero amplitudes."""
         return Term.of(self.effect, self.shapes[run])
 
     def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in
-        all."""
+        """Return the candidate with shape ``i`` larger by a step, in some runs or in all."""
         return self.with_own(
             i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)]
         )
@@ -65,16 +64,14 @@ class Candidate:
         )
 
     def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with another value of shape parameter ``i``, in some runs or in
-        all."""
+        """Return the candidate with a new value of shape ``i``, in some runs or in all."""
         return self.with_own(
             i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)]
         )
 
     @property
     def bends(self) -> bool:
-        """Whether the effect changes kinematics or readings rather than adding torque of its
-        own."""
+        """Whether the effect changes kinematics or readings, and adds no torque of its own."""
         return bends_motion(self.effect)
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
@@ -84,10 +81,9 @@ class Candidate:
         return TermColumns.of(self.effect, kinds, per_run, start)
 
     def typical(self, kinds: Sequence[str]) -> NDArray:
-        """Return how large the amplitude of each column is where the effect is as large as on other
-        machines, (k,).
+        """Return the amplitude of each column of an effect as large as on other machines, (k,).
 
-        Where the effect transforms the motion a column has its shape, or is in proportion to its
+        Where the effect transforms the motion, a column has its shape or is proportional to its
         direction.
         """
         if self.directions:
@@ -100,12 +96,11 @@ class Candidate:
 
     @property
     def log_prior(self) -> float:
-        """Log prior density of its shape over that of a uniform one in the typical range; forms are
-        equally likely.
+        """Log prior density of its shape over that of a uniform one in the typical range.
 
-        A free shape has Student's distribution about the middle of its typical range, with a
-        quarter of the range as its scale. Where a joint's way decides the range, or each run has a
-        value, the density is the uniform one.
+        Forms are equally likely. A free shape has Student's distribution about the middle of its
+        typical range, with a quarter of the range as its scale. Where a joint's travel decides the
+        range, or each run has a value, the density is uniform.
         """
         forms = prod(max(len(parameter.forms), 1) for parameter in self.effect.shape)
         free = [
@@ -116,37 +111,33 @@ class Candidate:
         offs = [
             self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions
         ]
-        # Off the middle in halves of the range, with a scale of a quarter; a range is four scales
-        # long.
+        # Distances are in halves of the range, the scale is a quarter: a range is four scales long.
         return float(
             np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), CRITERIA.shape_freedom))
             - np.log(forms)
         )
 
     def is_free(self, i: int) -> bool:
-        """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one
-        of its forms."""
+        """Return whether shape ``i`` is fitted, not held at a default or one of its forms."""
         parameter = self.effect.shape[i]
         spanned = any(shape[i] != 0.0 for shape in self.directions)
         return not parameter.forms and (parameter.default is None or spanned)
 
     @property
     def own_bend(self) -> int | None:
-        """Which shape parameter bends each run in a way of its own, None where none does."""
+        """Place of the per-run shape parameter that transforms the motion, None without one."""
         own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.bends)
         return next(own, None)
 
     @property
     def onset(self) -> int | None:
-        """Which shape parameter is the instant at which the effect begins in each run, None where
-        it has none."""
+        """Place of the shape that is the instant of onset in each run, None without one."""
         own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
         return next(own, None)
 
 
 def bends_motion(effect: Effect) -> bool:
-    """Tell whether an effect changes kinematics or readings rather than adding torque of its
-    own."""
+    """Return whether an effect changes kinematics or readings, and adds no torque of its own."""
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (
         effect.torque_reading is not None and shaped
@@ -154,13 +145,13 @@ def bends_motion(effect: Effect) -> bool:
 
 
 def _largest(effect: Effect, direction: Sequence[float]) -> float:
-    """Return how far along a direction of its shapes an effect may typically be."""
+    """Return the largest typical size of an effect along a direction of its shapes."""
     pairs = zip(effect.shape, direction, strict=True)
     return max(max(map(abs, parameter.typical)) / abs(value) for parameter, value in pairs if value)
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
-    """Return the value below which runs cannot tell a shape parameter of an effect."""
+    """Return the smallest value of a shape parameter that runs can determine, in its unit."""
     if parameter.unit not in TURNS or effect.joint is None:
         return -np.inf
     j = runs[0].motion.joints.index(effect.joint)
@@ -169,10 +160,9 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
 
 
 def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place of a machine where it can be, in the kinds of each run at
-    hand.
+    """Yield every effect at every place where a machine can have it, in the kinds of the runs.
 
-    What is in the baseline already is none.
+    Effects of the baseline are left out.
     """
     machine, known = baseline.machine, {effect.label for effect in baseline.known}
     for effect in EFFECTS:

@@ -1,7 +1,7 @@
-"""A candidate's rows in the decision regression, computed once a block.
+"""Compute a candidate's rows in the decision regression, once a block.
 
-The decision band is slow enough for that (tests/diagnosis/test_block_rate.py), but for waves over
-the angle that go by within a few blocks.
+The decision band is slow enough for that (tests/diagnosis/test_block_rate.py). The exception is
+waves over the angle that pass within a few blocks.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ RIDGE = 1e-10
 
 
 class CandidateRows:
-    """Computes weighted rows (N, k) of candidates, nothing projected out."""
+    """Computes weighted rows (N, k) of candidates; nothing is projected out."""
 
     def __init__(
         self, runs: Sequence[Run], baseline: Baseline, regression: DecisionRegression
@@ -46,12 +46,19 @@ class CandidateRows:
         self._last_change: tuple[Candidate, NDArray | None, tuple[NDArray, NDArray]] | None = None
 
     def __call__(self, candidate: Candidate, others: NDArray | None = None) -> NDArray | None:
-        """Return a candidate's rows; None where they are not finite.
+        """Return a candidate's rows.
 
         Parameters
         ----------
-        beside : (N, b) array, optional
-            Rows of what else is fitted with the baseline where the candidate transforms the motion.
+        candidate : Candidate
+        others : (N, b) array, optional
+            Rows of other causes, fitted with the baseline where the candidate transforms the
+            motion.
+
+        Returns
+        -------
+        (N, k) array or None
+            None where the rows are not finite.
         """
         if not candidate.bends:
             runs = self._runs if self._ripples_within_blocks(candidate) else self._slow
@@ -68,15 +75,15 @@ class CandidateRows:
     def with_refitted_bodies(
         self, candidate: Candidate, others: NDArray | None = None
     ) -> Candidate:
-        """Return a transmission with the rigid bodies of a fit of baseline and transmission
-        together.
+        """Return a transmission with the rigid bodies of a joint fit of baseline and transmission.
 
         A fit of the baseline alone is biased by the missing transmission.
 
         Parameters
         ----------
-        beside : (N, b) array, optional
-            Rows of what else is fitted with them.
+        candidate : Candidate
+        others : (N, b) array, optional
+            Rows of other causes that are fitted with them.
         """
         _, refitted = self._change(candidate, others)
         bodies = relaxed(refitted, np.array(candidate.bodies) if candidate.bodies else None)
@@ -95,7 +102,7 @@ class CandidateRows:
         return self._last_laden[1]
 
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
-        """Tell whether a wave over the angle goes by within a few blocks."""
+        """Return whether a wave over the angle passes within a few blocks."""
         joint, shapes = candidate.effect.joint, candidate.effect.shape
         if joint is None or not any(parameter.unit in TURNS for parameter in shapes):
             return False
@@ -109,7 +116,7 @@ class CandidateRows:
         return [own.expand(part, r) for r, part in enumerate(parts)]
 
     def _transformed(self, candidate: Candidate, others: NDArray | None) -> NDArray:
-        """Return what the transformed baseline adds to the plain one, under the values it then has.
+        """Return the change of the transformed baseline against the plain one, at its own values.
 
         Each run has a column of its own where its shape is its own.
         """
@@ -120,10 +127,12 @@ class CandidateRows:
         return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
 
     def _change(self, candidate: Candidate, others: NDArray | None) -> tuple[NDArray, NDArray]:
-        """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its
-        values then, (b,)."""
+        """Return the change of the prediction by a transformed motion, (N, 1), and values, (b,).
+
+        The values are those of the baseline under that motion.
+        """
         last = self._last_change
-        # Its rows are asked for, then its bodies.
+        # A caller needs the rows first, then the bodies of the same candidate.
         if last is None or last[0] != candidate or last[1] is not others:
             last = self._last_change = candidate, others, self._compute_change(candidate, others)
         return last[2]
@@ -151,7 +160,7 @@ class CandidateRows:
 
 
 def _least_squares(rows: NDArray, target: NDArray) -> NDArray:
-    """Return the coefficients (k,) of rows (N, k) that are nearest to a target (N,)."""
+    """Return the coefficients (k,) with which rows (N, k) come nearest to a target (N,)."""
     gram = rows.T @ rows
     size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     scaled = gram / np.outer(size, size) + RIDGE * np.eye(len(size))

@@ -28,17 +28,17 @@ class Cause:
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
     variance: NDArray
-    """(k,) prior variance of each coefficient over their sum: larger where typical amplitudes make
-    more of it."""
+    """(k,) prior variance of each coefficient over their sum. It is larger for columns to which
+    typical amplitudes add more."""
     derivative: NDArray
-    """(N, d) what a change of its shape does: along each shape, and towards another form."""
+    """(N, d) change of the prediction along each shape, and towards another form."""
     imitation: NDArray
     """(b, k + d): values of the baseline that imitate columns and derivatives best, before it is
     projected out."""
     first: bool
     """Whether it is the best shape of its effect."""
     context: int = -1
-    """The set of causes beside which it was refined; -1 where it was refined alone."""
+    """The set of causes with which it was refined; -1 where it was refined alone."""
 
     @classmethod
     def of(
@@ -50,14 +50,14 @@ class Cause:
         first: bool,
         context: int = -1,
     ) -> "Cause | None":
-        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it.
+        """Return a fitted candidate as a cause; None where the baseline explains all of it.
 
         Parameters
         ----------
         fitted : Fitted
             The candidate at its best shapes, with its columns.
-        slopes : NDArray
-            (N, d) rows of what its shapes do, each per unit of change.
+        slopes : (N, d) array
+            Change of the rows by each shape, per unit of change.
         first : bool
             Whether these are the best shapes of the effect.
         context : int, optional
@@ -73,8 +73,7 @@ class Cause:
         amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
         rows = fitted.columns @ amplitudes
         imitation = regression.baseline_values(np.hstack([rows, slopes]))
-        # Typical amplitudes are known roughly: were they exact, variances would be as the squares
-        # of sizes.
+        # Typical amplitudes are known roughly. Exact ones give variances like the squares of sizes.
         variance = size[kept] / size[kept].sum()
         columns, derivative = regression.project(rows), regression.project(slopes)
         return cls(
@@ -83,7 +82,7 @@ class Cause:
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:
-    """Return what changes from the best form of a cause to its best other form, (N, 0 or 1)."""
+    """Return the change from the best form of a cause to its best other form, (N, 0 or 1)."""
     forms = [p.forms for p in best.candidate.effect.shape]
     here = best.candidate.shapes[0]
     for other in others:

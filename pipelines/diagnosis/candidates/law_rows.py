@@ -1,4 +1,4 @@
-"""Rows of the smooth laws and of the curves of time in the decision regression."""
+"""Compute rows of the smooth laws and of the curves of time in the decision regression."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
 
 
 def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
-    """Yield the law and the columns of each joint's tones: every run has phases of its own."""
+    """Yield the law and the columns of each joint's tones; every run has its own phases."""
     for j, lines in enumerate(prepared.lines):
         tones = np.array([line.cycles for line in lines.of_kind(Kind.TIME)])
         if not len(tones):
@@ -69,7 +69,7 @@ def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], li
 def _coarse_steps(
     prepared: Prepared, joints: int
 ) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
-    """Yield the law and the column of each joint whose torque may be reported in coarse steps."""
+    """Yield the law and the column of each joint whose torque may have coarse steps."""
     runs = prepared.runs
     predicted = [run.slow(x) for run, x in zip(runs, prepared.predicted, strict=True)]
     residual = [
@@ -88,14 +88,14 @@ def _coarse_steps(
             continue
         columns = [np.zeros((*run.measured.shape, 1)) for run in runs]
         for column, run, x in zip(columns, runs, predicted, strict=True):
-            # Rounding has an rms of the step over the root of twelve, the column one of the joint's
-            # torque.
+            # Rounding has an rms of the step over the root of twelve. The column has the rms of the
+            # joint's torque.
             column[:, j, 0] = run.average(rounding(x[:, j], step)) * np.sqrt(12.0) / step * rms
         yield [LawColumn(QUANTISATION, j, "all", 1.0)], columns
 
 
 def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
-    """Put columns of drives and of cuffs, (m, J, k) each, over one another."""
+    """Stack columns of drives and of cuffs, (m, J, k) each, as outputs."""
     return [np.concatenate([d, c], axis=1) for d, c in zip(drives, cuffs, strict=True)]
 
 
@@ -104,8 +104,7 @@ def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list
     kept, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)
-        # Noise of a density adds twice that over the duration to the square of a cosine's
-        # amplitude.
+        # Noise adds twice its density over the duration to the square of a cosine's amplitude.
         duration = max(float(run.time[-1] - run.time[0]), LENGTH_S)
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
         noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration

@@ -1,8 +1,8 @@
-"""The candidate library: every cause and every law that competes, as columns of one regression.
+"""Build the candidate library: every competing cause and law, as columns of one regression.
 
-Each cause stands in it at its best shape alone, with derivative columns along its shapes, and at
-the next best of the coarse search. Where sets of causes are likely, it stands in it once more at
-the shape that it has beside the others of the set.
+Each cause has its best shape alone, with derivative columns along its shapes, and the next best
+shapes of the coarse search. Where sets of causes are likely, it has one more: the shape refined
+together with the others of the set.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,27 +28,27 @@ from pipelines.wording.law import law_label
 ALTERNATIVES = 2
 """Shapes of a cause besides its best one."""
 SWEEPS = 2
-"""Times that the causes of a set are refined in turn."""
+"""Number of times that the causes of a set are refined in turn."""
 Report = Callable[[float, str], None]
 
 
 def silent(share: float, what: str) -> None:
-    """Report to nobody."""
+    """Ignore a report of progress."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """A set of causes and laws in which the causes are refined beside one another."""
+    """A set of causes and laws whose causes are refined together."""
 
     causes: tuple[int, ...]
     """Their numbers in the library."""
     laws: tuple[str, ...]
-    """Variants of laws, as ``LawColumn.variant`` has them."""
+    """Variants of laws, as of ``LawColumn.variant``."""
 
 
 @dataclass(frozen=True)
 class Library:
-    """Everything that competes, the baseline projected out."""
+    """All competing causes and laws, the baseline projected out."""
 
     prepared: Prepared
     regression: DecisionRegression
@@ -65,21 +65,22 @@ class Library:
     """Labels of effects whose columns at every shape are not finite or add nothing to the
     baseline."""
     contexts: tuple[Context, ...] = ()
-    """Sets whose causes were refined beside one another."""
+    """Sets whose causes were refined together."""
     screened: tuple[tuple[Fitted, ...], ...] = ()
-    """Of each effect the fits of its coarse search."""
+    """The fits of each effect's coarse search."""
 
     def refined_together(self, contexts: Sequence[Context]) -> "Library":
-        """Return the library with the causes of some sets refined beside one another as well."""
+        """Return the library with the causes of some sets refined together as well."""
         grown = self
         for context in contexts:
             grown = grown._with([self.causes[i] for i in context.causes], context.laws)
         return grown
 
     def with_partners(self, number: int, most: int) -> "Library":
-        """Return the library with those causes that explain most beside one cause, refined with it.
+        """Return the library with one cause refined with each of its best partners.
 
-        Beside a large cause a small one has another shape than alone.
+        Partners are the ``most`` causes that explain most in addition to it. In a set with a large
+        cause, a small one has another shape than alone.
         """
         grown, main = self, self.causes[number]
         rows_of_main = np.hstack([main.columns, main.derivative])
@@ -97,7 +98,7 @@ class Library:
         return grown
 
     def _with(self, added: Sequence[Cause], laws: Sequence[str] = ()) -> "Library":
-        """Return the library with a set of causes refined beside one another as well."""
+        """Return the library with a set of causes refined together as well."""
         own = self._together(list(added), laws)
         if own is None:
             return self
@@ -142,7 +143,19 @@ class Library:
 
 
 def build_library(prepared: Prepared, report: Report = silent) -> Library:
-    """Compute every cause's and every law's columns."""
+    """Compute the columns of every cause and every law.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The searched runs under the baseline alone.
+    report : callable, optional
+        Takes the share that is done, 0 to 1, and the present effect.
+
+    Returns
+    -------
+    Library
+    """
     misfit = CRITERIA.form_misfit * prepared.slow_rms
     regression = DecisionRegression.of(
         prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit
@@ -189,7 +202,7 @@ def _effects(prepared: Prepared) -> list[Effect]:
 def _ripples(
     prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression
 ) -> list[Cause]:
-    """Return each joint's ripple as order tracking has it, at the full sampling rate."""
+    """Return each joint's ripple from order tracking, at the full sampling rate."""
     ripples, machine = [], prepared.baseline.machine
     for joint in prepared.baseline.joints:
         if orders := orders_of(joint, prepared):
@@ -202,7 +215,7 @@ def _ripples(
 
 
 def orders_of(joint: str, prepared: Prepared) -> tuple[float, ...]:
-    """Return the cycles a turn of a joint's ripple, known at the full sampling rate."""
+    """Return the cycles a turn of a joint's ripple, as found at the full sampling rate."""
     lines = prepared.lines[prepared.baseline.joints.index(joint)]
     return tuple(line.cycles for line in lines.of_kind(Kind.ANGLE))
 
@@ -215,8 +228,8 @@ def _shapes(
         return []
     swings = fits[0].candidate.effect.swings
     best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
-    # A refinement may go far from its start; of a transmission it is not known which start was the
-    # best.
+    # A refinement may end far from its start, and it is unknown which start of a transmission led
+    # to the best shape.
     others = others_of(fits, best if swings else fits[0], ALTERNATIVES)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
@@ -226,12 +239,11 @@ def _shapes(
 
 
 def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
-    """Return a transmission at its best shape, refined from several starts, and its slopes there,
-    (N, d).
+    """Return a transmission at its best shape, and its slopes there, (N, d).
 
-    Where a load swings the likelihood has several maxima, and which is the highest shows only with
-    refitted bodies: the shape that is best with the baseline's bodies and the one that is best with
-    refitted bodies are both refined.
+    It is refined from several starts. Where a load swings, the likelihood has several maxima, and
+    only refitted bodies show which is the highest. So the best shape with the baseline's bodies and
+    the best shape with refitted bodies are both refined.
     """
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]

@@ -1,10 +1,9 @@
-"""A torque that is reported in coarse steps: the step that a residual shows, and what rounding to
-it adds.
+"""Find the step of a torque that is reported in coarse steps, and the rounding error.
 
 Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x, whose
 first harmonic is -(h / pi) sin(2 pi x / h) (Widrow and Kollar, 2008, Quantization Noise, chapter
-4). So a step is a line of known phase in the spectrum of the residual over the torque. It is found
-also where noise came after the rounding, so that no value in the file lies on a grid.
+4). So a step is a line of known phase in the spectrum of the residual over the torque. The line
+remains where noise was added after the rounding, so that no value in the file lies on a grid.
 """
 
 from collections.abc import Sequence
@@ -13,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 FINEST, COARSEST = 0.1, 2.0
-"""Steps that are sought, in units of the joint's rms torque. A finer one adds less than three
-percent of it."""
+"""Range of steps that are sought, in units of the joint's rms torque. A finer one adds less than
+three percent of it."""
 REACH = 3.0
 """Torque on either side of its median in which the step is sought, in the same unit."""
 BINS = 1024
-"""Of torque within that reach: 17 in the finest step."""
+"""Bins of torque within that reach: 17 in the finest step."""
 PEAKS = 4
 """Steps tried within the width of a line."""
 STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
@@ -26,13 +25,12 @@ STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:
-    """Return what rounding to multiples of a step adds to a torque (n,), N·m."""
+    """Return the error of rounding a torque (n,) to multiples of a step, N·m."""
     return step * np.round(torque / step) - torque
 
 
 def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: float) -> float | None:
-    """Return the step whose rounding error correlates most with the residual, N·m; None where none
-    does.
+    """Return the step, N·m, whose rounding error correlates most with the residual.
 
     Parameters
     ----------
@@ -40,6 +38,11 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
         Predicted torque of one joint, and measured less predicted, of each run, N·m.
     rms : float
         The joint's torque, N·m.
+
+    Returns
+    -------
+    float or None
+        None where no step correlates with the residual.
     """
     x, y = np.concatenate(torque), np.concatenate(residual)
     if not len(x) or not rms > 0.0:

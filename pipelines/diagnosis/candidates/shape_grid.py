@@ -1,4 +1,4 @@
-"""The coarse search over a cause's shapes: a grid, screened at block rate in the decision band."""
+"""Search a cause's shapes coarsely: a grid, screened at block rate in the decision band."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -15,13 +15,13 @@ from pipelines.effects import Effect, Parameter
 VALUES = 8
 """Values of a shape parameter in a grid."""
 BENDING = 2
-"""Values of one whose effect is nearly in proportion to it."""
+"""Values of a shape parameter to which the effect is nearly proportional."""
 SLOW_WAVES = 4.0
-"""Times the fewest waves of a ripple, up to which block averages are searched for one."""
+"""Multiple of the fewest waves of a ripple, up to which block averages are searched for one."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2
-"""Grid steps by which two maxima along an oscillating parameter differ at least."""
+"""Least distance between two maxima along an oscillating parameter, in grid steps."""
 
 Fit = Callable[[Candidate], Fitted | None]
 
@@ -46,12 +46,12 @@ def screened(
 
 
 def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
-    """Return a candidate with a column for each direction that its effect is in proportion to."""
+    """Return a candidate with a column for each direction to which its effect is proportional."""
     return Candidate(effect, (directions[0],) * runs, tuple(directions))
 
 
 def others_of(fits: Sequence[Fitted], chosen: Fitted, most: int) -> list[Fitted]:
-    """Return the best fits of other forms, or at other maxima, than the chosen one's."""
+    """Return the best fits at other forms or other maxima than the chosen fit."""
     effect = chosen.candidate.effect
     kept = [chosen]
     for fitted in fits:
@@ -63,7 +63,7 @@ def others_of(fits: Sequence[Fitted], chosen: Fitted, most: int) -> list[Fitted]
 
 
 def _differ(effect: Effect, one: Candidate, other: Candidate) -> bool:
-    """Tell whether two shapes differ by more than a refinement follows."""
+    """Return whether two shapes differ by more than a refinement can follow."""
     for parameter, a, b in zip(effect.shape, one.shapes[0], other.shapes[0], strict=True):
         low, high = parameter.typical
         if parameter.forms:
@@ -98,8 +98,7 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
-    """Return the values of an effect's shape parameter that are tried on some runs, (count,), in
-    its unit."""
+    """Return the values of an effect's shape to try on some runs, (count,), in its unit."""
     if not parameter.swept or effect.joint is None:
         return values_of(parameter, count)
     j = runs[0].motion.joint_index(effect.joint)
@@ -108,7 +107,7 @@ def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[R
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:
-    """Return the values of a shape parameter that are tried, (count,) or fewer, in its unit."""
+    """Return the values of a shape parameter to try, (count,) or fewer, in its unit."""
     if parameter.forms:
         return np.array(parameter.forms)
     if parameter.default is not None:
@@ -118,13 +117,13 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
         return np.arange(low, high, parameter.grain)
     wide = low > 0.0 and high / low > 4.0
     space = np.geomspace if wide else np.linspace
-    # Away from the ends, where an effect that bends the motion does nothing or tears it apart.
+    # The ends are left out: there an effect that transforms the motion does nothing or too much.
     values = space(low, high, count + 2)[1:-1]
     return values if wide else values[np.abs(values - parameter.neutral) > 0.02 * (high - low)]
 
 
 def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression) -> list[float]:
-    """Return the frequencies at which a rhythm explains most, the highest peaks first."""
+    """Return the frequencies, Hz, at which a rhythm explains most, the highest peaks first."""
     low, high = effect.shape[0].typical
     tried = np.arange(low, high, TONE_STEP_HZ)
     power = np.zeros(len(tried))
@@ -141,7 +140,6 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
 
 
 def _from_the_begin(effect: Effect, runs: int) -> Candidate:
-    """Return an effect that begins at an instant, from the begin on: its instants are sought
-    later."""
+    """Return an effect with an onset, present from the begin on; its instants are sought later."""
     defaults = [ALWAYS if p.per_run else p.default or 0.0 for p in effect.shape]
     return Candidate(effect, (tuple(defaults),) * runs)

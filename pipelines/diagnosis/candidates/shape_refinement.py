@@ -1,8 +1,8 @@
-"""The shape of one cause, refined by its derivative: Gauss and Newton's method.
+"""Refine the shape of one cause along its derivative, by Gauss and Newton's method.
 
-A step solves for the amplitudes and the shape's change together, with the baseline and whatever
-else is in the set refitted. The derivative columns are kept: with them a set of causes can move
-every shape a little without computing any column anew.
+A step solves for the amplitudes and the shape's change together, with the baseline and the other
+causes of the set refitted. The derivative columns are kept: with them a set of causes can move
+every shape a little without computing any column again.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.effects import Parameter
 
 STEPS = 3
-"""Steps at most."""
+"""Largest number of steps."""
 LENGTHS = 3
-"""Lengths at which a step is tried, until one gains."""
+"""Number of lengths at which a step is tried, until one gains."""
 SHORTER = 0.3
 """Factor from each of these lengths to the next."""
 ENOUGH = 0.2
@@ -27,54 +27,54 @@ ENOUGH = 0.2
 DIFFERENCE = 0.02
 """Step of a difference quotient, in the shape's own unit of change."""
 LARGEST_STEP = 0.7
-"""Of one step, in the shape's unit of change."""
+"""Largest change in one step, in the shape's unit of change."""
 MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
 ROUNDING = 1e-5
-"""Share of a column that is left by a projection where the column lies in what is projected out."""
+"""Relative length below which a projected column is rounding error."""
 STIFFNESS = "N·m/rad"
-"""Unit of a shape of which more does less."""
+"""Unit of a shape whose effect falls as it grows."""
 BODY_REFITS = 2
-"""Times that the rigid bodies with which a transmission is simulated are fitted anew."""
+"""Number of times that the rigid bodies of a simulated transmission are fitted again."""
 ONSETS, SWEEPS = 40, 3
-"""Instants tried in a run at a time, and times that all runs are gone through."""
+"""Instants tried in a run at a time, and number of passes through all runs."""
 TONE_STEP_HZ = 0.01
 """Unit of change of a rhythm's frequency: that of a line over 100 s, Hz."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One candidate and what it explains."""
+    """One candidate and how much it explains."""
 
     candidate: Candidate
     columns: NDArray
     """(N, k) rows."""
     amplitudes: NDArray
-    """(k,) that explain most; of a candidate that transforms the motion, 1 at its true shape."""
+    """(k,) that explain most; for a candidate that transforms the motion, 1 at its true shape."""
     gain: float
     """Log likelihood over the baseline's, amplitudes free."""
     gain_as_is: float
-    """The same, of a candidate that transforms the motion with its amplitude one."""
+    """The same with amplitude one, for a candidate that transforms the motion."""
 
     @property
     def worth(self) -> float:
         """The gain by which shapes are compared.
 
-        Of what swings, as it is: an amplitude would scale the twist, which the load does not
-        follow.
+        For a swinging load the amplitude is one: another amplitude would scale the twist, and the
+        load does not follow it.
         """
         return self.gain_as_is if self.candidate.effect.swings else self.gain
 
     @property
     def torque(self) -> NDArray:
-        """What the candidate explains as it is, (N,) rows."""
+        """Prediction of the candidate at its shape, (N,) rows."""
         transforms = self.candidate.bends and not self.candidate.directions
         amplitudes = np.ones_like(self.amplitudes) if transforms else self.amplitudes
         return self.columns @ amplitudes
 
 
 class ShapeRefinement:
-    """Fits single candidates beside the baseline, and beside rows of other causes where given."""
+    """Fits single candidates together with the baseline, and with rows of other causes if given."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class ShapeRefinement:
         regression: DecisionRegression,
         others: NDArray | None = None,
     ) -> None:
-        """Prepare; ``beside`` (N, b) are rows of what else is fitted freely."""
+        """Prepare the projection; ``others`` (N, b) are rows of other causes, fitted freely."""
         self._rows, self._regression, self._others = rows, regression, others
         measured = regression.measured
         basis = np.zeros((len(measured), 0))
@@ -92,15 +92,14 @@ class ShapeRefinement:
         self._measured = measured - basis @ (basis.T @ measured)
 
     def _project(self, rows: NDArray) -> NDArray:
-        """Return rows (N, k) less what is fitted beside; nought where nothing but rounding is
-        left."""
+        """Return rows (N, k) less the baseline and the other causes; zero for rounding."""
         plain = self._regression.project(rows)
         plain -= self._basis @ (self._basis.T @ plain)
         size = np.linalg.norm(rows, axis=0)
         return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
 
     def fit(self, candidate: Candidate) -> Fitted | None:
-        """Fit a candidate's amplitudes; None where its rows are not finite."""
+        """Fit a candidate's amplitudes; return None where its rows are not finite."""
         columns = self._rows(candidate, self._others)
         return None if columns is None else self._fitted(candidate, columns)
 
@@ -115,7 +114,7 @@ class ShapeRefinement:
         return Fitted(candidate, columns, amplitudes, gain, as_is)
 
     def best_of(self, fits: Sequence[Fitted]) -> Fitted | None:
-        """Return that one of an effect's fits made elsewhere which explains most here."""
+        """Return the fit of an effect that explains most here, from fits made elsewhere."""
         if fits[0].candidate.onset is not None:
             return self._with_onsets(fits[0].candidate)
         return max(
@@ -125,7 +124,7 @@ class ShapeRefinement:
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d).
 
-        A transmission's rigid bodies and shapes are fitted in turn. Either may come first, for
+        A transmission's rigid bodies and shapes are fitted in turn. Either may come first, because
         there are several maxima. A refit of the bodies that does not explain more is left out.
         """
         if not start.candidate.effect.swings:
@@ -142,8 +141,7 @@ class ShapeRefinement:
         return best, slopes
 
     def _refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return the candidate at its best shape with the rigid bodies it has, and its derivative
-        columns, (N, d)."""
+        """Return the candidate's best shape with given rigid bodies, and slopes, (N, d)."""
         if start.candidate.directions:
             # Linear in its shapes: the amplitudes are the shape.
             return _shaped(start), np.zeros((len(self._measured), 0))
@@ -164,8 +162,10 @@ class ShapeRefinement:
         return best, slopes
 
     def fits_of_transmission(self, candidate: Candidate) -> list[Fitted]:
-        """Fit a transmission with the baseline's rigid bodies and with refitted ones, where its
-        rows are finite."""
+        """Fit a transmission with the baseline's bodies, and with refitted ones.
+
+        A fit whose rows are not finite is left out.
+        """
         fits = [self.fit(candidate), self.fit(self._with_own_bodies(candidate))]
         return [fitted for fitted in fits if fitted is not None]
 
@@ -176,16 +176,16 @@ class ShapeRefinement:
         return candidate
 
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:
-        """Return a candidate that begins in each run at the instant at which it explains most.
+        """Return a candidate whose onset in each run is the instant at which it explains most.
 
         It never begins in a run where that explains as much. Its amplitude is the same in all runs.
-        What has begun acts as if it had always been there: the column of an instant is that of all
-        the run, zero before it.
+        After its onset an effect acts as if it had always been present: the column of an instant is
+        that of the whole run, zero before it.
         """
         at, count = candidate.onset, len(candidate.shapes)
         assert at is not None
         times = {r: self._regression.time[self._regression.run == r] for r in range(count)}
-        times = {r: t for r, t in times.items() if len(t)}  # a run may have no row that counts
+        times = {r: t for r, t in times.items() if len(t)}  # a run may have no row with weight
         whole = {r: self._only_in(candidate, r) for r in times}
         steps = {r: (t.max() - t.min()) / ONSETS for r, t in times.items()}
         onsets, own = [NEVER] * count, {r: np.zeros(len(self._measured)) for r in times}
@@ -213,7 +213,7 @@ class ShapeRefinement:
         return self.fit(candidate.with_own(at, onsets))
 
     def _only_in(self, candidate: Candidate, number: int) -> NDArray:
-        """Return the rows (N,) of a candidate that is there in one run only, from its begin on."""
+        """Return the rows (N,) of a candidate that acts in one run only, from its begin on."""
         at, runs = candidate.onset, range(len(candidate.shapes))
         assert at is not None
         alone = candidate.with_own(at, [ALWAYS if k == number else NEVER for k in runs])
@@ -221,14 +221,12 @@ class ShapeRefinement:
         return np.zeros(len(self._measured)) if rows is None else rows[:, 0]
 
     def _gains(self, plain: NDArray) -> NDArray:
-        """Return the log likelihood that each of some projected columns (N, k) gains alone,
-        (k,)."""
+        """Return the log likelihood that each projected column (N, k) gains alone, (k,)."""
         square = np.sum(plain**2, axis=0)
         return 0.5 * (plain.T @ self._measured) ** 2 / np.where(square > 0.0, square, np.inf)
 
     def _scaled(self, start: Fitted) -> Fitted:
-        """Return a candidate that transforms the motion at the shape that its amplitude asks
-        for."""
+        """Return a candidate that transforms the motion, its shape scaled by the amplitude."""
         effect, (amplitude, *others) = start.candidate.effect, start.amplitudes
         if not start.candidate.bends or others or amplitude <= 0.0:
             return start
@@ -243,7 +241,7 @@ class ShapeRefinement:
         return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
 
     def _following(self, candidate: Candidate) -> Candidate:
-        """Return a candidate at a new shape; a transmission with rigid bodies that follow it."""
+        """Return a candidate at a new shape; a transmission with rigid bodies refitted to it."""
         return (
             self._rows.with_refitted_bodies(candidate, self._others)
             if candidate.bodies
@@ -251,7 +249,7 @@ class ShapeRefinement:
         )
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
-        """Return what each free shape does per unit of change, (N, d)."""
+        """Return the change of the prediction by each free shape, per unit of change, (N, d)."""
         slopes = np.zeros((len(self._measured), len(units)))
         for d, (i, unit) in enumerate(units):
             step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
@@ -267,7 +265,7 @@ class ShapeRefinement:
         transforms = fitted.candidate.bends
         parts = [slopes] if transforms else [fitted.columns, slopes]
         plain = self._project(np.hstack(parts))
-        # What transforms the motion has no amplitude: what it leaves is the shape's to explain.
+        # An effect that transforms the motion has no amplitude: its shape alone explains the rest.
         remainder = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
         solution, _ = _solved(plain, remainder)
         length = 1.0
@@ -294,7 +292,7 @@ def _solved(rows: NDArray, target: NDArray) -> tuple[NDArray, float]:
 
 
 def _shaped(fitted: Fitted) -> Fitted:
-    """Return a candidate that is linear in its shapes at the shape which its amplitudes make."""
+    """Return a candidate that is linear in its shapes, at the shape given by its amplitudes."""
     candidate = fitted.candidate
     directions = np.array(candidate.directions)
     held = np.array([bool(parameter.forms) for parameter in candidate.effect.shape])
@@ -304,15 +302,14 @@ def _shaped(fitted: Fitted) -> Fitted:
 
 
 def has_shapes(candidate: Candidate) -> bool:
-    """Tell whether a candidate has a shape that other causes beside it may move."""
+    """Return whether a candidate has a shape that other causes of its set may move."""
     return bool(free_shapes(candidate)) or candidate.onset is not None
 
 
 def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
     """Return the shapes that are refined along their slopes, and the unit of change of each.
 
-    The unit is zero where a shape changes by factors. Instants at which something begins are
-    found otherwise.
+    The unit is zero where a shape changes by factors. Onsets are searched separately.
     """
     return [
         (i, _unit_of(parameter))
@@ -322,8 +319,7 @@ def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
 
 
 def _unit_of(parameter: Parameter) -> float:
-    """Return a shape's unit of change: its grain, its range, or zero where it changes by
-    factors."""
+    """Return a shape's unit of change: its grain, its range, or zero if it changes by factors."""
     low, high = parameter.typical
     if parameter.unit in TURNS:
         return parameter.grain
@@ -333,8 +329,7 @@ def _unit_of(parameter: Parameter) -> float:
 
 
 def log_searched(candidate: Candidate) -> float:
-    """Return the log number of independent values among which its waves, tones and onsets were
-    sought."""
+    """Return the log number of independent values tried for its waves, tones and onsets."""
     effect, count = candidate.effect, 0.0
     for i, parameter in enumerate(effect.shape):
         if i == candidate.onset:

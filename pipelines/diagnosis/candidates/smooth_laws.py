@@ -1,9 +1,8 @@
-"""Smooth laws that nobody listed: torque as a free function of the angle, the speed, the load ...
+"""Define smooth laws outside the catalogue: torque as a free function of angle, speed, load ...
 
-They compete with the catalogue's causes as rivals, stand behind each cause for how its true form
-may differ from ours, and at a small size are the background that even a good rig shows. Every
-column is dimensionless and of order one, so that its coefficient is a share of the joint's rms
-torque.
+They compete with the catalogue's causes, describe how the true form of a cause may differ from the
+listed one, and at a small size are the background of a good rig. Every column is dimensionless and
+of order one, so that its coefficient is a share of the joint's rms torque.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,13 +18,13 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.wording.law import law_label
 
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
-"""Laws by which cuff forces may be a little wrong on their own."""
+"""Laws by which cuff forces alone may have small errors."""
 WANDER_HZ = 0.5
-"""Highest frequency of the curves of time that each run has for itself, Hz."""
+"""Highest frequency of each run's own curves of time, Hz."""
 MOST_CURVES = 80
-"""Curves of time of one run at most."""
+"""Largest number of curves of time in one run."""
 WANDER_CORNER_HZ = 0.1
-"""Above it a wandering torque has less and less power, as a random walk has, Hz."""
+"""Corner above which the power of a wandering torque falls, as of a random walk, Hz."""
 
 
 TIME = "time"
@@ -33,7 +32,7 @@ TIME = "time"
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
 QUANTISATION = "quantisation"
-"""The law of a torque that is reported in coarse steps: its column is what rounding adds."""
+"""The law of a torque that is reported in coarse steps: its column is the rounding error."""
 ACROSS = "across_joints"
 """The law of an elastic energy of both angles, as of a muscle or a band over two joints."""
 ACROSS_DEGREE = 4
@@ -53,7 +52,7 @@ class LawColumn:
     """Prior variance of the coefficient relative to the law's other columns."""
 
     def variant(self, joints: Sequence[str]) -> str:
-        """Return the law's label, and whose share it is."""
+        """Return the law's label with the wearer's share that it acts on."""
         return law_label(self.kind, None if self.joint is None else joints[self.joint], self.wearer)
 
 
@@ -70,7 +69,7 @@ class Curve(NamedTuple):
 
 @dataclass(frozen=True)
 class Spans:
-    """What makes a session's motion dimensionless, (J,) each."""
+    """Scales that make a session's motion dimensionless, (J,) each."""
 
     middle: NDArray
     half_range: NDArray
@@ -81,7 +80,7 @@ class Spans:
 
     @classmethod
     def of(cls, runs: Sequence[Run], torque: NDArray) -> "Spans":
-        """Read them off the searched runs; ``torque`` (J,) N·m is the joints' rms torque."""
+        """Compute them from the searched runs; ``torque`` (J,) N·m is the joints' rms torque."""
         low = np.min([run.state[0].min(axis=0) for run in runs], axis=0)
         high = np.max([run.state[0].max(axis=0) for run in runs], axis=0)
         speed, acceleration = (
@@ -104,6 +103,9 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
 
     Parameters
     ----------
+    run : Run
+    spans : Spans
+        Scales of the session's motion.
     load : (m, J) array
         The torque that the baseline predicts, N·m.
     """
@@ -139,7 +141,7 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     every = np.eye(ACROSS_DEGREE + 1)
     value, slope = legval(x, every), legval(x, legder(every))
     degree = np.arange(ACROSS_DEGREE + 1)
-    # Over the whole range, a polynomial's rms and its slope's.
+    # Rms of each polynomial and of its slope over the whole range.
     rms, steep = 1.0 / np.sqrt(2.0 * degree + 1.0), np.sqrt(0.5 * degree * (degree + 1.0))
     units = spans.half_range * spans.torque
     for a, b in product(degree, degree):

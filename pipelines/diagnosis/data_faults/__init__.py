@@ -1,9 +1,8 @@
-"""Data faults: what went wrong between a sound leg and its file, found before any physics is
-blamed.
+"""Data faults: errors between the leg and its file, found before physics is blamed.
 
-Time first, then single channels, then how channels are wired, then their units; each looks only at
-samples that those before it left. Slow or small changes that physics can make (a drift, a gain of a
-few tens of percent, an offset) are no faults.
+Time is checked first, then single channels, then the wiring of channels, then their units. Each
+check uses only the samples that those before it left valid. Slow or small changes that physics can
+make (a drift, a gain of a few tens of percent, an offset) are no faults.
 """
 
 from collections.abc import Container, Iterable, Sequence
@@ -22,8 +21,8 @@ from pipelines.diagnosis.data_faults.wiring import angle_faults, cuff_faults, wi
 from pipelines.mechanics.motion import Motion
 
 LEAST_S, LEAST_SHARE = 5.0, 0.5
-"""Of an exoskeleton's run that faults must leave, or it is not worth its place; of a short one,
-this share of it."""
+"""Motion that must remain of an exoskeleton's run without its faulty samples, s; of a short run,
+this share."""
 
 __all__ = ["Fault", "excluding", "find_faults"]
 
@@ -34,7 +33,11 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     Parameters
     ----------
     motions : sequence of Motion
-        All runs of one leg, made from recordings, so that the measured angles are there.
+        All runs of one leg, made from recordings, so that they have the measured angles.
+
+    Returns
+    -------
+    list of Fault
     """
     faults = [
         fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
@@ -58,11 +61,10 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
 
 
 def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
-    """Return the faults, those of runs of which too little is left without them as such that
-    masking does not help.
+    """Return the faults, those of runs that are too short without their faulty samples changed.
 
-    Where other runs of its kind suffice such a run is left out instead, whole: it spoils nothing
-    but itself.
+    Masking does not help such a run. Where other runs of its kind suffice, it is left out whole
+    instead, and spoils nothing but itself.
     """
     sound = excluding(motions, faults)
     hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
@@ -92,16 +94,14 @@ def _too_little(whole: Motion, sound: Motion) -> bool:
 
 
 def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[str]) -> bool:
-    """Tell whether half of what was recorded of a run's kind and for its purpose is in runs that
-    are usable."""
+    """Return whether half of the samples of a run's kind and purpose are in usable runs."""
     alike = [m for m in motions if (m.run, m.purpose) == (run.run, run.purpose)]
     usable = sum(len(m) for m in alike if m.file not in hopeless)
     return usable >= LEAST_SHARE * sum(map(len, alike))
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
-    """Return the motions with the faults' samples marked as not valid, and without cuffs that never
-    say anything."""
+    """Return the motions with the faults' samples invalid, and without cuffs that never change."""
     bad: dict[str, np.ndarray] = {}
     for fault in faults:
         if fault.samples is not None:

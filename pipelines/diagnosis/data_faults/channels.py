@@ -1,4 +1,4 @@
-"""Channels that stop telling the truth for a while: repeated, stuck, saturated, dead."""
+"""Find channels that do not report the truth for a while: repeated, stuck, saturated, dead."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -22,36 +22,37 @@ from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.signals.blocks import dilate
 
 STALE = 3
-"""Rows that repeat the last one while the joint moves, before it is more than an accident."""
+"""Fewest rows that repeat the last one while the joint moves: fewer may be an accident."""
 COUNTS = 2.0
 """Encoder counts that a joint moves in one sample before an equal reading is stale."""
 NOISES = 4.0
-"""Standard deviations of the angle's noise that it moves in addition."""
+"""Standard deviations of the angle's noise that the joint moves in addition."""
 STUCK_ANGLE_S = 0.25
-"""Least length of a stretch in which an angle is stuck, while its joint moves on either side, s."""
+"""Least length of a stretch in which an angle is stuck, while its joint moves before and after,
+s."""
 JUMP = 3.0
-"""Times the largest step of the moving joint: no joint catches up like that."""
+"""Multiple of the largest step of the moving joint: no joint catches up that fast."""
 HELD_S, HELD_RAD = 1.0, 0.1
-"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by
-friction. At a prismatic joint the way is in proportion to the joint's."""
+"""Standstill, and travel of the set-point in that time, from which friction is no explanation. At a
+prismatic joint the travel is scaled to the joint's."""
 ALONE_S, ALONE = 2.0, 3.0
-"""Without a set-point: this long, and so many times the longest other standstill."""
+"""Least standstill without a set-point, and its least multiple of the longest other standstill."""
 OUTLASTS = 3.0
-"""Times the next longest constant stretch that a stuck, coarsely rounded torque lasts."""
+"""Multiple of the next longest constant stretch from which a coarsely rounded torque is stuck."""
 STUCK_TORQUE_S = 0.15
-"""Least length of a stretch of one and the same torque that is stuck, s."""
+"""Least length of a stretch of constant torque that is stuck, s."""
 STUCK_FORCE_S = 1.0
-"""Least length of a stretch of one and the same cuff force that is stuck, s."""
+"""Least length of a stretch of constant cuff force that is stuck, s."""
 FLAT_TOP, SATURATED = 3, 10
 """Samples in a row at the extreme, and samples in such rows: noise never returns to the same
 number."""
 IN_STEPS = 0.5
-"""Share of samples that repeat the one before, from which a torque is taken as rounded to coarse
-steps. A fine one is hardly ever the same twice."""
+"""Share of samples that repeat the one before, from which a torque is rounded to coarse steps. A
+finely rounded one is rarely the same twice."""
 
 
 def channel_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield what is wrong with channels of one run, alone or as copies of one another."""
+    """Yield the faults of single channels of one run, and of channels that are copies."""
     yield from _repeated(motion)
     yield from _copied(motion)
     for joint in range(motion.torque.shape[1]):
@@ -62,17 +63,16 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _repeated(motion: Motion) -> Iterator[Fault]:
-    """Report drives that hand out old values: angle and torque are the last sample's while the
-    joint moves.
+    """Report drives that give old values: angle and torque repeat while the joint moves.
 
-    A torque rounded to coarse steps is often the last sample's, and tells nothing of that.
+    A torque that is rounded to coarse steps often repeats, and is no evidence of that.
     """
     if motion.measured_angle is None:
         return
     same: NDArray = np.zeros(motion.torque.shape, dtype=bool)
     same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
     for j, torque in enumerate(motion.torque.T):
-        # A torque that stands for longer is stuck, whatever the angle does.
+        # A torque that is constant for longer is stuck, whatever the angle does.
         stuck = constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz))
         same[:, j] &= ~mask_of(stuck, len(torque)) & (not _is_in_steps(torque, stuck))
     step, change = motion.dq / motion.sample_rate_hz, np.diff(motion.measured_angle, axis=0)
@@ -93,8 +93,8 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
             f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}:"
-            f" {who} gave stale values, the last sample's again, though the joint moved; wait for"
-            " new data before reading",
+            f" {who} gave the last sample's values again while the joint moved; wait for new data"
+            " before reading",
             samples,
         )
 
@@ -110,15 +110,15 @@ def _copied(motion: Motion) -> Iterator[Fault]:
             yield Fault(
                 motion.file,
                 other,
-                f"{one} and {other} are equal in every sample: probably one drive was read twice; "
-                "check its address, register or column",
+                f"{one} and {other} are equal in every sample: probably one drive was read twice;"
+                " check its address, register or column",
             )
 
 
 def _count_of(angle: NDArray) -> float:
-    """Return the smallest step of an encoder, rad; of one that never moved, beyond all.
+    """Return the smallest step of an encoder, rad; infinite for one that never moved.
 
-    The smallest difference would do but for rounding: equal counts differ by 1e-16 in radians.
+    Steps below 1e-9 are rounding: equal counts differ by 1e-16 in radians.
     """
     steps = np.abs(np.diff(angle))
     steps = steps[steps > 1e-9]
@@ -126,8 +126,10 @@ def _count_of(angle: NDArray) -> float:
 
 
 def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
-    """Report an angle that stands while the leg goes on; friction holds a joint too, but lets it go
-    where it stood."""
+    """Report an angle that is constant while the leg moves on.
+
+    Friction holds a joint too, but the joint then starts from where it stopped.
+    """
     if motion.measured_angle is None:
         return
     angle = motion.measured_angle[:, joint]
@@ -138,14 +140,14 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
     ]
     if len(stuck):
         samples = mask_of(stuck, len(angle))
-        # The filter carries the standstill on into its neighbourhood.
+        # The filter spreads the standstill into its neighbourhood.
         reach = int(np.ceil(EDGE_PERIODS * motion.sample_rate_hz / motion.cutoff_hz))
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),
             f"{the(motion.joints[joint])}'s angle is stuck: constant for"
-            f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, stuck)}, while the rest"
-            " moved on; check the encoder's cable and the drive's status",
+            f" {samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, stuck)}, while the leg"
+            " moved; check the encoder's cable and the drive's status",
             dilate(samples, reach),
         )
 
@@ -173,15 +175,15 @@ def _impossible(
 
 
 def _held(motion: Motion, joint: int) -> float:
-    """Return how far a set-point, or another joint, must go for a standstill to be impossible."""
+    """Return the travel of a set-point, or another joint, that makes a standstill impossible."""
     return HELD_RAD * motion.machine.scale(motion.joints[joint]).travel
 
 
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
-    """Report torque that stands still: at its extreme it is saturated, elsewhere stuck.
+    """Report constant torque: at its extreme it is saturated, elsewhere stuck.
 
-    A torque rounded to coarse steps also stays constant. Saturation cannot be told there, and only
-    an exceptionally long stretch counts as stuck.
+    A torque rounded to coarse steps also stays constant. Saturation cannot be detected there, and
+    only an exceptionally long stretch counts as stuck.
     """
     torque = motion.torque[:, joint]
     flat = constant_stretches(torque, FLAT_TOP)
@@ -230,22 +232,20 @@ def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
 
 
 def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
-    """Tell whether a torque (n,) mostly repeats its last value outside the stretches ``apart``
-    (runs, 2)."""
+    """Return whether a torque (n,) mostly repeats its last value outside stretches (runs, 2)."""
     rest = ~mask_of(apart, len(torque))[1:]
     return bool(rest.any()) and float(np.mean(torque[1:][rest] == torque[:-1][rest])) > IN_STEPS
 
 
 def _outlasts(intervals: NDArray) -> NDArray:
-    """Tell which of the stretches (runs, 2) lasts ``OUTLASTS`` times as long as any other, (runs,)
-    bool."""
+    """Return whether a stretch (runs, 2) lasts ``OUTLASTS`` times any other, (runs,) bool."""
     lasting = intervals[:, 1] - intervals[:, 0]
     second = np.partition(lasting, -2)[-2] if len(lasting) > 1 else 0
     return np.asarray(lasting > OUTLASTS * second, dtype=bool)
 
 
 def has_silent_cuffs(motion: Motion) -> bool:
-    """Tell whether the cuff forces of a person's run were recorded, and none ever changes."""
+    """Return whether the cuff forces of a person's run were recorded, and none ever changes."""
     if motion.held_forces is None or motion.run != "with_human":
         return False
     channels = motion.held_forces.reshape(len(motion.held_forces), -1).T
@@ -253,8 +253,7 @@ def has_silent_cuffs(motion: Motion) -> bool:
 
 
 def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
-    """Report cuff force channels that are dead all along, or stand still for a second while others
-    go on."""
+    """Report cuff force channels that are dead, or constant for a second while others change."""
     if has_silent_cuffs(motion):
         yield Fault(
             motion.file,

@@ -1,4 +1,4 @@
-"""A fault of acquisition: which samples of which channel do not say what the leg did."""
+"""A fault of acquisition, with the samples of the channel that are wrong."""
 
 from dataclasses import dataclass
 
@@ -13,20 +13,19 @@ WHOLE_ROW = "all channels"
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One finding about a recording that is not physics."""
+    """One fault of a recording that is not physics."""
 
     file: str
     channel: str
     """The column's name in the file, or ``WHOLE_ROW``."""
     what: str
-    """One sentence: what, how much, where in time, what to do."""
+    """The fault, its extent, its time, and the remedy."""
     samples: NDArray | None = None
-    """(n,) bool, the samples that must not be used; None where masking would not help."""
+    """(n,) bool, the samples that must not be used; None where masking does not help."""
 
     @property
     def spoils(self) -> bool:
-        """Whether it spoils the whole recording: physics would be blamed for what acquisition
-        did."""
+        """Whether it spoils the whole recording, so that physics would be blamed for it."""
         return self.samples is None
 
 
@@ -36,15 +35,19 @@ def column(motion: Motion, joint: int, quantity: str) -> str:
 
 
 def stretches(marked: NDArray) -> NDArray:
-    """Return first and one past the last sample of each run of true samples in (n,) bool, (runs,
-    2)."""
+    """Return the runs of true samples in (n,) bool, (runs, 2).
+
+    Each row has the first sample and one past the last.
+    """
     edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
 
 
 def constant_stretches(x: NDArray, least: int) -> NDArray:
-    """Return first and one past the last of each run of at least ``least`` equal values in (n,),
-    (runs, 2)."""
+    """Return the runs of at least ``least`` equal values in (n,), (runs, 2).
+
+    Each row has the first sample and one past the last.
+    """
     intervals = stretches(x[1:] == x[:-1])
     intervals[:, 1] += 1
     return intervals[intervals[:, 1] - intervals[:, 0] >= least]
@@ -59,7 +62,7 @@ def mask_of(intervals: NDArray, n: int) -> NDArray:
 
 
 def when(motion: Motion, intervals: NDArray) -> str:
-    """Say where in time stretches (runs, 2) lie."""
+    """Return the times of stretches (runs, 2) in words."""
     if len(intervals) == 1:
         start, stop = intervals[0]
         return f"from {motion.time[start]:.2f} s to {motion.time[stop - 1]:.2f} s"

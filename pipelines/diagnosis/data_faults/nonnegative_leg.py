@@ -1,8 +1,7 @@
-"""What a leg can do: torque against its rigid body and friction, each parameter with the sign that
-nature gives it.
+"""Fit a leg with rigid body and friction whose parameters have the signs that nature gives.
 
 Inertia, weight that hangs below its joint, and friction are never negative. A leg whose channels
-are exchanged or reversed needs negative ones, so a fit that forbids them tells how channels are
+are exchanged or reversed needs negative ones, so a fit that forbids them shows how the channels are
 wired. Each joint is fitted by itself, so that its unit does not matter.
 """
 
@@ -17,7 +16,7 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
 BLOCK_S = 0.1
-"""Length of the averages, s: long, so that noise of the angles does not pass for accelerations
+"""Length of the averages, s. It is long, because noise of the angles would look like acceleration
 without torque."""
 LEAST_BLOCKS = 50
 """Fewest averages, five seconds of motion, that separate gravity from inertia."""
@@ -47,14 +46,17 @@ class Averages:
     """(m, 2, 3) N, sums of front and back at thigh and shank; None where they were not read."""
 
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
-        """Torque per unit of (X1 - X2, X2, X3, X4) with the angles read otherwise, (m, 2, 4)."""
+        """Return torque per unit of (X1 - X2, X2, X3, X4) under a reading, (m, 2, 4)."""
         order, sign = reading
         q, dq, ddq = (x[:, list(order)] * sign for x in (self.q, self.dq, self.ddq))
         return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
-        """Columns of one joint, (m, k): its share of the rigid body, Coulomb, viscous, and an
-        offset of either sign."""
+        """Return the columns of one joint, (m, k).
+
+        They are its share of the rigid body, Coulomb and viscous friction, and an offset of either
+        sign.
+        """
         order, sign = reading
         body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
         friction = (
@@ -66,8 +68,13 @@ class Averages:
 
 
 def averages(motion: Motion) -> Averages | None:
-    """Average over blocks that can be trusted; None where the machine has no second joint, or too
-    few are left."""
+    """Average a motion over its valid blocks.
+
+    Returns
+    -------
+    Averages or None
+        None where the machine has no second joint, or too few blocks are valid.
+    """
     if motion.machine.mechanism is not LEG:
         return None
     block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
@@ -88,14 +95,25 @@ def averages(motion: Motion) -> Averages | None:
 def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple[float, NDArray]:
     """Fit torque (m,) by nonnegative multiples of columns (m, p).
 
-    Returns the share of the torque's power that is left, and the multiples (p,). ``free`` are
-    further columns (m, f) whose multiples may have any sign.
+    Parameters
+    ----------
+    columns : (m, p) array
+    torque : (m,) array
+        N·m.
+    free : (m, f) array, optional
+        Further columns whose multiples may have any sign.
+
+    Returns
+    -------
+    float
+        Share of the torque's power that is not explained.
+    (p,) array
+        The multiples.
     """
     if free is not None:
         basis = np.linalg.qr(free)[0]
         columns, torque = columns - basis @ (basis.T @ columns), torque - basis @ (basis.T @ torque)
-    # A root of the Gram matrix has the same inner products as the columns, and a hundredth of their
-    # rows.
+    # A root of the Gram matrix has the columns' inner products in a hundredth of their rows.
     everything = np.column_stack([columns, torque])
     scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
     power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
@@ -105,8 +123,10 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
 
 
 def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
-    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros
-    are free."""
+    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains.
+
+    The zeros of the sensors are free.
+    """
     g = run.motion.geometry
     measured = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
     wide = [np.broadcast_to(unit, (len(measured), 2, 3)) for unit in ZEROS]
@@ -122,4 +142,4 @@ def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
 ZEROS = np.array(
     [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0], [0, 0, 0]]], dtype=float
 )
-"""Zeros of the sensors that show in the torque: shank along, shank across, thigh across."""
+"""Zeros of the sensors that change the torque: shank along, shank across, thigh across."""

@@ -1,7 +1,7 @@
-"""Instants: samples taken at other times than their even stamps say.
+"""Find samples that were taken at other instants than their even stamps.
 
-An instant that is off by d shifts every angle by its speed times d: the third differences of two
-joints then correlate as their speeds do, which no vibration, count or friction of one joint does.
+An instant that is off by d shifts every angle by its speed times d. The third differences of two
+joints then correlate as their speeds do. No vibration, count or friction of one joint does that.
 """
 
 from collections.abc import Iterator
@@ -13,23 +13,26 @@ from pipelines.diagnosis.data_faults.fault import Fault
 from pipelines.mechanics.motion import Motion
 
 UNEVEN = 0.05
-"""Of a sample period, rms, of instants that stray. Sticking joints and impacts reach 0.01."""
+"""Rms deviation of instants that counts as a fault, in sample periods. Sticking joints and impacts
+reach 0.01."""
 EVEN = 0.04
-"""Of a sample period: a stamp that strays more is another fault, and says so itself."""
+"""Largest deviation of an even stamp, in sample periods; a larger one is reported as another
+fault."""
 SURE = 5.0
-"""Standard errors."""
+"""Standard errors that a correlation must exceed."""
 WINDOW = 4
-"""Samples that make a third difference."""
+"""Number of samples in a third difference."""
 SPREAD = 20.0
 """Variance of the third difference of independent numbers: 1 + 9 + 9 + 1."""
 BLOCK = 20
-"""Neighbouring differences share samples; sums over so many are nearly independent."""
+"""Differences in a sum. Neighbouring differences share samples; sums over so many are nearly
+independent."""
 LEAST = 1000
-"""Differences that a verdict needs."""
+"""Fewest differences for a verdict."""
 
 
 def sampling_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield what two joints' angles say together of the instants at which they were taken."""
+    """Yield a fault where two joints' angles show that they were sampled at uneven instants."""
     if motion.measured_angle is None or motion.q.shape[1] < 2 or len(motion) < WINDOW:
         return
     trusted = _undisturbed(motion)
@@ -45,16 +48,15 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             "time_s",
-            "clock jitter: the stamps are even, but all angles jump together as if taken"
+            "clock jitter: the stamps are even, but all angles jump together, as if sampled"
             f" {100 * jitter:.2g} % of a sample period rms"
-            f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; store the instants"
-            " of the samples, not the planned ones",
+            f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; store the measured"
+            " instants, not the planned ones",
         )
 
 
 def _undisturbed(motion: Motion) -> NDArray:
-    """Tell which third differences lie on even stamps and samples not known to be bad, (n - 3,)
-    bool."""
+    """Return which third differences lie on even stamps and valid samples, (n - 3,) bool."""
     even = np.abs(np.diff(motion.time) * motion.sample_rate_hz - 1.0) < EVEN
     good = motion.valid[1:] & motion.valid[:-1] & even
     return np.asarray(np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1))

@@ -1,9 +1,9 @@
-"""The sign of a joint alone: a torque that only a body of negative inertia, whose friction drives
-it, would ask for.
+"""Find a reversed sign at a machine of one joint.
 
-A stiff spring or a late torque can make an inertia look negative, and hardly anything but a wrong
-sign makes friction give energy beside it; so both must be plain. Which of torque and angle has the
-wrong sign no equation tells.
+With a reversed sign the torque is that of a body of negative inertia, whose friction drives it. A
+stiff spring or a late torque can make an inertia look negative. Only a wrong sign also makes
+friction supply energy, so both must be significant. No equation shows whether torque or angle has
+the wrong sign.
 """
 
 from collections.abc import Iterator
@@ -27,8 +27,7 @@ LEAST_BLOCKS = 50
 
 
 def sign_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield a torque of a machine of one joint whose sign is reversed; with a person in it, who may
-    drive it, none."""
+    """Yield a reversed torque of a machine of one joint; none with a person, who may drive it."""
     if motion.machine.mechanism.name != PENDULUM.name or motion.run == "with_human":
         return
     run = observe(motion)
@@ -45,19 +44,17 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
         channel,
         f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an"
         f" inertia of {body:.4g} {inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses"
-        f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}), and the other way round both are a"
-        f" machine's (so they would be with {column(motion, 0, 'angle')} reversed instead: a mirror"
-        f" image); turn it round in {settings_of(motion)}, if every run has it, and in this"
-        " recording",
+        f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}), and both must be positive. A reversed"
+        f" {column(motion, 0, 'angle')} looks the same; reverse the sign in"
+        f" {settings_of(motion)}, if every run has it, and in this recording",
     )
 
 
 def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
-    """Return inertia (kg·m² or kg) and mean loss in friction (W) of one joint's fit, and half of
-    their intervals, (2,).
+    """Return inertia and friction loss of one joint's fit, and half their intervals, (2,).
 
-    What else may hold the joint, with a constant torque or as a spring does, is fitted beside and
-    counts for neither.
+    Inertia is in kg·m² or kg, the mean loss in W. A constant torque and a spring are fitted as
+    well, and count for neither.
     """
     motion, usable = run.motion, run.usable[:, :1]
     constants = np.stack([np.ones_like(motion.q), motion.q], axis=2)

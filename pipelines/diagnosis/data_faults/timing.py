@@ -1,5 +1,4 @@
-"""Time as stamped: samples that are missing, stamps that jitter, clocks at another rate, counters
-that jump."""
+"""Find faults of time stamps: missing samples, jitter, wrong clock rates, counter jumps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,26 +11,26 @@ from pipelines.diagnosis.data_faults.fault import Fault
 from pipelines.mechanics.motion import Motion
 
 HORIZON = 50
-"""Samples within which a late stamp is followed by one that is not."""
+"""Samples within which a late stamp is followed by one that is not late."""
 SINGLE = 3
-"""Up to so many samples in a row count as dropped; more are a gap."""
+"""Most missing samples in a row that count as dropped; more are a gap."""
 JITTER = 0.04
-"""Of a sample period, rms: steps that stray more are irregular. Moving at 1 rad/s, 4 % of 5 ms is
-0.2 mrad, an encoder count."""
+"""Rms deviation of irregular steps, in sample periods. Moving at 1 rad/s, 4 % of 5 ms is 0.2 mrad,
+an encoder count."""
 HALF, SURE = 0.5, 3.0
-"""Share of the stamps' straying that angles follow, between none and all; standard errors."""
+"""Share of the stamps' deviation that the angles follow, between none and all; standard errors."""
 BELOW = 0.5
-"""Of the angles' own noise: what wrong stamps do to the angles and is less adds an eighth to that
-noise at most."""
+"""Share of the angles' own noise. Wrong stamps that change the angles by less add at most an eighth
+to that noise."""
 BLOCK = 20
-"""Samples whose sums are nearly independent."""
+"""Samples in a sum; such sums are nearly independent."""
 RATE = 0.01
-"""Relative error of a clock that is worth a sentence: velocity is off by as much, acceleration by
-twice."""
+"""Relative error of a clock that is reported: velocity has the same error, acceleration twice
+that."""
 
 
 def timing_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield what is wrong with the time of one run."""
+    """Yield the faults of the time stamps of one run."""
     late = motion.time * motion.sample_rate_hz - np.arange(len(motion))
     missing = missing_samples(motion, late)
     yield from _missing(motion, missing)
@@ -46,11 +45,12 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
 def missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
-    The counter knows. Without one: a missing sample leaves all that follow late, a late stamp only
-    itself, so the step is looked for in the lower envelope of the lateness.
+    The counter shows them. Without one: a missing sample makes all later samples late, a late stamp
+    only itself. So the step is sought in the lower envelope of the lateness.
 
     Parameters
     ----------
+    motion : Motion
     late : (n,) array
         Time in sample periods, less the sample's number.
     """
@@ -61,15 +61,17 @@ def missing_samples(motion: Motion, late: NDArray) -> NDArray:
 
 
 def _counted(sequence: NDArray) -> NDArray:
-    """Return by how many samples the counter advances, (n - 1,): who keeps each tenth row leaves a
-    counter by tens."""
+    """Return by how many samples the counter advances, (n - 1,).
+
+    Where each tenth row was kept, the counter advances by tens.
+    """
     step = np.diff(sequence)
     usual = max(int(np.median(step)), 1) if len(step) else 1
     return np.asarray(np.rint(step / usual).astype(np.int64))
 
 
 def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
-    # What is missing is left out already; the samples around it are as good as any.
+    # The missing samples are absent already, and those around them are valid.
     nothing_to_mask = np.zeros(len(motion), dtype=bool)
     long, few = missing > SINGLE, (missing > 0) & (missing <= SINGLE)
     if long.any():
@@ -105,7 +107,7 @@ def _counter(motion: Motion) -> Iterator[Fault]:
         return
     step, time_step = _counted(motion.sequence), np.diff(motion.time) * motion.sample_rate_hz
     back, stands = step < 0, step == 0
-    # A late stamp disagrees too, but by less than it takes to lose several samples.
+    # A late stamp disagrees too, but by less than several samples.
     disagrees = (step > 0) & (np.abs(time_step - step) > SINGLE)
     for bad, what, remedy in (
         (back, "goes back", "the device restarted: split the file there"),
@@ -127,45 +129,44 @@ def _counter(motion: Motion) -> Iterator[Fault]:
 
 
 def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
-    """Report uneven steps: they spoil a run where the angles contradict the stamps, or there are
-    none to ask.
+    """Report uneven steps. They spoil a run whose angles contradict the stamps, or are unknown.
 
-    Samples that were taken unevenly are as good as any where the stamps say when. Where the angles
-    are too coarse to tell, what a wrong stamp does to them is too small to be seen as well; where
-    they do tell, it may still be.
+    Samples that were taken unevenly are valid where the stamps are right. Where the angles are too
+    coarse to show that, a wrong stamp changes them too little to matter. It may matter as little
+    where the angles do show it.
     """
     if motion.measured_angle is None:
         explained, spoils = "take time from the device's clock, not from the host's", True
     else:
-        explained, spoils = _judged(_Asked.of(motion, motion.measured_angle, on_grid))
+        explained, spoils = _judged(_Comparison.of(motion, motion.measured_angle, on_grid))
     return Fault(
         motion.file,
         "time_s",
-        f"clock jitter: irregular time steps that stray by {100 * jitter:.2g} % of a sample period"
-        f" rms ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) all along; {explained}",
+        f"clock jitter: irregular time steps, {100 * jitter:.2g} % of a sample period rms"
+        f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; {explained}",
         None if spoils else np.zeros(len(motion), dtype=bool),
     )
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """What angles say of uneven stamps."""
+class _Comparison:
+    """The angles compared with uneven stamps."""
 
     followed: float
-    """1 where the samples were taken when the stamps say: an angle at uneven instants is rough, d
-    angle = speed d t; 0 where they were taken evenly."""
+    """1 where the samples were taken at the stamps: an angle at uneven instants is rough, d angle =
+    speed d t. 0 where they were taken evenly."""
     error: float
     """Standard error of ``followed``."""
     share: float
-    """What the stamps' straying would do to an angle, over the angle's own noise; the largest of
-    the joints."""
+    """Change of an angle by the stamps' deviation, over the angle's own noise; the largest of the
+    joints."""
 
     @classmethod
-    def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Asked":
-        """Compare the roughness of angles (n, J) with what stamps (n,), in sample periods off their
-        grid, would make.
+    def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Comparison":
+        """Compare the roughness of angles (n, J) with that due to stamps (n,) off their grid.
 
-        Third differences hold what a smooth motion does not: noise of angles and of stamps.
+        ``on_grid`` is in sample periods. Third differences hold noise of angles and of stamps, and
+        no smooth motion.
         """
         rough = np.diff(angle, 3, axis=0)
         stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
@@ -181,31 +182,20 @@ class _Asked:
         )
 
 
-def _judged(asked: _Asked) -> tuple[str, bool]:
-    """Say what uneven stamps mean, and whether they spoil the run."""
-    if asked.followed - SURE * asked.error > HALF:
-        return (
-            "the angles follow the stamps: the samples were taken then, and nothing is lost",
-            False,
+def _judged(comparison: _Comparison) -> tuple[str, bool]:
+    """Return the meaning of uneven stamps, and whether they spoil the run."""
+    if comparison.followed - SURE * comparison.error > HALF:
+        return "the angles follow the stamps: the stamps are right, and nothing is lost", False
+    if comparison.followed + SURE * comparison.error >= HALF:
+        words = (
+            "the angles are too coarse to show whether the stamps are right, so no sample is left"
+            " out; better take time from the device's clock"
         )
-    if asked.followed + SURE * asked.error >= HALF:
-        return (
-            (
-                "the angles are too coarse to tell whether the stamps are right, and so to suffer"
-                " where they are not: no sample is left out; better take time from the device's"
-                " clock"
-            ),
-            False,
-        )
+        return words, False
     reason = "the angles are smooth against the sample count, so only the stamps are wrong: "
-    if asked.share < BELOW:
-        return (
-            (
-                f"{reason}by {100 * asked.share:.2g} % of the angles' own noise at most, and"
-                " nothing is lost"
-            ),
-            False,
-        )
+    if comparison.share < BELOW:
+        noise = f"{100 * comparison.share:.2g} % of the angles' own noise"
+        return f"{reason}by {noise} at most, and nothing is lost", False
     return f"{reason}rebuild time_s from the device's counter and sample rate", True
 
 
@@ -214,13 +204,13 @@ def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
     if len(motion) < HORIZON:
         return
     drift = float(np.median(on_grid[HORIZON:] - on_grid[:-HORIZON])) / HORIZON
-    # A rate that changes within the run has another median than mean; its clock is none the worse.
+    # A rate that changes within the run differs in median and mean: that is no wrong clock.
     overall = float(on_grid[-1] - on_grid[0]) / (len(motion) - 1)
     if min(abs(drift), abs(overall)) > RATE:
         yield Fault(
             motion.file,
             "time_s",
-            f"the clock runs at another rate than sample_rate_hz says: {1.0 + drift:.4g} nominal"
+            f"the clock runs at another rate than sample_rate_hz: {1.0 + drift:.4g} nominal"
             f" periods a sample, {motion.sample_rate_hz / (1.0 + drift):.5g} Hz in place of"
-            f" {motion.sample_rate_hz:g} Hz; correct the one that is wrong",
+            f" {motion.sample_rate_hz:g} Hz; correct the wrong one",
         )

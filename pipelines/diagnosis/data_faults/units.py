@@ -1,7 +1,7 @@
-"""Units: a channel that is a factor away from what set-point, drive, the other joint or other runs
-say.
+"""Find wrong units: channels a factor away from set-point, drive, other joint or other runs.
 
-A factor near one is a gain, and physics: here only factors that no calibration error makes.
+A factor near one is a gain, and physics. Only factors that no calibration error makes are sought
+here.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,24 +17,25 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import settings_of
 
 WRONG = 3.0
-"""Factor that is no gain, where it is well measured."""
+"""Least factor that is no gain, where it is well measured."""
 WRONG_BETWEEN_JOINTS = 5.0
-"""The same where missing physics of one joint can pretend a factor of 2 to 3."""
+"""The same where missing physics of one joint can look like a factor of 2 to 3."""
 SHANK_KG_M = {"exo_alone": 0.5, "with_human": 1.6}
 """A shank's mass times the distance of its centre from the knee: 1-4 kg of machine at 0.2-0.3 m,
 and 6 % of 50-100 kg of person at 0.25 m (Winter, Biomechanics and Motor Control of Human Movement,
 table 4.1)."""
 IMPOSSIBLE = 30.0
-"""Times that mass moment, or a part of it: no leg."""
+"""Multiple, or part, of that mass moment beyond which there is no leg."""
 EXPLAINED = 0.7
-"""Of the torque's power by rigid body and friction: below, a joint is no witness of anything's
-size."""
+"""Share of the torque's power that rigid body and friction must explain before a joint's torque is
+compared."""
 NOTHING = 1e-4
-"""No unit is as far from N·m as this: the channels contradict each other in another way."""
+"""Least scale that is compared. No unit is as far from N·m: the channels contradict each other in
+another way."""
 LAW_HOLDS = 0.8
-"""Of the torque's power that a position loop must explain before its gain is compared."""
+"""Share of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
-"""No joint of a leg goes further from its zero; a pendulum may turn over."""
+"""Largest angle of a leg's joint from its zero; a pendulum may turn over."""
 TORQUE_UNITS = {
     "N·mm": 1e3,
     "N·cm": 1e2,
@@ -47,16 +48,14 @@ TORQUE_UNITS = {
 SAME_UNIT = 1.3
 """Largest factor between a measured ratio and a unit's."""
 FOLLOWS = 0.7
-"""Correlation of an angle with its set-point below which it does not go after it, in whatever
-unit."""
+"""Correlation of an angle with its set-point below which it does not follow it, in any unit."""
 SMALLER_UNITS, NEAR = (1 / (2 * np.pi), np.pi / 180, 1 / 360), 1.25
-"""Turns under set-points in radians, radians under degrees, turns under degrees; and how near to
-one of these is it."""
+"""Turns per radian, radians per degree, turns per degree; and the factor within which a ratio is
+near one of them."""
 
 
 def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield angles in degrees or another unit: many times their set-point, or beyond what a joint
-    can do."""
+    """Yield angles in degrees or another unit: far beyond their set-point or a joint's range."""
     for j, name in enumerate(motion.joints):
         q = motion.q[motion.valid, j]
         factor = _times_set_point(motion, j)
@@ -79,17 +78,19 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _is_a_unit(factor: float) -> bool:
-    """Tell whether an angle is so many times its set-point that only a unit can be the reason.
+    """Return whether an angle is so many times its set-point that only a unit explains it.
 
-    A drive that is weak or soft moves less than it is told, but hardly by the factor of a turn or a
-    degree; none moves several times as far.
+    A weak or soft drive moves less than its set-point, but hardly by the factor of a turn or a
+    degree. None moves several times as far.
     """
     return factor > WRONG or any(1 / NEAR < factor / smaller < NEAR for smaller in SMALLER_UNITS)
 
 
 def _times_set_point(motion: Motion, joint: int) -> float | None:
-    """Return how many times its set-point an angle is; None where it goes elsewhere, as a joint
-    that rests does."""
+    """Return how many times its set-point an angle is; None where it does not follow it.
+
+    A joint at rest does not follow its set-point, for example.
+    """
     if motion.reference is None:
         return None
     reference, q = motion.reference[motion.valid, joint], motion.q[motion.valid, joint]
@@ -105,8 +106,7 @@ def _times_set_point(motion: Motion, joint: int) -> float | None:
 
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
-    """Yield torques in another unit than N·m, run by run, and runs at another scale than their
-    like."""
+    """Yield torques in another unit than N·m, and runs at another scale than similar runs."""
     without_witness = []
     for run in runs:
         wrong = _against_the_drives(run)
@@ -119,8 +119,7 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
 
 
 def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
-    """Return the joints whose torque is not what their position loops ask for; None where not both
-    loops are known."""
+    """Return the joints whose torque contradicts their position loops; None if one is unknown."""
     laws = [drive_law(run.motion, j) for j in range(2)]
     wrong = {
         j: (law, f"{the(name)}'s position loop")
@@ -131,11 +130,15 @@ def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
 
 
 def drive_law(motion: Motion, joint: int) -> float | None:
-    """Return recorded torque over that of the position loop named in the metadata; None where it
-    cannot be said.
+    """Return recorded torque over that of the position loop in the metadata.
 
     The torque is fitted by the angle's error and both speeds; the multiple of the error is the
     loop's stiffness.
+
+    Returns
+    -------
+    float or None
+        None where there is no such loop, or it explains too little.
     """
     controller = motion.metadata.get("controller", {}).get(motion.joints[joint], {})
     stiffness = controller.get("kp_nm_rad")
@@ -155,12 +158,10 @@ def drive_law(motion: Motion, joint: int) -> float | None:
 
 
 def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
-    """Return the joints whose torque is in another unit, judged by the shank, which both drives
-    carry."""
+    """Return the joints whose torque is in another unit, by the shank that both drives carry."""
     moment, scale = shank(run)
     of_a_leg = run.motion.machine.is_exoskeleton
-    # What another machine's second link weighs, nobody knows beforehand: then the first joint's
-    # torque is the measure.
+    # The weight of another machine's second link is unknown: its first joint's torque is compared.
     typical = SHANK_KG_M[run.motion.run] if of_a_leg else moment
     if min(moment, scale) < NOTHING or any(
         fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)
@@ -179,11 +180,11 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
 
 
 def shank(run: Averages) -> tuple[float, float]:
-    """Return the shank's mass moment from the knee's torque, kg·m, and how many times it the hip's
-    torque carries.
+    """Return the shank's mass moment from the knee's torque, kg·m, and its multiple at the hip.
 
-    The multiple is 1 where the hip's torque can be explained with exactly this shank. Drag at the
-    hip can leave the multiple undetermined, but a wrong unit makes the shank too heavy for the hip.
+    The multiple is how many times the shank the hip's torque carries: 1 where this shank explains
+    it. Drag at the hip can leave the multiple undetermined, but a wrong unit makes the shank too
+    heavy for the hip.
     """
     at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
     at_hip, torque = run.joint_columns(0), run.torque[:, 0]
@@ -197,7 +198,7 @@ def shank(run: Averages) -> tuple[float, float]:
 
 
 def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
-    """Compare every two runs of a kind: what one's parameters predict for the other."""
+    """Compare every two runs of a kind: one's parameters predict the torque of the other."""
     for first, second in combinations(runs, 2):
         if first.motion.run != second.motion.run:
             continue
@@ -215,14 +216,14 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
 
 
 def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
-    """Return the run's torque as a multiple of what another run's parameters predict."""
+    """Return the run's torque as a multiple of the prediction by another run's parameters."""
     predicted = run.joint_columns(joint) @ multiples
     return max(float(predicted @ run.torque[:, joint] / max(predicted @ predicted, 1e-12)), 1e-6)
 
 
 def _less_plausible(run: Averages, than: Averages) -> bool:
     if not run.motion.machine.is_exoskeleton:
-        return True  # one of the two, and nothing tells which
+        return True  # one of the two is wrong; either may be
 
     def distance(one: Averages) -> float:
         return abs(float(np.log(max(shank(one)[0], 1e-6) / SHANK_KG_M[one.motion.run])))

@@ -1,7 +1,8 @@
-"""Wiring: channels of hip and knee exchanged, and signs that are reversed.
+"""Find wrong wiring: channels of hip and knee exchanged, and reversed signs.
 
-The angles are held against their set-points, where these were recorded, and then all against what a
-leg can do (``body.py``): a wiring is said to be wrong when another explains both joints far better.
+The angles are compared with their set-points, where these were recorded. Then all channels are
+compared with the torque of a leg (``nonnegative_leg.py``): a wiring is wrong when another explains
+both joints far better.
 """
 
 from collections.abc import Iterator
@@ -25,18 +26,18 @@ from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.mechanics.origin import settings_of
 
 FAR_BETTER = 0.5
-"""By which the power left unexplained must fall for each channel said to be wrong: the more
-channels, the less likely. Missing physics of a quarter of the torque changes it by a few tenths."""
+"""Factor by which the unexplained power must fall for each channel that is reported as wrong: more
+channels are less likely. Missing physics of a quarter of the torque changes it by a few tenths."""
 A_LIMB = 0.05
-"""Share of the cuffs' power: with less of it left unexplained they feel a limb, whatever would
-explain more."""
+"""Largest unexplained share of the cuffs' power at which they measure a limb, whatever explains
+more."""
 FOLLOWS = 0.9
-"""Correlation of an angle with its set-point."""
+"""Correlation of an angle with its set-point from which it follows it."""
 SIGN, SWAP = "reversed", "exchanged"
 
 Wiring = tuple[Reading, tuple[int, int], tuple[float, float], tuple[tuple[int, str], ...], str]
-"""How angles are read; which torques are hip's and knee's; their signs; what is wrong then, and in
-which way."""
+"""Reading of the angles; columns of hip's and knee's torque; their signs; wrong channels, and
+how."""
 HIP, KNEE = 0, 1
 """Columns of the joints."""
 STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
@@ -51,8 +52,8 @@ WIRINGS: tuple[Wiring, ...] = (
     (AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
     (EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
     (EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
-    # The equations are odd: a reversed hip is a reversed knee with all torques reversed, a hip
-    # reversed in both channels cannot be told from such a knee, nor both angles from both torques.
+    # The equations are odd. A reversed hip is a reversed knee with all torques reversed. A hip
+    # reversed in both channels looks like such a knee, and both angles look like both torques.
     (KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
@@ -94,7 +95,7 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def wiring_faults(run: Averages) -> Iterator[Fault]:
-    """Yield channels that only make a leg when exchanged or reversed."""
+    """Yield channels that fit a leg only when exchanged or reversed."""
     misfits: dict[tuple[Reading, int, int, float], float] = {}
     for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
         columns = run.joint_columns(joint, reading)
@@ -112,19 +113,18 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
     if best is as_recorded:
         return
     why = (
-        f"rigid body and friction leave {_percent(misfit(best))} of the torques' power unexplained"
-        f" that way, {_percent(misfit(as_recorded))} as recorded"
+        f"rigid body and friction then leave {_percent(misfit(best))} of the torques' power"
+        f" unexplained, {_percent(misfit(as_recorded))} as recorded"
     )
     if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
         mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
-        why += f" (so they would with {mirror} reversed instead: a mirror image)"
+        why += f" (reversing {mirror} instead gives the same)"
     say = _reversed if best[4] == SIGN else _exchanged
     yield say(run.motion, best[3], why)
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
-    """Yield force sensors that only carry a limb when thigh and shank are exchanged, or one is
-    reversed."""
+    """Yield force sensors that carry a limb only when exchanged or reversed."""
     if run.cuffs is None or run.motion.run != "with_human" or not np.isfinite(run.cuffs).all():
         return
     readings: dict[str, NDArray] = {
@@ -145,10 +145,9 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
         yield Fault(
             run.motion.file,
             f"{chosen[0]}_force_y_n",
-            f"cuff forces are those of no limb, unless {best} (swapped or reversed sensors,"
-            f" {len(chosen)} of them): then {_percent(misfits[best])} of their torque's power is"
-            f" left unexplained, not {_percent(as_recorded)}; check the sensors' addresses and"
-            " axes",
+            f"cuff forces fit no limb, unless {best} (swapped or reversed sensors, {len(chosen)} of"
+            f" them): then {_percent(misfits[best])} of their torque's power is unexplained, not"
+            f" {_percent(as_recorded)}; check the sensors' addresses and axes",
         )
 
 
@@ -159,11 +158,11 @@ def _names(motion: Motion, channels: tuple[tuple[int, str], ...]) -> tuple[str, 
 
 def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
     channel, names = _names(motion, channels)
-    mend = f"in {settings_of(motion)}, if every run has it, and in this recording"
     return Fault(
         motion.file,
         channel,
-        f"the sign of {names} is reversed, all along: {why}; turn it round {mend}",
+        f"the sign of {names} is reversed, all along: {why}; reverse it in {settings_of(motion)},"
+        " if every run has it, and in this recording",
     )
 
 

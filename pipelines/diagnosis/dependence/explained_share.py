@@ -1,8 +1,8 @@
-"""What the residual depends on, for causes that nobody knows yet.
+"""Rank the variables on which the residual depends, for causes that are not known yet.
 
-Each variable that the runs know (angle, speed, load, time, phase, ...) is given a smooth curve,
+Each variable that the runs have (angle, speed, load, time, phase, ...) is given a smooth curve,
 fitted on all folds but one and judged on that one. Folds are whole periods, so that noise, coloured
-noise included, earns nothing. The share of the residual's variance that a curve foretells ranks the
+noise included, gains nothing. The share of the residual's variance that a curve predicts ranks the
 variables.
 """
 
@@ -20,26 +20,27 @@ from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
 from pipelines.mechanics.machine import Machine
 
 LONGEST_S = 2.0
-"""Time since a reversal after which it no longer counts."""
+"""Largest time since a reversal that is distinguished, s."""
 PARTS = 12
-"""Of the excitation's period, dealt out to folds."""
+"""Number of parts of the excitation's period that are assigned to folds."""
 PADDING = 4
-"""Of the spectrum in which a tone is sought."""
+"""Factor of zero padding of the spectrum in which a tone is sought."""
 LOWEST_HZ = 0.2
-"""Below, a tone and a drift are the same."""
+"""Lowest frequency of a tone, below which it is a drift, Hz."""
 MOST = 0.5
-"""Share that a tone in step with the motion must hold: a law of the motion has many lines there."""
+"""Share that a tone in step with the motion must predict. A law of the motion has many lines
+there."""
 IMITATES = 0.5
-"""Weight of the phase in the ranking: it can imitate whatever repeats, so others go first."""
+"""Weight of the phase in the ranking. It can imitate everything that repeats, so others go
+first."""
 LITTLE = 0.05
-"""Share below which nothing is said to depend on a variable."""
+"""Share from which the residual is reported to depend on a variable."""
 MUCH_MORE = 1.5
-"""Factor by which two variables must foretell more than one, to be said instead of it."""
+"""Factor by which two variables must predict more than one, to be reported instead of it."""
 NOTICED = 0.2
-"""Of the noise floor: excess below which it is not asked where it is."""
+"""Excess, as a share of the noise floor, below which its place is not reported."""
 ONE_SIDED = 4.0
-"""Ratio of squared excess between kinds of run, or files, from which it is said to be in one
-only."""
+"""Ratio of squared excess between kinds of run, or files, from which it is in one of them only."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +49,17 @@ class Variable:
 
     name: str
     words: str
-    """As a sentence says it; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and
+    """Its name in sentences; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and
     ``{other}`` with its own."""
     unit: str
     of: Callable[[Run, int], NDArray | None]
-    """(m,) values in a run for a joint; None where the run does not know it."""
+    """(m,) values in a run for a joint; None where the run does not have it."""
     by_direction: bool = False
     """Whether each direction of motion has a curve of its own."""
     lasting: bool = True
-    """Whether another run, of another excitation, would surely show the same."""
+    """Whether another run, of another excitation, must show the same."""
     knots: int = 8
-    """Inner knots of its curve; few where a fold leaves a gap as long as what a knot spans."""
+    """Inner knots of its curve; few where a fold leaves a gap as long as a knot's span."""
 
 
 def _of_other(run: Run, order: int, j: int) -> NDArray | None:
@@ -99,7 +100,7 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 VARIABLES = (
     Variable("angle", "{joint}'s {place}", "rad", lambda run, j: run.state[0][:, j]),
-    # What friction does has a jump where the joint reverses.
+    # Friction jumps where the joint reverses.
     Variable(
         "speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True
     ),
@@ -132,7 +133,7 @@ VARIABLES = (
 
 @dataclass(frozen=True)
 class Dependence:
-    """How much of a joint's residual one variable foretells."""
+    """The share of a joint's residual that one variable predicts."""
 
     joint: str
     variable: str
@@ -143,7 +144,7 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Together:
-    """Variables that only together foretell much of a joint's residual."""
+    """Variables that only together predict much of a joint's residual."""
 
     joint: str
     variables: tuple[Variable, ...]
@@ -152,7 +153,7 @@ class Together:
 
 @dataclass(frozen=True)
 class Excess:
-    """What a run's residual has above the noise floor."""
+    """The part of a run's residual above the noise floor."""
 
     joint: str
     file: str
@@ -162,12 +163,24 @@ class Excess:
 
     @property
     def square(self) -> float:
-        """Square of what is not noise, (N·m)²."""
+        """Square of the part that is not noise, (N·m)²."""
         return max(self.rms_nm**2 - self.floor_nm**2, 0.0)
 
 
 def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Dependence]:
-    """Rank what the residuals (m, O) of the drives depend on, most first, joint by joint."""
+    """Rank the dependences of the residuals (m, O) of the drives, joint by joint.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    list of Dependence
+        Of each joint in turn, the largest first.
+    """
     machine = runs[0].motion.machine
     results = []
     for j, joint in enumerate(machine.names):
@@ -194,7 +207,7 @@ def _rank(dependence: Dependence) -> float:
 
 
 def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
-    """Tell whether any run knows the variable."""
+    """Return whether any run has the variable."""
     return any(variable.of(run, j) is not None for run in runs)
 
 
@@ -203,7 +216,7 @@ def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
 
 
 def _unexplained(joint: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at {the(joint)}"
+    return f"{100 * share:.0f} % of the remaining error at {the(joint)}"
 
 
 def _words(joint: str, machine: Machine, words: str) -> str:
@@ -221,8 +234,10 @@ def _words(joint: str, machine: Machine, words: str) -> str:
 def by_kind(
     runs: Sequence[Run], residuals: Sequence[NDArray]
 ) -> Iterable[tuple[list[Run], list[NDArray]]]:
-    """Yield the runs of each kind with their residuals (m, O): what hides in one kind need not be
-    in the other."""
+    """Yield the runs of each kind with their residuals (m, O).
+
+    An effect that hides in one kind need not be in the other.
+    """
     for kind in dict.fromkeys(run.motion.run for run in runs):
         chosen = [i for i, run in enumerate(runs) if run.motion.run == kind]
         yield [runs[i] for i in chosen], [residuals[i] for i in chosen]
@@ -231,8 +246,17 @@ def by_kind(
 def variable_share(
     variable: Variable, runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> float:
-    """Return the share of a joint's residual (m, O) variance that smooth curves along a variable
-    foretell."""
+    """Return the share of a joint's residual variance that curves along a variable predict.
+
+    Parameters
+    ----------
+    variable : Variable
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        N·m of each run.
+    j : int
+        Number of the joint.
+    """
     total = error = 0.0
     for some, of_kind in by_kind(runs, residuals):
         y = pooled(some, [r[:, j] for r in of_kind], j)
@@ -259,10 +283,10 @@ def _folds(variable: Variable, runs: Sequence[Run], j: int) -> list[NDArray]:
 
 
 def parts_of_period(run: Run) -> NDArray:
-    """Deal the parts of the excitation's period out to folds, (m,).
+    """Assign the parts of the excitation's period to folds, (m,).
 
-    A law learnt in some parts of the period foretells the others; a curve that only imitates what
-    repeats does not. Without a period, stretches of a second are dealt out.
+    A law learnt in some parts of the period predicts the others; a curve that only imitates the
+    repeating residual does not. Without a period, stretches of a second are assigned.
     """
     length = (run.motion.period_s or PARTS) / PARTS
     return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
@@ -274,12 +298,25 @@ def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
 
 
 def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
-    """Return the strongest frequency (Hz) that no period of the motion explains, and the share it
-    foretells.
+    """Return the strongest tone that no period of the motion explains, and its share.
 
-    Where a harmonic of the motion's period above twice the motion's own band holds most, it is that
-    one: a motor that hums while it is recorded may do so in step. ``residuals`` are (m, O) of each
-    run, N·m; ``j`` is the output.
+    Where a harmonic of the motion's period, above twice the motion's own band, predicts most, it is
+    that one: a motor that hums while it is recorded may do so in step.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        N·m of each run.
+    j : int
+        Number of the output.
+
+    Returns
+    -------
+    float
+        Frequency, Hz.
+    float
+        Share of the variance that it predicts.
     """
     return _free_or_in_step(runs, residuals, j)[:2]
 
@@ -287,8 +324,7 @@ def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[flo
 def _free_or_in_step(
     runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> tuple[float, float, bool]:
-    """Return frequency and share of ``tone``, and whether it is in step with the motion's
-    period."""
+    """Return frequency and share of ``tone``, and whether it is in step with the motion."""
     free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
         return (*free, False)
@@ -304,10 +340,9 @@ def _tone_in(
     residuals: Sequence[NDArray],
     j: int,
 ) -> tuple[float, float]:
-    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all
-    that it foretells.
+    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and its share.
 
-    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on
+    The frequency is shared by all runs, amplitude and phase are each run's own. Both are fitted on
     all folds but one and judged on that one.
     """
     total = error = 0.0
@@ -334,8 +369,7 @@ def _tone_in(
 
 
 def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
-    """Return what of a residual (m,) does not repeat with the excitation, nought where it is not
-    ``learnt``."""
+    """Return the part of a residual (m,) that does not repeat, zero where not ``learnt``."""
     kept = np.where(learnt, residual, 0.0)
     if not run.motion.period_s:
         return kept
@@ -346,13 +380,12 @@ def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
 
 
 def _repeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
-    """Return what of a residual (m,) repeats with the excitation, nought where it is not
-    ``learnt``."""
+    """Return the part of a residual (m,) that repeats, zero where not ``learnt``."""
     return np.where(learnt, residual, 0.0) - _unrepeated(run, residual, learnt)
 
 
 def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) -> float:
-    """Return the frequency of the highest peak of the summed spectra above one, Hz."""
+    """Return the frequency of the highest peak of the summed spectra above a limit, Hz."""
     width = runs[0].block.decimation / runs[0].motion.sample_rate_hz
     places = [np.round((run.time - run.time[0]) / width).astype(int) for run in runs]
     length = PADDING * (max(int(p[-1]) for p in places) + 1)
@@ -366,7 +399,7 @@ def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) 
 
 
 def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) -> list[Excess]:
-    """Return how far each run's residual (m, O) stands above the noise floor, joint by joint."""
+    """Return each run's residual (m, O) N·m above the noise floor, joint by joint."""
     return [
         Excess(
             joint,
@@ -387,10 +420,15 @@ def describe(
     above: Sequence[Excess],
     together: Sequence[Together] = (),
 ) -> str:
-    """Say in a sentence or two what the joint with most above its floor depends on, and where that
-    is.
+    """Describe the residual of the joint with most above its floor, in a sentence or two.
 
-    ``together`` are pairs of variables that foretell the residual (see ``smooth_term``).
+    Parameters
+    ----------
+    machine : Machine
+    results : sequence of Dependence
+    above : sequence of Excess
+    together : sequence of Together
+        Pairs of variables that predict the residual (see ``smooth_term``).
     """
     squares = {
         d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in results
@@ -403,13 +441,11 @@ def describe(
         words = " together with ".join(
             _words(joint, machine, variable.words) for variable in pair.variables
         )
-        return (
-            f"{100 * pair.share:.0f} % of what is left at {the(joint)} depends on {words}{where}."
-        )
+        return f"{_unexplained(joint, pair.share)} depends on {words}{where}."
     if own[0].share < LITTLE:
         return (
-            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was "
-            f"measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
+            f"The remaining error at {the(joint)}{where}{',' * bool(where)} depends on nothing that"
+            f" was measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
         )
     second = next(
         (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)),
@@ -421,7 +457,7 @@ def describe(
 
 
 def _where(above: Sequence[Excess]) -> str:
-    """Say in which kind of run, or in which one file, the excess is."""
+    """Return in words the kind of run, or the file, that has the excess."""
     if not any(e.square > (NOTICED * e.floor_nm) ** 2 for e in above):
         return ", and it is hardly above the noise"
     for what, words in (

@@ -1,5 +1,4 @@
-"""Smooth curves and surfaces of what a run knows, and their error on folds they were not fitted
-to."""
+"""Fit smooth curves and surfaces over a run's variables, judged on folds left out of the fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,8 +43,7 @@ class Curve:
         return cls(tuple(variables), tuple(knots), j)
 
     def design(self, run: Run) -> NDArray:
-        """Return the splines' values in a run, (m, k); nought where the run does not know a
-        variable."""
+        """Return the splines' values in a run, (m, k); zero where the run lacks a variable."""
         design = np.ones((len(run.time), 1))
         for variable, knots in zip(self.variables, self.knots, strict=True):
             x = variable.of(run, self.joint)
@@ -62,7 +60,7 @@ class Curve:
 
 
 def _knots(x: NDArray, inner: int) -> NDArray:
-    # A variable that hardly moves would have several knots in one place.
+    # Quantiles of a variable that hardly moves coincide.
     places = np.unique(np.quantile(x, np.linspace(0, 1, inner + 2)))
     if len(places) < 2:
         places = np.array([places[0] - 0.5, places[0] + 0.5])
@@ -100,16 +98,16 @@ class Products:
 
 
 def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
-    """Return what ridges (r, 1) or () add to matrices (..., k, k)."""
+    """Return the diagonal matrices that ridges (r, 1) or () add to matrices (..., k, k)."""
     size = ridges * np.trace(A, axis1=-2, axis2=-1) / A.shape[-1] + np.finfo(float).tiny
     return np.asarray(size)[..., np.newaxis, np.newaxis] * np.eye(A.shape[-1])
 
 
 def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) -> list[Products]:
-    """Multiply out a design (n, k) and a residual (n,) for several partitions of the rows into
-    folds (n,).
+    """Return the products of a design (n, k) and a residual (n,) for some partitions.
 
-    Rows that all partitions put into the same folds are multiplied out once.
+    Each partition assigns the rows to folds, (n,). Rows that all partitions put into the same folds
+    are multiplied once.
     """
     cell = np.ravel_multi_index(tuple(partitions), (FOLDS,) * len(partitions))
     order = np.argsort(cell, kind="stable")
@@ -128,7 +126,7 @@ def _summed(columns: NDArray, right: NDArray, square: NDArray, fold: NDArray) ->
 
 
 def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
-    """Return the squared error on folds that were not fitted, and the ridge that makes it least.
+    """Return the squared error on folds that were not fitted, and the ridge that minimises it.
 
     Of several partitions the worst counts.
     """

@@ -1,8 +1,8 @@
-"""What a model gains by a cause that nobody can name: a smooth surface in place of an equation.
+"""Extend a model whose cause is unknown: a smooth surface in place of an equation.
 
-The surface is over the one or two variables that foretell most of a joint's residual on folds it
-was not fitted to, with the shrinkage that foretells best. Where nothing foretells enough, there is
-no surface.
+The surface is over the one or two variables that predict most of a joint's residual on folds it was
+not fitted to, with the shrinkage that predicts best. Where nothing predicts enough, there is no
+surface.
 """
 
 import itertools
@@ -23,11 +23,11 @@ from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, he
 from pipelines.diagnosis.evidence.observed_run import Run
 
 EARNED = 0.05
-"""Share of a residual's square that a surface must foretell to be there."""
+"""Least share of a residual's square that a surface must predict."""
 BETTER = 0.05
-"""Share by which two variables must foretell more than one."""
+"""Share by which two variables must predict more than one."""
 ONE_SIDED = 2.0
-"""Ratio of mean squares from which a law may hold in one kind of run only."""
+"""Ratio of mean squares from which a law may act in one kind of run only."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,17 @@ class Surface:
     curve: Curve
     values: NDArray
     share: float
-    """Of the residual's square, foretold on folds that were not fitted."""
+    """Of the residual's square, predicted on folds that were not fitted."""
 
 
 @dataclass(frozen=True)
 class SmoothTerm:
-    """The surfaces that earned their place."""
+    """The surfaces that predict enough."""
 
     surfaces: tuple[Surface, ...]
 
     def torque(self, run: Run) -> NDArray:
-        """Return what the surfaces add to each measured torque, (m, O) N·m."""
+        """Return the surfaces' torque at each output, (m, O) N·m."""
         torque = np.zeros_like(run.measured)
         for surface in self.surfaces:
             if run.motion.run in surface.runs:
@@ -58,7 +58,7 @@ class SmoothTerm:
 
     @property
     def together(self) -> list[Together]:
-        """What ``dependence.describe`` can say of surfaces over two variables."""
+        """The surfaces over two variables, for ``explained_share.describe``."""
         return [
             Together(s.joint, s.curve.variables, s.share)
             for s in self.surfaces
@@ -66,20 +66,20 @@ class SmoothTerm:
         ]
 
     def describe(self) -> str:
-        """Say what the surfaces are over."""
+        """Return the variables of the surfaces in words."""
         parts = []
         for surface in self.surfaces:
             names = " and ".join(v.name.replace("_", " ") for v in surface.curve.variables)
             where = f"{surface.joint}, {' and '.join(surface.runs)}"
-            parts.append(f"{where}: {names} ({100 * surface.share:.0f} % of what is left)")
-        return "; ".join(parts) or "no smooth term earned its place"
+            parts.append(f"{where}: {names} ({100 * surface.share:.0f} % of the remaining error)")
+        return "; ".join(parts) or "no smooth term predicts enough"
 
 
 def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm:
-    """Fit surfaces to the residuals (m, O) of training runs, joint by joint.
+    """Fit surfaces to the residuals (m, O) N·m of training runs, joint by joint.
 
-    With both kinds of run a law must foretell one kind from the other, or be at home in the one
-    that has most of the error.
+    With both kinds of run a law must predict one kind from the other, or act in the one with most
+    of the error.
     """
     terms = [
         _of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))

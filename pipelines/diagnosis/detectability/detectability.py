@@ -1,16 +1,15 @@
-"""The smallest size of each cause that a motion and a noise level would reveal, and the ties they
-cannot break.
+"""Compute the smallest size of each cause that a motion and a noise level reveal, and its ties.
 
-An effect of magnitude theta adds theta c to the measured torques; the baseline takes up its share P
+An effect of magnitude theta adds theta c to the measured torques; the baseline explains its share P
 c and leaves theta (I - P) c. With each output's rows divided by its noise and multiplied by the
 root of the share of independent samples, the log likelihood that naming the effect gains is half a
-noncentral chi-square of noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds
-its price: the prior odds against a cause, and half the logarithm of the independent samples for
-each amplitude. So
+noncentral chi-square of noncentrality theta^2 |(I - P) c|^2. The effect is named where that gain
+exceeds its price: the prior odds against a cause, and half the logarithm of the independent samples
+for each amplitude. So
 
     theta_min = (z_a + z_b) / |(I - P) c|
 
-with z_a^2 twice the price and z_b for the power asked for. A good rig shows a little of every cause
+with z_a^2 twice the price and z_b for the required power. A good rig shows a little of every cause
 (``Criteria.background_cause``), so the smallest size also exceeds that by as much.
 """
 
@@ -46,24 +45,25 @@ from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import TermColumns
 
 POWER = 0.9
-"""Chance that an effect of the smallest visible size is found."""
+"""Chance that an effect of the smallest visible size is detected."""
 USUAL = 0.8
-"""Share of a family's shapes that the smallest size is enough for, none being known beforehand."""
+"""Share of a family's shapes for which the smallest size suffices, as the shape is unknown
+beforehand."""
 SHAPES = 6
-"""Values of a free shape parameter that stand for its range."""
+"""Values of a free shape parameter that represent its range."""
 ONSETS = (0.25, 0.5, 0.75)
-"""Of a run: when that may begin which has an onset of its own in each."""
+"""Parts of a run at which an effect with per-run onsets may begin."""
 DISTINGUISHED = np.log(20.0)
-"""Log likelihood by which one cause must beat another for the two to be told apart: 20 to 1."""
+"""Log likelihood by which one cause must exceed another for the two to be separated: 20 to 1."""
 NEVER = 1e-3
-"""Share of an effect that another leaves, below which no size tells the two apart."""
+"""Share of an effect that another does not explain, below which no size separates the two."""
 NOTHING = 1e-10
-"""Share of an effect's square that the baseline leaves, below which it leaves nothing."""
+"""Share of an effect's square that the baseline does not explain, below which it explains all."""
 LEAST = 1e-3
-"""Of a joint's torque: what an effect of the largest typical size makes where it has to do with the
-motion at all."""
+"""Share of a joint's torque that an effect of the largest typical size makes if it depends on the
+motion."""
 STEPS = 8
-"""Of the search for the size of an effect that bends the motion."""
+"""Steps of the search for the size of an effect that transforms the motion."""
 
 
 @dataclass(frozen=True)
@@ -72,42 +72,43 @@ class Detectable:
 
     effect: Effect
     smallest_rms_nm: float
-    """Rms of its torque at its joint (else the first), before the baseline takes its share; inf:
-    never seen."""
+    """Rms of its torque at its joint (else the first), before the baseline explains its share; inf:
+    never detected."""
     smallest: float
     """The magnitude in the unit of ``parameter``."""
     shape: tuple[tuple[str, float], ...]
-    """Shape parameters that the size holds for: it is enough for most of those tried, none being
-    known beforehand."""
+    """Shape parameters that the size holds for: it suffices for most of those tried, as the shape
+    is unknown beforehand."""
     best_rms_nm: float
-    """The same rms at the shape that shows most."""
+    """The same rms at the shape that is easiest to detect."""
     limited_by: str
-    """``noise``, or ``materiality`` where a smaller effect would show but be no reason to alarm."""
+    """``noise``, or ``materiality`` where a smaller effect is detectable but too small to
+    matter."""
     tied_with: tuple[str, ...]
-    """Causes that could not be told from this one at its smallest size."""
+    """Causes that cannot be separated from this one at its smallest size."""
     never_apart: tuple[str, ...]
-    """Those of them that no size tells from this one."""
+    """Those of them that cannot be separated at any size."""
     torque_rms_nm: float
-    """Of the joint's torque in these runs: more than that no working leg hides."""
+    """Of the joint's torque in these runs: no working leg hides more."""
 
     @property
     def parameter(self) -> Parameter:
-        """Return the parameter that says how large the effect is."""
+        """The parameter that gives the size of the effect."""
         return self.effect.parameters[0]
 
     @property
     def unit(self) -> str:
-        """Return the unit of its torque, N where the machine slides."""
+        """The unit of its torque, N where the machine slides."""
         machine, joint = self.effect.on, self.effect.joint
         return (machine.joint(joint) if joint else machine.joints[0]).unit("torque")
 
     def size_in_words(self) -> str:
-        """Write the smallest size with its unit, as tables and figures have it."""
+        """Return the smallest size with its unit, as in tables and figures."""
         digits = f"{self.smallest:,.0f}" if abs(self.smallest) >= 100 else f"{self.smallest:.3g}"
         return digits if self.parameter.unit == "1" else f"{digits} {self.parameter.unit}"
 
     def as_json(self) -> dict:
-        """Return a row of ``detectability.json``; null where no size would be seen."""
+        """Return a row of ``detectability.json``; null where no size is detected."""
         seen = bool(np.isfinite(self.smallest_rms_nm))
         return {
             "effect": self.effect.name,
@@ -128,17 +129,16 @@ class Detectable:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """What can be seen in some runs: rows in units of the noise, the baseline projected out."""
+class DetectionProblem:
+    """Detection problem of some runs: rows in units of the noise, the baseline projected out."""
 
     runs: tuple[Run, ...]
     baseline: Baseline
     untouched: tuple[NDArray, ...]
     values: NDArray
-    """The baseline's values, that effects which bend the motion bend."""
+    """The baseline's values under which the motion is transformed."""
     root: NDArray
-    """(O,) root of the independent share over the noise and what a good rig leaves; nought without
-    such an output."""
+    """(O,) root of the independent share over the noise; zero without such an output."""
     noise: NDArray
     """(O,) N·m."""
     independent: float
@@ -149,14 +149,14 @@ class Sight:
     """(O,) N·m, of the baseline's torque."""
 
     @classmethod
-    def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "Sight":
+    def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "DetectionProblem":
         """Fit the baseline and prepare its projection."""
         untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
         noise, share = np.where(there, floor.rms, 1.0), floor.independent_share
         drives = len(noise) // 2
-        # A weight above one makes up for noise that recordings tell too large; here it is given.
+        # A weight above one corrects noise that is overestimated from recordings; here it is given.
         weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
         counts = np.repeat(weights, drives)
         root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
@@ -167,10 +167,10 @@ class Sight:
             [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
         )
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        sight = cls(
+        problem = cls(
             loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms
         )
-        return replace(sight, basis=np.linalg.qr(sight.rows(untouched))[0])
+        return replace(problem, basis=np.linalg.qr(problem.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
         """Return columns (m, O, k) of each run as weighted rows (rows, k), usable ones only."""
@@ -182,25 +182,24 @@ class Sight:
         return np.concatenate([np.nonzero(run.usable)[1] for run in self.runs])
 
     def remainder(self, columns: Sequence[NDArray]) -> NDArray:
-        """Return what the baseline leaves of columns, (rows, k)."""
+        """Return columns less their projection on the baseline, (rows, k)."""
         rows = self.rows(columns)
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rows = rows - self.basis @ (self.basis.T @ rows)
         return rows
 
     def joint(self, effect: Effect) -> int:
-        """Return the joint at which an effect's size is told: a whole machine's at its first."""
+        """Return the joint at which an effect's size is given: for a whole machine the first."""
         return max(effect.column(self.runs[0].motion), 0)
 
     def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the share of the joint's torque that a column (m, O, 1) makes."""
+        """Return the rms of a column (m, O, 1) as a share of the joint's torque."""
         return self.rms(effect, column) / max(
             float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny
         )
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, over the runs in which
-        it acts."""
+        """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, where it acts."""
         j = self.joint(effect)
         acting = [
             (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
@@ -211,8 +210,8 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class Look:
-    """An effect of one shape: its direction and what the baseline leaves of it."""
+class DetectionResult:
+    """Detection result of an effect at one shape."""
 
     shape: tuple[float, ...]
     size: float
@@ -222,14 +221,15 @@ class Look:
     noncentrality: float
     """At the smallest magnitude."""
     remainder: NDArray
-    """(rows,) of unit length; what the baseline leaves of the direction."""
+    """(rows,) of unit length; the part of the direction that the baseline does not explain."""
     span: NDArray
-    """(rows, k) orthonormal: all that the effect of this shape could explain."""
+    """(rows, k) orthonormal: all that the effect of this shape can explain."""
     level: NDArray
-    """(rows, l) orthonormal: what of it a mere level explains, as a spring's preload or a drift's
-    beginning does."""
+    """(rows, l) orthonormal: the part that a constant explains, as a spring's preload or a drift's
+    start."""
     plausible: bool
-    """Whether typical sizes of this shape make a torque that a joint could have, and any at all."""
+    """Whether typical sizes of this shape make a torque that is not zero and that a joint can
+    have."""
 
 
 def detectability(
@@ -239,33 +239,43 @@ def detectability(
     power: float = POWER,
     report: Callable[[float, str], None] = lambda share, what: None,
 ) -> list[Detectable]:
-    """Return every cause at every joint with the smallest size that these runs would reveal.
+    """Return every cause at every joint with the smallest size that these runs reveal.
 
     Parameters
     ----------
-    runs : what the diagnosis would be fitted to; of the measured torques only the baseline's fit is
-    used floor : noise of each output, (O,), and its independent share power : chance with which an
-    effect of the smallest size is found report : told the share done and the cause at hand
+    runs : sequence of Run
+        Runs that a diagnosis would be fitted to. Of the measured torques only the baseline's fit is
+        used.
+    baseline : Baseline
+    floor : Floor
+        Noise of each output, (O,), and its independent share.
+    power : float, optional
+        Chance with which an effect of the smallest size is detected.
+    report : callable, optional
+        Takes the share that is done, 0 to 1, and the present cause.
+
+    Returns
+    -------
+    list of Detectable
     """
-    sight = Sight.of([at_block_rate(run) for run in runs], baseline, floor)
-    # What the wearer may carry instead of the machine goes by the same name; the machine's is
-    # reported.
+    problem = DetectionProblem.of([at_block_rate(run) for run in runs], baseline, floor)
+    # An effect that the wearer may carry has the same name; the machine's is reported.
     motions = [run.motion for run in runs]
     effects = [
         e
         for e in proposals(baseline, baseline.kinds)
         if e.run is None and not e.each_run and e.shows_in(motions)
     ]
-    looks: dict[Effect, list[Look]] = {}
+    results: dict[Effect, list[DetectionResult]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        results = list(_looks(effect, sight, power))
-        looks[effect] = [look for look in results if look.plausible] or results
-    chosen = [_usual(own) for own in looks.values()]
-    unexplained = _unexplained(chosen, list(looks.values()))
+        of_shapes = list(_results_of(effect, problem, power))
+        results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
+    chosen = [_usual(own) for own in results.values()]
+    unexplained = _unexplained(chosen, list(results.values()))
     return [
-        _detectable(effect, look, looks, row, float(sight.torque_rms[sight.joint(effect)]))
-        for effect, look, row in zip(effects, chosen, unexplained, strict=True)
+        _detectable(effect, result, results, row, float(problem.torque_rms[problem.joint(effect)]))
+        for effect, result, row in zip(effects, chosen, unexplained, strict=True)
     ]
 
 
@@ -275,10 +285,26 @@ def detectability_of_recorded(
     report: Callable[[float, str], None] = lambda share, what: None,
     known: Sequence[str] = (),
 ) -> list[Detectable]:
-    """Return the same for recorded motions, their noise measured from what does not repeat between
-    periods.
+    """Return the detectability of recorded motions, with noise from differences of periods.
 
-    Training runs count, as they do for a diagnosis; where there is none, all do.
+    Training runs are used, as for a diagnosis; where there is none, all are.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    power, report
+        As for ``detectability``.
+    known : sequence of str, optional
+        Labels of effects that the machine is known to have.
+
+    Returns
+    -------
+    list of Detectable
+
+    Raises
+    ------
+    InputError
+        Where no diagnosis could be made of the motions.
     """
     motions = on_one_scale(motions)
     refuse_unfit(motions)
@@ -294,27 +320,28 @@ def detectability_of_recorded(
 
 
 def as_json(results: Sequence[Detectable]) -> dict:
-    """Return what ``detectability.json`` holds."""
+    """Return the contents of ``detectability.json``."""
     return {"contract": "detectability/1", "causes": [one.as_json() for one in results]}
 
 
 @cache
 def needed_noncentrality(columns: int, price: float, power: float) -> float:
-    """Return the noncentrality at which a log likelihood gain over ``columns`` exceeds its price
-    with this power.
+    """Return the noncentrality at which a gain over ``columns`` exceeds its price.
 
-    (z_a + z_b)^2 for one column, with z_a^2 twice the price.
+    It does so with this power: (z_a + z_b)^2 for one column, with z_a^2 twice the price.
     """
     price = 2.0 * price
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))
 
 
-def _looks(effect: Effect, sight: Sight, power: float) -> Iterator[Look]:
-    for candidate in _shapes(effect, sight.runs):
+def _results_of(
+    effect: Effect, problem: DetectionProblem, power: float
+) -> Iterator[DetectionResult]:
+    for candidate in _shapes(effect, problem.runs):
         if candidate.bends:
-            yield _bent(candidate, sight, power)
+            yield _bent(candidate, problem, power)
         else:
-            yield _added(candidate, sight, power)
+            yield _added(candidate, problem, power)
 
 
 def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
@@ -333,10 +360,10 @@ def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
 
 
 def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
-    """Return the values of a shape parameter that stand for its range.
+    """Return the values of a shape parameter that represent its range.
 
-    Of a ripple, those that blocks pass: faster ones are found at the full sampling rate
-    (``order_tracking``), where they show no less.
+    For a ripple, those that blocks pass. Faster ones are found at the full sampling rate
+    (``order_tracking``), where they are as detectable.
     """
     values = values_in(effect, parameter, SHAPES, runs)
     if parameter.unit not in TURNS or effect.joint is None:
@@ -359,21 +386,21 @@ def _in_run(effect: Effect, shape: Sequence[float], run: Run) -> tuple[float, ..
     )
 
 
-def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
-    """Size an effect that adds torque of its own: in proportion to its amplitude."""
+def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> DetectionResult:
+    """Find the size of an effect that adds torque in proportion to its amplitude."""
     effect = candidate.effect
-    columns = [torque_columns(candidate, r, run) for r, run in enumerate(sight.runs)]
-    direction = _direction(effect, columns, sight)
-    own = candidate.columns_in([run.motion.run for run in sight.runs])
-    span = sight.remainder([own.expand(column, r) for r, column in enumerate(columns)])
-    remainder = sight.remainder(direction)[:, 0]
-    growth, by = _growth(effect, remainder, direction, span.shape[1], sight, power)
-    size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
+    columns = [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
+    direction = _direction(effect, columns, problem)
+    own = candidate.columns_in([run.motion.run for run in problem.runs])
+    span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
+    remainder = problem.remainder(direction)[:, 0]
+    growth, by = _growth(effect, remainder, direction, span.shape[1], problem, power)
+    size, unit = float(np.sqrt(growth)), problem.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
     if effect.linear[0].typical[0] < 0:
         least = 0.0
-    torque = sight.torque_rms[sight.joint(effect)]
-    return Look(
+    torque = problem.torque_rms[problem.joint(effect)]
+    return DetectionResult(
         candidate.shapes[0],
         size,
         size * unit if np.isfinite(size) else np.inf,
@@ -381,7 +408,7 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
         _squared(remainder) * growth if np.isfinite(growth) else np.inf,
         _unit(remainder),
         _orthonormal(span),
-        _orthonormal(sight.remainder(_wide(effect, columns, _levels(effect), sight.runs))),
+        _orthonormal(problem.remainder(_wide(effect, columns, _levels(effect), problem.runs))),
         least * unit < torque and largest * unit > LEAST * torque,
     )
 
@@ -392,34 +419,36 @@ def _companions(effect: Effect) -> list[int]:
 
 
 def _levels(effect: Effect) -> list[int]:
-    """Return those companions that are another quantity than the first amplitude, as a preload
-    beside a stiffness."""
+    """Return those companions that differ in unit from the first amplitude.
+
+    A preload accompanies a stiffness, for example.
+    """
     return [i for i in _companions(effect) if effect.linear[i].unit != effect.linear[0].unit]
 
 
 def _wide(
     effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: Sequence[Run]
 ) -> list[NDArray]:
-    """Return some of an effect's columns, those that each run has for itself in places of their
-    own, (m, O, k)."""
+    """Return some of an effect's columns, per-run ones in places of their own, (m, O, k)."""
     per_run = [effect.linear[i].per_run for i in chosen]
     own = TermColumns.of(effect, [run.motion.run for run in runs], per_run)
     return [own.expand(column[:, :, chosen], r) for r, column in enumerate(columns)]
 
 
-def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list[NDArray]:
+def _direction(
+    effect: Effect, columns: Sequence[NDArray], problem: DetectionProblem
+) -> list[NDArray]:
     """Return the effect at unit magnitude, (m, O, 1) of each run.
 
-    Companions of either sign, a preload, a level, the cosine beside the sine, are such that it
-    makes least torque: a spring rests in the middle of the motion, a drift starts at minus half of
-    what it becomes.
+    Companions of either sign (a preload, a level, the cosine of a sine) are chosen to minimise its
+    torque: a spring rests in the middle of the motion, a drift starts at minus half of its end.
     """
     lead = [c[:, :, :1] for c in columns]
     companions = _companions(effect)
     if not companions:
         return lead
-    wide = _wide(effect, columns, companions, sight.runs)
-    usable = [run.usable for run in sight.runs]
+    wide = _wide(effect, columns, companions, problem.runs)
+    usable = [run.usable for run in problem.runs]
     A, y = (
         np.concatenate([c[u] for c, u in zip(part, usable, strict=True)]) for part in (wide, lead)
     )
@@ -427,8 +456,8 @@ def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list
     return [c - (w @ values)[:, :, np.newaxis] for c, w in zip(lead, wide, strict=True)]
 
 
-def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
-    """Size an effect that bends the motion or a reading: step until it is just seen."""
+def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> DetectionResult:
+    """Find the size of an effect that transforms the motion or a reading, by steps."""
     effect, start = candidate.effect, np.array(candidate.shapes[0])
     zero = np.array(
         [v if p.forms else p.neutral for v, p in zip(start, effect.shape, strict=False)]
@@ -437,9 +466,9 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
 
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
         shape = zero + (start - zero) / reach * np.exp(x)
-        column = _bend(replace(candidate, shapes=(tuple(shape),) * len(sight.runs)), sight)
-        remainder = sight.remainder(column)[:, 0]
-        growth, by = _growth(effect, remainder, column, 1, sight, power)
+        column = _bend(replace(candidate, shapes=(tuple(shape),) * len(problem.runs)), problem)
+        remainder = problem.remainder(column)[:, 0]
+        growth, by = _growth(effect, remainder, column, 1, problem, power)
         return growth, by, remainder, column, float(effect.physical(effect.completed(shape))[0])
 
     x0 = float(np.log(reach))
@@ -455,10 +484,10 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
         before, now = now, at(x1)
     growth, by, remainder, column, value = now
     seen = np.isfinite(growth) and abs(np.log(growth)) < 0.2
-    return Look(
+    return DetectionResult(
         (),
         value if seen else np.inf,
-        sight.rms(effect, column) if seen else np.inf,
+        problem.rms(effect, column) if seen else np.inf,
         by,
         _squared(remainder) if seen else np.inf,
         _unit(remainder),
@@ -468,16 +497,16 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     )
 
 
-def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
-    """Return what the bent baseline adds to the untouched one, (m, O, 1) of each run."""
+def _bend(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run."""
     return [
         bent_column(
-            *columns_under([candidate.term(r)], run, sight.baseline),
-            sight.values,
-            sight.untouched[r],
+            *columns_under([candidate.term(r)], run, problem.baseline),
+            problem.values,
+            problem.untouched[r],
             run,
         )
-        for r, run in enumerate(sight.runs)
+        for r, run in enumerate(problem.runs)
     ]
 
 
@@ -486,16 +515,16 @@ def _growth(
     remainder: NDArray,
     column: Sequence[NDArray],
     columns: int,
-    sight: Sight,
+    problem: DetectionProblem,
     power: float,
 ) -> tuple[float, str]:
-    """Return the factor by which an effect's square must grow to be named, and what asks for it."""
-    if _squared(remainder) <= NOTHING * _squared(sight.rows(column)[:, 0]):
+    """Return the factor by which an effect's square must grow to be named, and its limit."""
+    if _squared(remainder) <= NOTHING * _squared(problem.rows(column)[:, 0]):
         return np.inf, "noise"
-    price = 0.5 * columns * np.log(sight.independent) - weights(CRITERIA)[FEATURES.index("cause")]
+    price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
     by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
-    # A good rig has a little of the effect, as if its amplitude were known to so much.
-    share = sight.share(effect, column)
+    # A good rig has a little of the effect: its amplitude is uncertain by that much.
+    share = problem.share(effect, column)
     by_background = (
         2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
     )
@@ -504,65 +533,66 @@ def _growth(
     return by_background, "materiality"
 
 
-def _usual(looks: list[Look]) -> Look:
-    """Return the look that shows less than most shapes do: the size that it needs is enough for
-    ``USUAL`` of them."""
-    return sorted(looks, key=lambda look: look.rms)[round(USUAL * (len(looks) - 1))]
+def _usual(results: list[DetectionResult]) -> DetectionResult:
+    """Return the result whose size suffices for ``USUAL`` of the shapes."""
+    return sorted(results, key=lambda result: result.rms)[round(USUAL * (len(results) - 1))]
 
 
 def _detectable(
     effect: Effect,
-    look: Look,
-    looks: dict[Effect, list[Look]],
+    result: DetectionResult,
+    results: dict[Effect, list[DetectionResult]],
     unexplained: NDArray,
     torque_rms: float,
 ) -> Detectable:
-    """Put together what is known of one cause; ``unexplained`` is the share of it that each cause
-    leaves."""
-    others = sorted(zip(unexplained, (other.label for other in looks), strict=True))
+    """Combine the results of one cause.
+
+    ``unexplained`` is the share of it that each cause does not explain.
+    """
+    others = sorted(zip(unexplained, (other.label for other in results), strict=True))
     alike = [
-        (share, label) for share, label in others if label != effect.label and _alike(look, share)
+        (share, label) for share, label in others if label != effect.label and _alike(result, share)
     ]
-    names = [p.name for p in effect.shape] if look.shape else []
+    names = [p.name for p in effect.shape] if result.shape else []
     return Detectable(
         effect,
-        look.rms,
-        look.size,
-        tuple(zip(names, look.shape, strict=True)),
-        min(other.rms for other in looks[effect]),
-        look.by,
+        result.rms,
+        result.size,
+        tuple(zip(names, result.shape, strict=True)),
+        min(other.rms for other in results[effect]),
+        result.by,
         tuple(label for _, label in alike),
         tuple(label for share, label in alike if share < NEVER),
         torque_rms,
     )
 
 
-def _alike(look: Look, unexplained: NDArray | float) -> NDArray:
-    if not np.isfinite(look.noncentrality):  # seen at no size
+def _alike(result: DetectionResult, unexplained: NDArray | float) -> NDArray:
+    if not np.isfinite(result.noncentrality):  # detected at no size
         return np.zeros(np.shape(unexplained), bool)
-    return 0.5 * look.noncentrality * np.asarray(unexplained) < DISTINGUISHED
+    return 0.5 * result.noncentrality * np.asarray(unexplained) < DISTINGUISHED
 
 
-def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray:
-    """Return the share of each effect that each cannot explain, the sine squared of the angle
-    between them, (e, e).
+def _unexplained(
+    chosen: Sequence[DetectionResult], results: Sequence[list[DetectionResult]]
+) -> NDArray:
+    """Return the share of each effect that each other cannot explain, (e, e).
 
-    A mere level does not count as an explanation: a spring without stiffness is an offset, and
-    called that.
+    It is the sine squared of the angle between them. A constant level does not count as an
+    explanation: a spring without stiffness is an offset, and is reported as one.
     """
-    every = [other for others in looks for other in others]
-    directions = np.array([look.remainder for look in chosen])
+    every = [other for others in results for other in others]
+    directions = np.array([result.remainder for result in chosen])
     by_level = 1.0 - _explained(directions, [other.level for other in every])
     shares = np.maximum(1.0 - _explained(directions, [other.span for other in every]), 0.0)
-    for row, look, level in zip(shares, chosen, by_level, strict=True):
-        row[_alike(look, level)] = 1.0
-    first = np.cumsum([0, *(len(others) for others in looks[:-1])])
+    for row, result, level in zip(shares, chosen, by_level, strict=True):
+        row[_alike(result, level)] = 1.0
+    first = np.cumsum([0, *(len(others) for others in results[:-1])])
     return np.minimum.reduceat(shares, first, axis=1)
 
 
 def _explained(directions: NDArray, spans: Sequence[NDArray]) -> NDArray:
-    """Return the share of each unit vector (e, rows) in each orthonormal span (rows, k), (e,
-    spans)."""
+    """Return the share of each unit vector (e, rows) in each span (rows, k), (e, spans)."""
     squares = (directions @ np.hstack(spans)) ** 2
     ends = np.cumsum([0, *(span.shape[1] for span in spans)])
     total = np.hstack([np.zeros((len(squares), 1)), np.cumsum(squares, axis=1)])
@@ -579,7 +609,7 @@ def _unit(x: NDArray) -> NDArray:
 
 
 def _orthonormal(columns: NDArray) -> NDArray:
-    """Return an orthonormal basis of what of the columns is there, (rows, k)."""
+    """Return an orthonormal basis of the columns that are not zero, (rows, k)."""
     size = np.linalg.norm(columns, axis=0)
     if not size.any():
         return columns[:, :0]

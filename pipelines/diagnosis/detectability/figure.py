@@ -1,5 +1,4 @@
-"""The figure of what can be seen: the smallest torque of each cause that would be noticed, joint by
-joint."""
+"""Draw the smallest torque of each cause that is detected, joint by joint."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +13,7 @@ from pipelines.wording.label import effect_labelled, title_in_words
 
 
 def draw(results: Sequence[Detectable], stem: Path, title: str) -> None:
-    """Write the bars as PNG and PDF; a cause of the whole leg stands with the hip."""
+    """Write the bars as PNG and PDF; a cause of the whole leg is drawn with the hip."""
     first = next(one.effect.joint for one in results if one.effect.joint)
     joints = list(
         dict.fromkeys([first, *(one.effect.joint for one in results if one.effect.joint)])

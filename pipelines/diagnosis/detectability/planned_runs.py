@@ -1,4 +1,4 @@
-"""The runs that a trajectory would give on a leg without faults, and the noise they would have."""
+"""Simulate the runs of a planned trajectory on a faultless leg, with their noise."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,10 @@ def planned_motions(
     kinds: tuple[str, ...],
     rate_hz: float,
 ) -> list[Motion]:
-    """Return one motion of each kind of run, its torque that of rigid body and friction, without
-    cuff forces."""
+    """Return one motion of each kind of run, without cuff forces.
+
+    Its torque is that of rigid body and friction.
+    """
     count = round(min(noise.duration_s, trajectory.duration_s) * rate_hz)
     time = np.arange(count) / rate_hz
     q, dq, ddq = trajectory.at(time)
@@ -77,7 +79,7 @@ def _motion(
 def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> Floor:
     """Return the noise of two drives behind the regression filter; cuffs are not planned.
 
-    Of noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 -
+    For noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 -
     i/D) rho^i) / D, and its integral over all lags is that of the noise itself.
     """
     rho = np.exp(-1.0 / (rate_hz * noise.correlation_s)) if noise.correlation_s > 0 else 0.0

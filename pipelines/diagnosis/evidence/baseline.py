@@ -1,7 +1,7 @@
-"""The model without causes: what every cause is held against.
+"""Define the model without causes, with which every cause is compared.
 
-Rigid bodies of machine and person, Coulomb and viscous friction, what the machine is known to have
-besides, and the zeros of the cuffs' force sensors.
+It has rigid bodies of machine and person, Coulomb and viscous friction, effects that the machine is
+known to have, and the zeros of the cuffs' force sensors.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
 RELAXATION = 0.5
-"""Share of the step from a rigid body to a refitted one. Behind a soft spring a full step
-overshoots, and alternates between heavier and lighter bodies for ever."""
+"""Share of the step from a rigid body to a refitted one. With a soft spring a full step overshoots,
+and alternates between heavier and lighter bodies for ever."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Baseline:
     machine: Machine
     cuffs: bool
     known: tuple[Effect, ...] = ()
-    """What else the machine is known to have; each acts like friction, by linear parameters that
-    all runs share."""
+    """Other effects that the machine is known to have; each acts like friction, by linear
+    parameters that all runs share."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -40,13 +40,12 @@ class Baseline:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Rigid bodies, friction, what the machine is known to have, and the force sensors'
-        zeros."""
+        """Rigid bodies, friction, known effects, and the force sensors' zeros."""
         return baseline(self.machine, self.kinds, self.known, cuffs=self.cuffs)
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """The effects as terms of a model, their linear parameters zero."""
+        """The effects as terms of a model, with zero linear parameters."""
         return Model.of(self.effects).terms
 
     @cached_property
@@ -56,8 +55,7 @@ class Baseline:
 
     @cached_property
     def nonnegative(self) -> list[int]:
-        """Columns whose values are never negative: inertia, friction, and what the machine is known
-        to have.
+        """Columns whose values are never negative: inertia, friction, and known effects.
 
         First moments of mass may be negative: a link may be overbalanced.
         """
@@ -75,15 +73,13 @@ class Baseline:
 
 
 def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
-    """Return the baseline that the kinds of run at hand allow, with what else the machine is
-    ``known`` to have."""
+    """Return the baseline that the kinds of run allow, with the effects in ``known``."""
     kinds = kinds_of(run.motion for run in runs)
     return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
 
 
 def like_trained(run: Run, baseline: Baseline) -> Run:
-    """Return the run without its cuffs where none was there to train on: their zeros are not
-    known."""
+    """Return the run without its cuffs if no training run has any: their zeros are unknown."""
     if baseline.cuffs or not run.has_cuffs:
         return run
     usable = run.usable.copy()
@@ -92,14 +88,15 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
 
 
 def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
-    """Return baseline values (b,) part of the way from those before to refitted ones; the refitted
-    ones without any."""
+    """Return baseline values (b,) part of the way to refitted ones.
+
+    Without values ``before``, the refitted ones are returned.
+    """
     return refitted if before is None else RELAXATION * refitted + (1.0 - RELAXATION) * before
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in
-    ``values`` (b,)."""
+    """Return the run with loads of links and limb from the rigid bodies in ``values`` (b,)."""
     layout = baseline.layout
     body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
     return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

@@ -1,4 +1,4 @@
-"""The columns of the baseline, and of terms beside it, behind the regression filter."""
+"""Compute the columns of the baseline, and of other terms, behind the regression filter."""
 
 from collections.abc import Sequence
 
@@ -11,15 +11,24 @@ from pipelines.model import Model, Term
 
 
 def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:
-    """Return the columns of the baseline and of some terms in one run, and what was measured.
+    """Return the columns of the baseline and of some terms in one run, and the torque.
 
-    Terms transform the motion that everything is computed at, add their own torque, and stand
-    between torque and reading. The force sensors sit on the links: their forces make another
-    torque where those stand at another angle.
+    Terms transform the motion at which everything is computed, add their own torque, and act
+    between torque and reading. The force sensors are on the links: if a link is at another angle,
+    their forces make another torque.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    run : Run
+    baseline : Baseline
 
     Returns
     -------
-    (m, O, size + linear parameters) columns and (m, O) measured torques, N·m.
+    (m, O, size + linear parameters) array
+        Columns.
+    (m, O) array
+        Measured torques, N·m.
     """
     model = Model((*baseline.terms, *terms))
     motions = model.motions(run.motion)
@@ -30,7 +39,15 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
 def gram_of_runs(
     runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None
 ) -> Gram:
-    """Multiply out all runs; ``measured`` (m, O) each where it is not the runs' own."""
+    """Return the Gram matrices of all runs.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    columns : sequence of (m, O, c) arrays
+    measured : sequence of (m, O) arrays, optional
+        N·m, where it differs from the runs' own.
+    """
     measured = measured or [run.measured for run in runs]
     grams = [gram_of(c, y, r.usable) for r, c, y in zip(runs, columns, measured, strict=True)]
     total = grams[0]

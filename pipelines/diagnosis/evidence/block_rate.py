@@ -1,7 +1,7 @@
-"""A run at the rate of its blocks: columns of slow effects are then five times cheaper.
+"""Reduce a run to the rate of its blocks, at which columns of slow effects cost a fifth.
 
-What moves below 12 Hz is followed by blocks of 25 ms; the difference to columns at the full rate is
-a small share of the column itself (measured in tests/diagnosis/test_block_rate.py).
+Blocks of 25 ms follow motion below 12 Hz. The difference to columns at the full rate is a small
+share of the column itself (measured in tests/diagnosis/test_block_rate.py).
 """
 
 from dataclasses import replace
@@ -12,7 +12,7 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
 HIGHEST_CUTOFF = 0.4
-"""Highest cutoff, as a share of the rate: a motion filtered above it moves no faster at this
+"""Highest cutoff, as a share of the rate. A motion filtered above it moves no faster at this
 rate."""
 
 

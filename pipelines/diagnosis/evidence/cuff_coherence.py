@@ -1,10 +1,10 @@
-"""A wearer who pushes, felt in the cuffs and by the drives at once: evidence that no rhythm has to
-be guessed for.
+"""Detect a wearer who pushes: torque that cuffs and drives share, and that does not repeat.
 
-What repeats with the motion may be a muscle's reflex or a spring; what does not, and comes through
-the cuffs, is somebody's will. A machine's own troubles, a drag that wanders or a sensor that
-drifts, leave the cuffs alone. The evidence is the log likelihood that the drives' scatter between
-adjacent periods gains where the cuffs' is taken off it, newton metre for newton metre.
+No rhythm has to be guessed. Torque that repeats with the motion may come from a reflex or a spring.
+Torque that does not repeat, and passes through the cuffs, is voluntary. A machine's own faults, a
+drag that wanders or a sensor that drifts, do not reach the cuffs. The evidence is the log
+likelihood that the drives' scatter between adjacent periods gains if the cuffs' scatter is
+subtracted from it.
 """
 
 from collections.abc import Sequence
@@ -17,23 +17,25 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slowed
 
 SLOW_S = 0.4
-"""Length of the averages: what swings on a soft transmission is gone from them."""
+"""Length of the averages, s: they suppress oscillations on a soft transmission."""
 NEEDED = 0.5
-"""Share of an average that must be there: cuffs say nothing about turns, and a leg turns often."""
+"""Share of an average that must be present: cuffs have no samples near reversals, and a leg
+reverses often."""
 LOUDER = 1.25
-"""Ratio of variances from which cuffs and drives feel the same at all."""
+"""Ratio of variances from which cuffs and drives share any torque."""
 FEWEST = 30
 """Fewest averages from which a variance is estimated."""
 
 
 def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
-    """Return the log likelihood that a wearer's push gains by what does not repeat at each joint,
-    (J,).
+    """Return the log likelihood of a wearer's push, from scatter at each joint, (J,).
 
     Parameters
     ----------
-    runs : with cuff torques as further outputs where there are any
-    residuals : (m, 2 J) of each run under the baseline
+    runs : sequence of Run
+        With cuff torques as further outputs where there are any.
+    residuals : sequence of (m, 2 J) arrays
+        Measured less predicted torque of each run under the baseline, N·m.
     """
     joints = len(runs[0].motion.joints)
     slow = [

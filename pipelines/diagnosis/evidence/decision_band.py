@@ -1,7 +1,7 @@
-"""Averages over 0.1 s: the band in which the decision is made.
+"""Average blocks over 0.1 s: the band in which the decision is made.
 
-They pass what is slower than 4.4 Hz. Between that and the angle's own filter the torque holds what
-the drive's control makes of counted angles: it repeats with the motion and no model predicts it.
+The averages pass frequencies below 4.4 Hz. Between that and the angle's own filter the torque holds
+the drive's response to counted angles: it repeats with the motion, and no model predicts it.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class DecisionBand:
 
     @classmethod
     def of(cls, run: Run) -> "DecisionBand":
-        """Lay the averages over a run's blocks, beginning anew after each gap."""
+        """Place the averages over a run's blocks, starting again after each gap."""
         width = run.block.decimation / run.motion.sample_rate_hz
         k = max(1, round(LENGTH_S / width))
         breaks = np.flatnonzero(np.diff(run.time) > 1.5 * width) + 1

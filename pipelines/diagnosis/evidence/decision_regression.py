@@ -1,8 +1,8 @@
-"""All searched runs in the decision band as one weighted regression, the baseline projected out.
+"""Combine all searched runs in the decision band into one weighted regression.
 
 Rows are averages over 0.1 s of every output of every run, divided by their noise and whitened as
-noise of first order; so the squared length of a residual is a chi-square. What the baseline can
-imitate is projected out of everything, which is the same as a flat prior on its parameters.
+noise of first order; so the squared length of a residual is a chi-square. The baseline is projected
+out of everything, which equals a flat prior on its parameters.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,10 +32,10 @@ class DecisionRegression:
     roots: tuple[NDArray, ...]
     """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
     operator: sparse.csr_matrix
-    """(N, sum of m O): takes the blocks of all runs to weighted rows; those without weight are left
+    """(N, sum of m O): maps the blocks of all runs to weighted rows; rows without weight are left
     out."""
     whitening: sparse.csr_matrix
-    """(N, N): takes from each average what the one before it foretells of its noise."""
+    """(N, N): subtracts from each average the noise that the one before it predicts."""
     weighty: NDArray
     """(rows,) whether a row has any weight; N of them do."""
     output: NDArray
@@ -60,7 +60,7 @@ class DecisionRegression:
         torque: NDArray,
         misfit: NDArray,
     ) -> "DecisionRegression":
-        """Set the regression up.
+        """Build the regression.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class DecisionRegression:
         torque : (O,) array
             Rms of each output, N·m.
         misfit : (O,) array
-            What counts as noise besides, for no form of a cause is exact, N·m.
+            Additional noise, because no form of a cause is exact, N·m.
         """
         bands = tuple(DecisionBand.of(run) for run in runs)
         sd, memory = noise.averaged(LENGTH_S)
@@ -82,7 +82,7 @@ class DecisionRegression:
         weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
         output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
         averaging = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
-        # What counts as noise besides is white.
+        # The misfit counts as white noise.
         whitening = _whitening(bands, weighty, memory * (sd / sigma) ** 2)
         operator = whitening @ averaging.tocsr()[weighty]
         operator.eliminate_zeros()
@@ -125,12 +125,12 @@ class DecisionRegression:
         return np.asarray(self.operator @ np.concatenate(flat))
 
     def project(self, columns: NDArray) -> NDArray:
-        """Return columns (N, k) less what the baseline imitates."""
+        """Return columns (N, k) less their projection on the baseline."""
         return columns - self.basis @ (self.basis.T @ columns)
 
     @cached_property
     def _inverse(self) -> NDArray:
-        """Takes rows to the baseline's values that come nearest to them, (b, N)."""
+        """Matrix from rows to the baseline values that come nearest to them, (b, N)."""
         size = np.linalg.norm(self.baseline, axis=0)
         size = np.where(size > 0.0, size, 1.0)[:, np.newaxis]
         return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=RANK) / size)
@@ -141,15 +141,14 @@ class DecisionRegression:
 
     @cached_property
     def baseline_variance(self) -> NDArray:
-        """The variance that the noise of each output gives each value of the baseline, (b, O)."""
+        """The variance that each output's noise gives each baseline value, (b, O)."""
         of_output = self.output[:, np.newaxis] == np.arange(len(self.torque))
         return np.asarray(self._inverse**2 @ of_output)
 
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield for each run the times (m,) s of an output's rows, and what the baseline leaves
-        there, (m,).
+        """Yield for each run the times (m,) s of an output's rows, and their residual, (m,).
 
-        The residual is in units of the rows' noise.
+        The residual is under the baseline, in units of the rows' noise.
         """
         ends = np.cumsum([0, *(root.size for root in self.roots)])
         values = np.zeros(len(self.weighty))
@@ -160,12 +159,11 @@ class DecisionRegression:
 
     @cached_property
     def _coloured(self) -> SuperLU:
-        """Undoes the whitening."""
+        """Factorisation that undoes the whitening."""
         return splu(self.whitening.tocsc(), permc_spec="NATURAL")
 
     def shares(self, columns: NDArray) -> NDArray:
-        """Return rows (R, k) whose squares add up to a column's squared share of the drives'
-        torque.
+        """Return rows (R, k) whose squares add up to a column's squared share of torque.
 
         The share at a joint is the column's rms over the drive's rms torque.
         """
@@ -181,10 +179,11 @@ class DecisionRegression:
 def _whitening(
     bands: Sequence[DecisionBand], weighty: NDArray, memory: NDArray
 ) -> sparse.csr_matrix:
-    """Return what whitens averages whose noise resembles that of the average before, (N, N).
+    """Return the matrix that whitens averages correlated with the average before, (N, N).
 
     Parameters
     ----------
+    bands : sequence of DecisionBand
     weighty : (rows,) bool
         Rows of all averages and outputs that count.
     memory : (O,) array
@@ -204,8 +203,7 @@ def _whitening(
 
 
 def _operator(band: DecisionBand, root: NDArray) -> sparse.csr_matrix:
-    """Return what takes a run's blocks and outputs, m O, to its weighted averages and outputs, M
-    O."""
+    """Return the matrix from a run's blocks and outputs, m O, to weighted averages, M O."""
     outputs = root.shape[1]
     weighted = [sparse.diags(root[:, o]) @ op for o, op in enumerate(band.operators)]
     M, m = weighted[0].shape
@@ -219,7 +217,7 @@ def _operator(band: DecisionBand, root: NDArray) -> sparse.csr_matrix:
 
 
 def _orthonormal(columns: NDArray) -> NDArray:
-    """Return an orthonormal basis (N, r) of columns (N, b), leaving out those that add nothing."""
+    """Return an orthonormal basis (N, r) of columns (N, b), without those that add nothing."""
     size = np.linalg.norm(columns, axis=0)
     q, r = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])
     return q[:, np.abs(np.diag(r)) > RANK]

@@ -1,5 +1,4 @@
-"""Fast recordings at the rate that the diagnosis needs: motion below 20 Hz asks for no
-kilohertz."""
+"""Downsample fast recordings: motion below 20 Hz does not need a kilohertz."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,8 +12,7 @@ ENOUGH_HZ = 200.0
 
 
 def thinned(motion: Motion) -> Motion:
-    """Return the motion with neighbouring samples averaged to ``ENOUGH_HZ`` or a little more; as it
-    is where slower."""
+    """Return the motion averaged to ``ENOUGH_HZ`` or a little more; unchanged if slower."""
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion
@@ -24,7 +22,7 @@ def thinned(motion: Motion) -> Motion:
         for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "temperature")
         if getattr(motion, name) is not None
     }
-    # A mean of readings is no reading: it has counts that the encoder lacks.
+    # A mean of readings is no reading: it lies between the encoder's counts.
     if motion.measured_angle is not None:
         averaged["measured_angle"] = motion.measured_angle[starts + every.decimation // 2]
     blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))

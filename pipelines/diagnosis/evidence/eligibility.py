@@ -1,5 +1,4 @@
-"""The runs that a diagnosis is given: of one machine, whose joints move for long enough to say
-anything."""
+"""Check that the runs of a diagnosis are of one machine whose joints move for long enough."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -18,15 +17,15 @@ from pipelines.mechanics.silence import silent_torque
 MOST_NM = 10_000.0
 """Largest plausible torque, N·m; a larger one is in another unit."""
 COPIED = 1e-12
-"""Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than
-their last count."""
+"""Largest shortfall of a correlation from 1 by rounding. Two encoders differ by more than their
+last count."""
 LEAST_S = 5.0
-"""Least motion of an exoskeleton, s, all runs of a kind and purpose together: less does not
+"""Least motion of an exoskeleton, s, all runs of a kind and purpose together. Less does not
 separate gravity, inertia and friction."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
-    """Refuse motions that no diagnosis can be made of, or it would be one of noise."""
+    """Raise InputError for motions that no diagnosis can use."""
     refuse_several_machines(motions)
     for motion in motions:
         if motion.machine.is_exoskeleton:
@@ -38,7 +37,7 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
 
 
 def _refuse_monsters(motion: Motion) -> None:
-    """Refuse torques that no leg's drive makes."""
+    """Raise InputError for torques that no leg's drive makes."""
     for j, joint in enumerate(motion.joints):
         largest = float(np.nanmax(np.abs(motion.torque[:, j])))
         if largest > MOST_NM:
@@ -50,8 +49,10 @@ def _refuse_monsters(motion: Motion) -> None:
 
 
 def _refuse_one_angle_twice(motion: Motion) -> None:
-    """Refuse joints of which one only repeats the other's angle: no motion then tells their torques
-    apart."""
+    """Raise InputError where one joint's angle copies another's.
+
+    No motion separates the torques of such joints.
+    """
     if motion.measured_angle is None or not motion.valid.any():
         return
     q = motion.measured_angle[motion.valid]
@@ -62,28 +63,31 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
             times = alike * np.ptp(q[:, other]) / np.ptp(q[:, one])
             first, second = motion.joints[one], motion.joints[other]
             raise InputError(
-                f"{motion.file}: {first} and {second} hold the same angles ({second}'s are"
-                f" {times:.4g} times {first}'s throughout, but for their zeros), expected a"
-                " measurement of its own of each joint; correct their columns in"
-                f" {settings_of(motion)}"
+                f"{motion.file}: {the(second)}'s angle is a copy of {the(first)}'s (factor"
+                f" {times:.4g}), expected an encoder column for each joint; correct their columns"
+                f" in {settings_of(motion)}"
             )
 
 
 def _refuse_twins(motions: Sequence[Motion]) -> None:
-    """Refuse one measurement under two names: an error would pass for one of a run that no fit has
-    seen."""
+    """Raise InputError for one measurement under two names.
+
+    Its error would count as that of a run that no fit has seen.
+    """
     for one, other in combinations(motions, 2):
         if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
             raise InputError(
                 f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as"
-                f" {one.file} ({one.run}, {one.purpose}), expected a measurement of its own in"
-                " each; give each run once"
+                f" {one.file} ({one.run}, {one.purpose}), expected different measurements; give"
+                " each run once"
             )
 
 
 def _refuse_standstill(motions: Sequence[Motion]) -> None:
-    """Refuse runs of one kind and purpose in which a joint hardly moves or both hardly move at
-    once."""
+    """Raise InputError where the joints of one kind and purpose move too little.
+
+    Each joint must move for long enough, and all of them at once.
+    """
     files = ", ".join(m.file for m in motions)
     together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
     moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
@@ -97,7 +101,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
                 f" reversals), expected {least:.2g} s {together}; excite"
                 f" {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or"
-                " record longer; if it did move, check its encoder, and the units of angle and"
+                " record longer. If it did move, check its encoder, and the units of angle and"
                 f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
@@ -110,20 +114,19 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
 
 
 def _rounded_down(seconds: float) -> float:
-    """Return seconds to a tenth, so that what is too short does not look long enough."""
+    """Return seconds rounded down to a tenth, so that a time that is too short looks so."""
     return int(10.0 * seconds) / 10.0
 
 
 def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
-    """Refuse a torque that is one number all along while its joint moves."""
+    """Raise InputError for a torque that is constant while its joint moves."""
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
     if len(values) and np.ptp(values) == 0.0:
         raise silent_torque(motions, motions[0].machine.joints[joint], float(values[0]) + 0.0)
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
-    """Refuse an angle that is one number all along: what a filter leaves of it only seems to
-    move."""
+    """Raise InputError for a constant angle; after the filter it only seems to move."""
     measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
     values = np.concatenate(measured) if measured else np.zeros(0)
     if len(values) and np.ptp(values) == 0.0:

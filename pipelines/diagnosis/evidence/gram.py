@@ -1,7 +1,7 @@
-"""Sums of products of columns, by output: all that a weighted fit needs.
+"""Sum the products of columns, by output, as every weighted fit needs them.
 
-With Gram matrices in hand a fit of any set of columns costs a solve of that set's size, whatever
-the length of the recordings.
+With Gram matrices a fit of any set of columns costs a solve of that set's size, whatever the length
+of the recordings.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 PASSES = 3
 """Passes in which outputs are weighted by their own errors."""
 RIDGE = 1e-9
-"""Of a column's own square: keeps solves of nearly dependent sets finite."""
+"""Relative to a column's square: keeps solves of nearly dependent sets finite."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,13 @@ class Gram:
 
 
 def gram_of(columns: NDArray, measured: NDArray, usable: NDArray) -> Gram:
-    """Multiply out one run.
+    """Return the Gram matrices of one run.
 
     Parameters
     ----------
     columns : (m, O, c) array
     measured : (m, O) array
+        N·m.
     usable : (m, O) array of bool
     """
     _, outputs, c = columns.shape
@@ -62,8 +63,14 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray) -> Gram:
 
 
 def solve(gram: Gram, weights: NDArray) -> NDArray:
-    """Return the coefficients (c,) of the weighted fit; ``weights`` (O,) are the outputs' inverse
-    variances."""
+    """Return the coefficients (c,) of the weighted fit.
+
+    Parameters
+    ----------
+    gram : Gram
+    weights : (O,) array
+        The outputs' inverse variances, 1/(N·m)².
+    """
     A = np.einsum("o,oij->ij", weights, gram.columns)
     b = np.einsum("o,oi->i", weights, gram.measured)
     size = np.sqrt(np.maximum(np.diag(A), np.finfo(float).tiny))
@@ -72,15 +79,17 @@ def solve(gram: Gram, weights: NDArray) -> NDArray:
 
 
 def error(gram: Gram, values: NDArray) -> NDArray:
-    """Return the sum of squared errors of given coefficients, (O,)."""
+    """Return each output's sum of squared errors under coefficients (c,), (O,) (N·m)²."""
     quadratic = np.einsum("i,oij,j->o", values, gram.columns, values)
     linear = np.einsum("i,oi->o", values, gram.measured)
     return np.maximum(gram.square - 2 * linear + quadratic, 0.0)
 
 
 def weights_under(gram: Gram) -> NDArray:
-    """Return each output's inverse variance under the fit to all columns, iterated, (O,)
-    1/(N·m)²."""
+    """Return each output's inverse variance under the fit to all columns, (O,) 1/(N·m)².
+
+    The fit is weighted by these variances, and iterated.
+    """
     weights = np.where(gram.count > 0, 1.0, 0.0)
     for _ in range(PASSES):
         squares = error(gram, solve(gram, weights))

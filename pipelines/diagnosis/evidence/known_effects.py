@@ -1,8 +1,7 @@
-"""What a machine is known to have besides its rigid body and friction: part of what everything is
-held against.
+"""Choose the effects that a machine is known to have, as part of its baseline.
 
-Who built a machine knows its rotors and gears. Data need not show that they are there, only how
-large they are.
+The builder of a machine knows its rotors and gears. Data need not show that they are present, only
+how large they are.
 """
 
 from collections.abc import Sequence
@@ -14,12 +13,12 @@ from pipelines.wording.label import effect_at
 
 
 def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]:
-    """Return the effects of some labels, ``rotor_inertia@knee``, at a machine.
+    """Return the effects of some labels, such as ``rotor_inertia@knee``, at a machine.
 
     Raises
     ------
     InputError
-        Where there is none of this name or at this joint, or drawings do not show it.
+        Where no effect has this name or is at this joint, or drawings do not show it.
     """
     return tuple(
         effect_at(label, machine, _fits, "diagnose.known") for label in dict.fromkeys(labels)
@@ -27,10 +26,9 @@ def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]
 
 
 def _fits(effect: type[Effect]) -> bool:
-    """Tell whether drawings show an effect, as an inertia, a spring or a mass, and only its linear
-    parameters are open.
+    """Return whether drawings show an effect, and all its parameters are linear.
 
-    How a joint rubs is on no drawing.
+    Drawings show inertias, springs and masses, but no friction.
     """
     shown = effect.inertial or effect.side is Side.STRUCTURE
     return shown and effect.name not in BASELINE and bool(effect.linear) and not effect.shape

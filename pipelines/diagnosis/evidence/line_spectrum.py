@@ -1,4 +1,4 @@
-"""Spectra of a residual torque: the log likelihood ratio of a line over the angle, or over time.
+"""Compute spectra of a residual torque: log likelihood ratios of lines over angle or time.
 
 With the score z and the weight w of ``whitened_residual``, angle q and speed v,
 
@@ -25,20 +25,20 @@ from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel
 GRID = 8
 """Points of the angle's grid in a wave of the highest order."""
 OVERSAMPLED = 8
-"""Orders in the width of a line at which the spectrum over angle is known."""
+"""Number of orders within the width of a line at which the spectrum over angle is computed."""
 AROUND_IN_ANGLE, AROUND_IN_TIME = 20, 120
-"""Widths of a line that its local level is the median of."""
+"""Line widths over which the median of the local level is taken."""
 STEEP = 6
-"""Widths of the same where the level may be steep; a line itself would raise so narrow a median."""
+"""The same where the level may be steep. A line itself would raise so narrow a median."""
 LEAST_INFORMED = 1e-3
-"""Least information about an order, as a share of that about the best known one: less is taken as
-that much."""
+"""Least information about an order, as a share of that about the best known one; smaller values are
+raised to it."""
 HARMONICS = 8
-"""Of the motion, on each side of one."""
+"""Number of the motion's harmonics on each side that are compared with one."""
 
 
 class Kind(StrEnum):
-    """What a line is a line over."""
+    """The variable over which a line is periodic."""
 
     ANGLE = "angle"
     TIME = "time"
@@ -56,32 +56,32 @@ class Spectrum:
     level: NDArray
     """(m,) by which the ratio against stationary noise was divided."""
     width: float
-    """Of a line, in cycles a turn or Hz: independent places are as far apart."""
+    """Width of a line, in cycles a turn or Hz: independent places are that far apart."""
     phases: int
     """Phases that a line has: one for all runs over angle, one in each run over time."""
 
     @property
     def steep_level(self) -> NDArray:
-        """The level where none of its lines is left, (m,): from nearer neighbours too."""
+        """The level after all lines are subtracted, (m,), from nearer neighbours too."""
         places = max(1, round(self.width / (self.cycles[1] - self.cycles[0])))
         near = _level(self.log_likelihood_ratio * self.level, STEEP * places, self.phases)
         return np.maximum(self.level, near)
 
     def false_alarm(self, ratio: float, searches: int) -> float:
-        """Return the chance that noise shows such a ratio anywhere in some spectra like this."""
+        """Return the chance that noise shows such a ratio anywhere in some similar spectra."""
         if not len(self.cycles):
             return 1.0
-        # The level is an estimate, too, so that the ratio is distributed as F; a median of k has
+        # The level is an estimate too, so the ratio has an F distribution. A median of k values has
         # half the efficiency of their mean.
         around = AROUND_IN_ANGLE if self.kind is Kind.ANGLE else AROUND_IN_TIME
         tail = float(fdtrc(2 * self.phases, around, ratio / self.phases))
-        # A maximum between independent places is higher than those at them.
+        # Maxima between independent places are higher than at them.
         places = 2.5 * (1.0 + (self.cycles[-1] - self.cycles[0]) / self.width)
         return float(-np.expm1(searches * places * np.log1p(-min(tail, 1.0 - 1e-12))))
 
 
 class Orders(NamedTuple):
-    """The orders of a joint that are searched."""
+    """The range of orders of a joint that is searched."""
 
     swept: float
     """rad, the range of angles that it moves through."""
@@ -107,7 +107,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     first = min(float(channel.grid.angle.min()) for channel in channels)
     total = np.zeros(int(searched.swept / step) + 3)
     for channel in channels:
-        # Each score is dealt to its two neighbours on the grid.
+        # Each score is split between its two neighbours on the grid.
         place = (channel.grid.angle - first) / step
         below = place.astype(int)
         share = place - below
@@ -121,7 +121,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     if not kept.any():
         return nothing(Kind.ANGLE)
     orders = orders[kept]
-    # What was dealt so is damped by the square of a sinc.
+    # Splitting damps the transform by the square of a sinc.
     power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
     some = orders[:: max(1, len(orders) // 256)]
     information = np.sum([information_at(channel, some) for channel in channels], axis=0)
@@ -132,7 +132,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
 
 
 def information_at(channel: Channel, orders: NDArray) -> NDArray:
-    """Return D of the equation above at some orders (m,): from speeds that stand for all."""
+    """Return D of the equation above at some orders (m,), from representative speeds."""
     hz = orders[:, np.newaxis] * channel.grid.usual_hz_per_order
     weight = channel.weight(hz).mean(axis=1)
     return np.asarray(len(channel.score) * weight) + TINY
@@ -160,7 +160,7 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
 
 
 def _level(ratio: NDArray, around: int, phases: int) -> NDArray:
-    """Return how much higher than with stationary noise ratios around each place are, (m,) >= 1."""
+    """Return the ratios' local level over that of stationary noise, (m,) >= 1."""
     edges = np.linspace(0, len(ratio), max(1, len(ratio) // around) + 1).astype(int)
     medians = [np.median(ratio[a:b]) for a, b in pairwise(edges)]
     middle = 0.5 * (edges[:-1] + edges[1:])
@@ -175,9 +175,9 @@ def _with_harmonics(
     period_s: float,
     phases: int,
 ) -> NDArray:
-    """Return the level; at the motion's harmonics the highest of others around.
+    """Return the level, raised at the motion's harmonics to the highest of others around.
 
-    Whatever repeats with the motion has lines there, of very different heights.
+    All torque that repeats with the motion has lines there, of very different heights.
     """
     step = hz[1] - hz[0]
     first, last = np.ceil(hz[0] * period_s), np.floor(hz[-1] * period_s)
@@ -196,7 +196,7 @@ def _with_harmonics(
 
 
 def information(channel: Channel, kind: Kind, cycles: float) -> float:
-    """Return D of the equation above for one line, samples times 1/(N·m)^2."""
+    """Return D of the equation above for one line, in samples times 1/(N·m)²."""
     if kind is Kind.TIME:
         return len(channel.score) * float(channel.weight(np.array(cycles))) + TINY
     return float(information_at(channel, np.array([cycles]))[0])

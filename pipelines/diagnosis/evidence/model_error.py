@@ -1,7 +1,7 @@
-"""What even a good rig gets wrong: a share of what its torques vary by.
+"""Estimate the error of a good rig's model: a share of the variation of its torques.
 
-What is off by some share of the torque varies with it. A constant that the baseline has anyway, as
-a lift's weight, is told off with it and hides nothing.
+An error in proportion to the torque varies with it. A constant that the baseline has anyway, as a
+lift's weight, is subtracted and hides nothing.
 """
 
 from collections.abc import Sequence
@@ -13,25 +13,29 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects.torque_offset import TorqueOffset
 
 IMPERFECTION = (0.009, 0.02)
-"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
+"""Share of a drive's and of a cuff's torque that even a good model of a good machine does not
+explain."""
 
 
 def imperfection(runs: Sequence[Run]) -> NDArray:
-    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth
-    nothing."""
-    torque = telling_torque(runs)
+    """Return the error that every model of a real machine has, (O,) N·m."""
+    torque = varying_torque(runs)
     return torque * imperfect_share(len(torque))
 
 
 def imperfect_share(outputs: int) -> NDArray:
-    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives
-    first, then cuffs."""
+    """Return the share of each output's torque that is wrong on a good rig, (O,).
+
+    Drives come first, then cuffs.
+    """
     return np.repeat(IMPERFECTION, outputs // 2)
 
 
-def telling_torque(runs: Sequence[Run]) -> NDArray:
-    """Return the rms of each output's torque (O,), N·m, less a constant where the machine's bodies
-    have any."""
+def varying_torque(runs: Sequence[Run]) -> NDArray:
+    """Return the rms of each output's torque, (O,) N·m.
+
+    A constant is subtracted where the machine's bodies have one.
+    """
     squares, count = np.zeros(runs[0].measured.shape[1]), np.zeros(runs[0].measured.shape[1])
     for run in runs:
         known = np.where(run.usable, run.measured, 0.0)

@@ -1,24 +1,23 @@
-"""The band in which a run's motion has its lines, and so has all that a model gets wrong of it."""
+"""Estimate the band of a run's motion, and so of all errors of a model of it."""
 
 import numpy as np
 
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LOWEST_HZ = 1.2
-"""Below it the motion itself has its lines, however slow it is."""
+"""Least frequency above the motion: below it a slow motion has lines too, Hz."""
 HARMONICS, MOVING = 2.0, 0.99
-"""Harmonics of the motion's own band that its misfit has lines up to, and share of the speed's
-power in that band."""
+"""Multiple of the motion's band in which its misfit has lines, and share of the speed's power in
+that band."""
 
 
 def above_the_motion_hz(run: Run) -> float:
-    """Return the frequency above which the motion, and what a model gets wrong of it, has no
-    lines."""
+    """Return the frequency, Hz, above which motion and model error have no lines."""
     return max(LOWEST_HZ, HARMONICS * _band_hz(run))
 
 
 def _band_hz(run: Run) -> float:
-    """Return the frequency below which the joints' speeds have nearly all of their power."""
+    """Return the frequency, Hz, below which the joints' speeds have nearly all their power."""
     speed = run.slow(run.motion.dq)[run.motion.valid]
     power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)
     share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)

@@ -1,5 +1,4 @@
-"""The noise floor, from data alone: what does not repeat from one period of the excitation to the
-next."""
+"""Estimate the noise floor from the residual that does not repeat between periods."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +10,8 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_LAG_S = 1.0
-"""Without periods noise is what changes faster than averages of this length, s, on an exoskeleton's
-scale."""
+"""Without periods, noise is the part that changes faster than averages of this length, s, on an
+exoskeleton's scale."""
 
 
 @dataclass(frozen=True)
@@ -22,16 +21,21 @@ class Floor:
     rms: NDArray
     """N·m."""
     independent_share: NDArray
-    """Independent samples per sample: noise resembles itself from block to block."""
+    """Independent samples per sample: noise is correlated from block to block."""
     from_periods: bool
 
 
 def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     """Estimate the noise from differences between adjacent periods at the same phase.
 
-    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods.
-    Without periods the noise is what is faster than the motion, and as dense below: what is missing
-    and as fast passes for noise.
+    Slow drift cancels in the differences. Without periods the noise is the part above the motion's
+    band, extrapolated below it: missing effects that are as fast count as noise.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
     """
     pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(d) for d in pairs)
@@ -48,15 +52,17 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
         known = known[np.isfinite(known)]
         if len(known) > 20:
             time = _correlation_time(d)
-            # The average that was taken off held a part of the noise too.
+            # The subtracted average held a part of the noise too.
             rms[o] = np.sqrt(np.mean(known**2) / max(1.0 - time / averaged, 0.5))
             share[o] = 1.0 / time
     return Floor(rms, share, from_periods)
 
 
 def scatter(run: Run, residual: NDArray) -> NDArray:
-    """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not
-    usable."""
+    """Return differences of adjacent periods over the root of two, (k, O) N·m.
+
+    They are NaN where a sample is not usable.
+    """
     period = run.motion.period_s
     if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
         return np.zeros((0, residual.shape[1]))
@@ -82,10 +88,10 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
 
 
 def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
-    """Return a residual (m, O) less its running average over ``than_s``, NaN where it is not
-    usable.
+    """Return a residual (m, O) less its running average over ``than_s``.
 
-    Next to a gap or a reversal the average is of those samples that are usable, at least half.
+    It is NaN where it is not usable. Next to a gap or a reversal the average is of usable samples
+    only, at least half.
     """
     width = _blocks(run, than_s)
     known = uniform_filter1d(run.usable.astype(float), width, axis=0, mode="nearest")
@@ -94,7 +100,7 @@ def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
 
 
 def _blocks(run: Run, seconds: float) -> int:
-    """Return how many blocks last so long, at least 3."""
+    """Return the number of blocks in some seconds, at least 3."""
     return max(3, round(seconds * run.motion.sample_rate_hz / run.block.decimation))
 
 

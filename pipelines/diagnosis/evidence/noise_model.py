@@ -1,13 +1,14 @@
-"""The noise of each output as a spectrum, known without a model of the machine.
+"""Estimate the noise of each output as a spectrum, without a model of the machine.
 
-Differences of adjacent periods at the same phase hold noise and whatever wanders. What wanders is
-slower than the noise is measured at. The noise is the sum of first-order noise and of pink noise,
+Differences of adjacent periods at the same phase hold noise and wandering torque. Torque that
+wanders is slower than the band in which the noise is measured. The noise is the sum of first-order
+noise and of pink noise,
 
     S(f) = S0 (1 / (1 + (2 pi f tau)^2) + pink F / f),  F = 1.5 Hz.
 
-Without periods it is read off above the motion's own band, where it cannot be told how pink it is.
-Averages are whitened as noise of first order; what is slower and pink is background that a torque
-which wanders has to exceed.
+Without periods it is measured above the motion's own band, where its pink part cannot be
+determined. Averages are whitened as noise of first order. Slower, pink noise is background that a
+wandering torque has to exceed.
 """
 
 from collections.abc import Sequence
@@ -21,15 +22,15 @@ from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 
 WANDER_HZ = 0.25
-"""Below it differences between periods hold what wanders, not only noise, Hz."""
+"""Frequency below which differences between periods hold wandering torque as well as noise, Hz."""
 HIGHEST_HZ = 6.0
 """Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above."""
 WITHOUT_PERIODS_HZ = (4.0, 8.0)
-"""Without periods: where the band begins at the latest, and where it ends, Hz."""
+"""Without periods: highest begin of the band, and its end, Hz."""
 CORRELATION_S = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
-"""Correlation times tried, s. Noise of sensors and drives is no slower; what is slower wanders."""
+"""Correlation times tried, s. Noise of sensors and drives is no slower; slower torque wanders."""
 PINK_HZ = 1.5
-"""Where pink noise is measured against first-order noise, Hz."""
+"""Frequency at which pink noise is compared with first-order noise, Hz."""
 PINK = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 """Ratios of the two tried."""
 UNKNOWN_PINK = 0.2
@@ -39,11 +40,11 @@ TINY_HZ = 1e-3
 PIECE_S = 20.0
 """Length of the pieces of a series whose spectra are taken, s."""
 SHORTEST = 64
-"""Blocks that a series must have for its spectrum to count."""
+"""Fewest blocks of a series whose spectrum counts."""
 LARGEST_SLOW = 0.8
-"""Share of a series' known blocks that the slow cosines may be at most in number."""
+"""Largest number of slow cosines, as a share of a series' known blocks."""
 UNLIKE = 3.0
-"""Times the median of all pieces, from which a piece holds what came or went, not noise."""
+"""Multiple of the median of all pieces above which a piece holds an event, not noise."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +59,18 @@ class NoiseModel:
     from_periods: bool
 
     def at(self, hz: NDArray) -> NDArray:
-        """Return the density at frequencies (k,), (O, k); below ``WANDER_HZ`` it is not known to
-        grow."""
+        """Return the density at frequencies (k,) Hz, (O, k) (N·m)²/Hz.
+
+        Below ``WANDER_HZ`` its growth is an extrapolation.
+        """
         first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
         pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, TINY_HZ))
         return (self.density * (first + pink).T).T
 
     def averaged(self, length_s: float) -> tuple[NDArray, NDArray]:
-        """Return standard deviation and correlation of adjacent averages over a length, (O,) each.
+        """Return standard deviation and correlation of adjacent averages, (O,) each.
 
-        What is slower than ``WANDER_HZ`` counts as if it were as fast.
+        Noise slower than ``WANDER_HZ`` counts as if it were at that frequency.
         """
         hz = np.linspace(0.0, 4.0 / length_s, 2001)
         passed = self.at(np.maximum(hz, WANDER_HZ)) * np.sinc(hz * length_s) ** 2
@@ -76,14 +79,12 @@ class NoiseModel:
         return np.sqrt(variance), np.maximum(adjacent / variance, 0.0)
 
     def sigma(self, length_s: float) -> NDArray:
-        """Return the standard deviation that averages act with where what they hold is slow, (O,)
-        N·m."""
+        """Return the effective standard deviation of averages for slow signals, (O,) N·m."""
         sd, memory = self.averaged(length_s)
         return np.asarray(sd * np.sqrt((1.0 + memory) / (1.0 - memory)))
 
     def excess(self, hz: NDArray, length_s: float) -> NDArray:
-        """Return by how much slow noise exceeds that of averages of first order, (O, k)
-        (N·m)²/Hz."""
+        """Return the excess of slow noise over first-order averages, (O, k) (N·m)²/Hz."""
         sd, memory = self.averaged(length_s)
         turn = np.multiply.outer(memory, np.cos(2.0 * np.pi * hz * length_s))
         of_order_one = (sd**2 * (1.0 - memory**2) * length_s) / (1.0 + memory**2 - 2.0 * turn.T)
@@ -91,7 +92,7 @@ class NoiseModel:
 
 
 def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel:
-    """Estimate the noise of each output from the residuals (m, O) of each run."""
+    """Estimate the noise of each output from the residuals (m, O) N·m of each run."""
     differences = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(one) for one in differences)
     if from_periods:
@@ -117,7 +118,7 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
 def _spectrum_of(
     series: Sequence[NDArray], rate_hz: float, band: tuple[float, float], pink: NDArray = PINK
 ) -> tuple[float, float, float]:
-    """Fit noise to series with NaN where they are not usable; return S0, tau and the pink share.
+    """Fit noise to series that are NaN where not usable; return S0, tau and the pink share.
 
     Maximum likelihood of the periodogram (Whittle, 1953, Arkiv för Matematik 2(23)).
     """
@@ -128,7 +129,7 @@ def _spectrum_of(
     alike = sizes <= UNLIKE * np.median(sizes)
     chosen = [piece for piece, is_alike in zip(pieces, alike, strict=True) if is_alike]
     frequency, power, share = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
-    # A band tells no correlation time that is longer than its slowest wave.
+    # A band does not determine a correlation time longer than its slowest wave.
     tried = CORRELATION_S[2.0 * np.pi * band[0] * CORRELATION_S <= 1.0]
     first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(tried, frequency)) ** 2)
     shapes = first[:, np.newaxis] + pink[:, np.newaxis] * PINK_HZ / frequency
@@ -142,7 +143,7 @@ Piece = tuple[NDArray, NDArray, NDArray]
 
 
 def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece]:
-    """Return each piece's spectrum within a band, as ``_of_piece`` gives it."""
+    """Return each piece's spectrum within a band, as of ``_of_piece``."""
     pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
     return [
         _of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST
@@ -150,12 +151,10 @@ def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
-    """Return one piece's frequencies (Hz), power densities, and the share of white noise left at
-    each.
+    """Return a piece's frequencies (Hz), power densities, and remaining shares of white noise.
 
-    Slow cosines are fitted and subtracted, or what is slow would leak into the band through gaps.
-    Through gaps they also take some of what is faster: of white noise the share that is left is
-    known.
+    Slow cosines are fitted and subtracted, because slow content leaks into the band through gaps.
+    They also remove some faster content; the share of white noise that remains is known.
     """
     known, n = np.isfinite(x), len(x)
     count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))

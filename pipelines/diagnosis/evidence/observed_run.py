@@ -1,8 +1,8 @@
-"""All runs as one linear regression: outputs, baseline columns, masks and folds.
+"""Represent all runs as one linear regression: outputs, baseline columns, masks and folds.
 
-An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about
-each joint that they exert on the person. The second pair is a second measurement of the human's
-share, and what separates causes in the drive or the structure from causes in the person.
+An *output* is one measured torque: each drive's and, with cuff forces, the torque about each joint
+that they exert on the person. The second pair is a second measurement of the human's share. It
+separates causes in the drive or the structure from causes in the person.
 """
 
 from dataclasses import dataclass
@@ -39,18 +39,19 @@ class Run:
     valid: NDArray
     """(m,) bool."""
     fold: NDArray
-    """(m,) number of the fold: whole periods, dealt out in turn."""
+    """(m,) number of the fold: whole periods, assigned in turn."""
     cutoff_hz: float | None = None
-    """Above which neither torque nor columns are looked at; None where all that blocks pass is."""
+    """Frequency above which neither torque nor columns are used; None where all that blocks pass
+    is."""
     fast: NDArray | None = None
     """(m, O) N·m of the torque that blocks pass and the cut-off does not."""
 
     def average(self, full_rate: NDArray) -> NDArray:
-        """Put (n, ...) at full rate behind the regression filter: (m, ...)."""
+        """Filter and average (n, ...) at full rate to blocks, (m, ...)."""
         return self.block.mean(self.slow(full_rate), self.starts)
 
     def slow(self, full_rate: NDArray) -> NDArray:
-        """Return what (n, ...) at full rate holds below the cut-off, where there is one."""
+        """Return (n, ...) at full rate without content above the cut-off, if there is one."""
         return (
             full_rate
             if self.cutoff_hz is None
@@ -58,12 +59,11 @@ class Run:
         )
 
     def with_fast(self, residual: NDArray) -> NDArray:
-        """Return what is left (m, O) with what is faster than the cut-off: no column foretells it,
-        and it may hum."""
+        """Return a residual (m, O) N·m plus the torque above the cut-off, which may hum."""
         return residual if self.fast is None else residual + self.fast
 
     def blocks_in(self, seconds: float) -> float:
-        """Return how many blocks last so long."""
+        """Return the number of blocks in some seconds."""
         return seconds * self.motion.sample_rate_hz / self.block.decimation
 
     @property
@@ -73,8 +73,7 @@ class Run:
         return passed if self.cutoff_hz is None else min(passed, self.cutoff_hz)
 
     def measured_at(self, link: Motion) -> NDArray:
-        """Return what was measured where the links move otherwise than the encoders say, (m, O)
-        N·m."""
+        """Return the torque measured if the links are not where the encoders say, (m, O) N·m."""
         if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
         cuffs = self.motion.cuff_torque(link.q)
@@ -89,8 +88,7 @@ class Run:
 
 
 def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
-    """Put one motion behind the regression filter, which may let nothing pass that is faster than a
-    cut-off."""
+    """Filter and average one motion to blocks, with a low-pass where a cut-off is given."""
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
@@ -111,7 +109,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     slow = whole if cutoff_hz is None else filtered(motion, whole, cutoff_hz)
     length = motion.period_s or FOLD_S
     number = np.floor(time / length + 1e-9).astype(int)
-    # A short run has no whole period for each fold: its stretches are dealt out instead.
+    # A short run has no whole period for each fold, so its stretches are assigned to folds instead.
     part = min(length, (time[-1] - time[0]) / FOLDS + 1e-6)
     return Run(
         motion=motion,

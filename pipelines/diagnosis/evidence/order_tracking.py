@@ -1,14 +1,14 @@
-"""Order tracking: lines of the residual torque over a joint's angle, and over time.
+"""Order tracking: find lines of the residual torque over a joint's angle, and over time.
 
-A gear's ripple is a line over the angle, at so many cycles a turn. Its frequency rises and falls
-with the joint's speed: no spectrum over time shows it, and at 200 cycles a turn it lies above all
-that block averages pass, so that the full sampling rate is needed. A hum is a line over time, which
-no spectrum over the angle shows. Both spectra are on one scale, that of ``line_spectrum`` (Fyfe,
-Munck, 1997, Mechanical Systems and Signal Processing 11(2): computed order tracking).
+A gear's ripple is a line over the angle, at a number of cycles a turn. Its frequency rises and
+falls with the joint's speed: no spectrum over time shows it. At 200 cycles a turn it lies above the
+band that block averages pass, so the full sampling rate is needed. A hum is a line over time, which
+no spectrum over the angle shows. Both spectra have the scale of ``line_spectrum`` (Fyfe, Munck,
+1997, Mechanical Systems and Signal Processing 11(2): computed order tracking).
 
-The strongest line of either kind is subtracted and the search repeated, so that a hum is no ripple
-and a ripple no hum, and no line hides another. All lines together are refined by steps of Gauss and
-Newton, and those stay that are significant beside all others.
+The strongest line of either kind is subtracted and the search repeated, so that hums, ripples and
+their neighbours are not mistaken for one another. All lines together are refined by Gauss and
+Newton's method. Those that are significant in addition to all others are kept.
 """
 
 from collections.abc import Sequence
@@ -31,22 +31,23 @@ from pipelines.effects.cogging import MOST_LINES, Cogging
 from pipelines.mechanics.motion import Motion
 
 LEAST_WAVES = 4.0
-"""Waves within the swept angles: with fewer a line is a smooth law of the angle."""
+"""Fewest waves within the swept angles: with fewer, a line is a smooth law of the angle."""
 FALSE_ALARMS = 0.005
 """Chance that a session of noise alone shows any line."""
 WORTH_A_TRIAL = 0.3
-"""Such a chance of a line that is tried: what others leave of the noise tells what it is worth."""
+"""Largest such chance of a line that is tried. Its significance is judged after the other lines are
+subtracted."""
 LEAST_HZ, SLOWEST_HZ = 1.0, 0.2
-"""Below the first, wandering is no hum; the second is the least that counts as slow."""
+"""Least frequency of a hum, below which torque wanders; least frequency that counts as slow, Hz."""
 APART = 1.5
-"""Widths between two lines of one kind."""
+"""Least distance between two lines of one kind, in widths."""
 LONGEST_STEP = 1.5
-"""Of a refinement, times that of Gauss and Newton."""
+"""Longest step of a refinement, as a multiple of Gauss and Newton's."""
 NEIGHBOURS, MUCH_WEAKER = 5.0, 0.05
 """A line within so many widths of a stronger one, with at most this share of its likelihood ratio,
 is a part of it."""
 LEAST_S = 2.0
-"""Of usable motion in a run, without which it is left out."""
+"""Least usable motion in a run that is searched, s."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +58,18 @@ class Line:
     cycles: float
     """Cycles a turn (rad/m where the joint slides), or Hz."""
     amplitude: float
-    """N·m, as the torque channel shows it; of a hum, the root mean square over runs."""
+    """N·m, as in the torque channel; of a hum, the root mean square over runs."""
     phase: float
-    """rad, of amplitude sin(n q + phase); NaN for a hum, whose phase each run has for itself."""
+    """rad, of amplitude sin(n q + phase); NaN for a hum, whose phase differs from run to run."""
     log_likelihood_ratio: float
-    """Of the line, beside all others, against noise of the same local colour."""
+    """Of the line, in addition to all others, against noise of the same local colour."""
     false_alarm: float
     """Chance that noise alone shows such a line anywhere in the session."""
 
 
 @dataclass(frozen=True)
 class JointLines:
-    """What one joint's residual shows."""
+    """The lines of one joint's residual."""
 
     lines: tuple[Line, ...]
     """The significant ones of both kinds, the strongest first."""
@@ -83,7 +84,7 @@ class JointLines:
 
 @dataclass(frozen=True)
 class Sinusoids:
-    """Lines of one kind as they were fitted to r runs."""
+    """Lines of one kind, as fitted to r runs."""
 
     kind: Kind
     cycles: NDArray
@@ -93,7 +94,7 @@ class Sinusoids:
 
     @classmethod
     def none(cls, kind: Kind, runs: int) -> "Sinusoids":
-        """Return no line."""
+        """Return an empty set of lines."""
         return cls(kind, np.zeros(0), np.zeros((runs, 0, 2)))
 
     def __len__(self) -> int:
@@ -101,7 +102,7 @@ class Sinusoids:
         return len(self.cycles)
 
     def with_one(self, cycles: float, amplitudes: NDArray) -> tuple["Sinusoids", "Sinusoids"]:
-        """Return the lines with one more, of no amplitude and of some, (r, 1, 2) N·m."""
+        """Return the lines and one more, with zero and with given amplitudes, (r, 1, 2) N·m."""
         more = replace(self, cycles=np.append(self.cycles, cycles))
         sizes = (np.zeros_like(amplitudes), amplitudes)
         without, with_it = (np.concatenate([self.amplitudes, size], axis=1) for size in sizes)
@@ -154,15 +155,15 @@ def lines_of(
     joints: Sequence[Sequence[Trace]],
     bounds: Sequence[tuple[float, float]] | None = None,
 ) -> list[JointLines]:
-    """Return the lines that each joint's residual holds over its angle and over time.
+    """Return the lines that each joint's residual has over its angle and over time.
 
     Parameters
     ----------
     joints : sequence of sequences of Trace
         For each joint its traces, one a run.
     bounds : sequence of (lowest, highest), optional
-        Cycles a turn between which to look at each joint, rad/m where it slides; unless given,
-        what is typical of cogging on an exoskeleton.
+        Range of cycles a turn to search at each joint, rad/m where it slides; by default, the
+        typical range of cogging on an exoskeleton.
 
     Returns
     -------
@@ -195,7 +196,7 @@ def _lines_of_joint(
         tried.append(place)
         lines = search.refined(search.added(lines, *place, channels))
         if search.repeats(lines, place[0]):
-            # What is left beside a line whose size or phase changes with speed is no other line.
+            # A line whose size or phase changes with speed leaves a residual next to it: no line.
             lines = search.refined([lines[0].without(-1), lines[1]])
         channels = search.remainder(lines)
         spectra = [search.spectrum(kind, channels) for kind in Kind]
@@ -259,7 +260,7 @@ def _strongest(
 
 
 def _peak(spectrum: Spectrum, at: int) -> float:
-    """Return where a parabola through a maximum and its neighbours is highest."""
+    """Return the summit of the parabola through a maximum and its neighbours."""
     if not 0 < at < len(spectrum.cycles) - 1:
         return float(spectrum.cycles[at])
     shift = _summit(*spectrum.log_likelihood_ratio[at - 1 : at + 2])
@@ -267,7 +268,7 @@ def _peak(spectrum: Spectrum, at: int) -> float:
 
 
 def _summit(before: float, here: float, after: float) -> float:
-    """Return where a parabola through three heights is highest, in steps from the middle one."""
+    """Return the summit of the parabola through three heights, in steps from the middle one."""
     bend = before - 2.0 * here + after
     return float(np.clip(0.5 * (before - after) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
 
@@ -283,7 +284,7 @@ class _Search:
         self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
 
     def remainder(self, lines: Sequence[Sinusoids]) -> list[Channel]:
-        """Return what lines leave of the residual in each run."""
+        """Return the residual in each run less the lines."""
         return [
             waves.grid.channel(waves.grid.residual - sum(kind.torque(waves, r) for kind in lines))
             for r, waves in enumerate(self.waves)
@@ -298,7 +299,7 @@ class _Search:
     def added(
         self, lines: Sequence[Sinusoids], kind: Kind, cycles: float, channels: Sequence[Channel]
     ) -> list[Sinusoids]:
-        """Return lines with one more, its amplitudes from the scores of what the others leave."""
+        """Return lines with one more; its amplitudes come from the scores of the residual."""
         if kind is Kind.TIME:
             cycles = self._sharpened(cycles, channels)
         products = np.array(
@@ -333,14 +334,14 @@ class _Search:
         return hz + step * _summit(*powers)
 
     def repeats(self, lines: Sequence[Sinusoids], kind: Kind) -> bool:
-        """Tell whether the last line over angle has come to lie beside another."""
+        """Return whether the last line over angle has moved next to another."""
         if kind is Kind.TIME:
             return False
         *others, last = lines[0].cycles
         return any(abs(last - other) < self.orders.width for other in others)
 
     def refined(self, lines: Sequence[Sinusoids]) -> list[Sinusoids]:
-        """Return lines after a step of Gauss and Newton, as long as their likelihood asks for."""
+        """Return lines after a step of Gauss and Newton, of the length of highest likelihood."""
         channels = self.remainder(lines)
         over_angle, over_time = lines
         ahead = (
@@ -355,7 +356,7 @@ class _Search:
         then: Sinusoids,
         channels: Sequence[Channel],
     ) -> Sinusoids:
-        """Return the likeliest lines on the way from some to others, however far they overshot."""
+        """Return the likeliest lines on the way from some lines to others, which may overshoot."""
         if not len(now):
             return now
         slope = bend = TINY
@@ -385,8 +386,8 @@ class _Search:
         spectra: Sequence[Spectrum],
         searches: int,
     ) -> tuple[Line, ...]:
-        """Return the lines that are significant beside all others, the strongest first."""
-        lines_made = []
+        """Return the lines that are significant in addition to all others, the strongest first."""
+        significant = []
         for known, spectrum in zip(lines, spectra, strict=True):
             level = spectrum.steep_level if len(known) else spectrum.level
             for number, cycles in enumerate(known.cycles):
@@ -399,17 +400,18 @@ class _Search:
                 size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
                 sine, cosine = amplitudes[0]
                 phase = float(np.arctan2(cosine, sine)) if known.kind is Kind.ANGLE else np.nan
-                lines_made.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
-        lines_made.sort(key=lambda line: -line.log_likelihood_ratio)
+                significant.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
+        significant.sort(key=lambda line: -line.log_likelihood_ratio)
         widths = {spectrum.kind: spectrum.width for spectrum in spectra}
-        alone = [
-            not _is_trace_of(line, lines_made[:i], widths) for i, line in enumerate(lines_made)
-        ]
-        return tuple(line for line, is_alone in zip(lines_made, alone, strict=True) if is_alone)
+        return tuple(
+            line
+            for i, line in enumerate(significant)
+            if not _is_trace_of(line, significant[:i], widths)
+        )
 
 
 def _is_trace_of(line: Line, stronger: Sequence[Line], widths: dict[Kind, float]) -> bool:
-    """Tell whether a line is what a stronger one leaves beside it when its size changes."""
+    """Return whether a line is the residual of a stronger one whose size changes."""
     return any(
         line.kind is other.kind
         and abs(line.cycles - other.cycles) < NEIGHBOURS * widths[line.kind]
@@ -424,7 +426,7 @@ def _step_over_angle(
     channels: Sequence[Channel],
     reach: float,
 ) -> Sinusoids:
-    """Return lines over angle after a step along amplitudes and orders, from what they leave.
+    """Return lines over angle after a step along amplitudes and orders.
 
     An order moves by ``reach`` at most.
     """
@@ -453,7 +455,7 @@ def _step_over_time(
     waves: Sequence[_Waves],
     channels: Sequence[Channel],
 ) -> Sinusoids:
-    """Return lines over time after such a step along their amplitudes in each run."""
+    """Return lines over time after a step along their amplitudes in each run."""
     if not len(lines):
         return lines
     amplitudes = lines.amplitudes.copy()

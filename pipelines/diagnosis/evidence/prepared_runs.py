@@ -1,4 +1,4 @@
-"""The searched runs under the baseline alone: what it leaves, and the noise in that."""
+"""Fit the baseline alone to the searched runs, and measure its residual and the noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.evidence.decision_band import DecisionBand
 from pipelines.diagnosis.evidence.gram import solve, weights_under
-from pipelines.diagnosis.evidence.model_error import telling_torque
+from pipelines.diagnosis.evidence.model_error import varying_torque
 from pipelines.diagnosis.evidence.noise_model import NoiseModel, noise_model
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.order_tracking import JointLines, lines_in
@@ -22,7 +22,7 @@ class Prepared:
     """Runs under the baseline alone: the training runs, or all runs where all are searched."""
 
     runs: tuple[Run, ...]
-    """With the loads that the baseline's rigid bodies make."""
+    """With joint loads computed from the baseline's rigid bodies."""
     baseline: Baseline
     columns: tuple[NDArray, ...]
     """(m, O, b) the baseline's columns in each run."""
@@ -34,14 +34,13 @@ class Prepared:
     torque: NDArray
     """(O,) N·m rms."""
     predicted: tuple[NDArray, ...]
-    """(n, J) N·m of each run: what the baseline predicts at the full sampling rate."""
+    """(n, J) N·m of each run: the baseline's prediction at the full sampling rate."""
     lines: tuple[JointLines, ...]
     """Of each joint's residual at the full sampling rate."""
 
     @property
     def slow_rms(self) -> NDArray:
-        """What the baseline leaves in the decision band, (O,) N·m rms; zero without such an
-        output."""
+        """Rms residual of the baseline in the decision band, (O,) N·m; zero for missing outputs."""
         squares, weight = np.zeros(len(self.torque)), np.zeros(len(self.torque))
         for run, residual in zip(self.runs, self.residuals, strict=True):
             band = DecisionBand.of(run)
@@ -51,12 +50,12 @@ class Prepared:
 
     @property
     def residuals(self) -> list[NDArray]:
-        """What the baseline leaves, (m, O) N·m of each run."""
+        """Measured torque less the baseline's, (m, O) N·m of each run."""
         return [r.measured - c @ self.values for r, c in zip(self.runs, self.columns, strict=True)]
 
 
 def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
-    """Fit the baseline alone and measure the noise of what it leaves."""
+    """Fit the baseline alone, and measure the noise of its residual."""
     columns = tuple(columns_under((), run, baseline)[0] for run in runs)
     gram = gram_of_runs(runs, columns)
     weights = weights_under(gram)
@@ -69,13 +68,13 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
     lines = lines_in(
         motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)]
     )
-    torque = telling_torque(runs)
+    torque = varying_torque(runs)
     return Prepared(
         laden, baseline, columns, values, weights, noise, torque, predicted, tuple(lines)
     )
 
 
 def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> tuple[NDArray, ...]:
-    """Return what the baseline predicts at the full sampling rate, (n, J) N·m of each run."""
+    """Return the baseline's prediction at the full sampling rate, (n, J) N·m of each run."""
     joints, model = len(baseline.joints), Model(baseline.terms)
     return tuple(model.regressor(run.motion, cuffs=True)[:, :joints] @ values for run in runs)

@@ -1,9 +1,9 @@
-"""Where the residual goes: its mean square split by what repeats, before any cause is looked for.
+"""Split the mean square residual by how it repeats, before any cause is sought.
 
 The excitation is a designed experiment: phases within periods, periods within runs, runs with and
-without a person. Products of residuals at the same phase of adjacent periods hold what repeats and
-no noise; the noise model tells the noise; what is left moves from period to period. A functional
-analysis of variance (Ramsay and Silverman, 2005, Functional Data Analysis, ch. 13).
+without a person. Products of residuals at the same phase of adjacent periods hold the part that
+repeats and no noise. The noise model gives the noise. The rest changes from period to period. This
+is a functional analysis of variance (Ramsay and Silverman, 2005, Functional Data Analysis, ch. 13).
 """
 
 from collections.abc import Sequence
@@ -27,18 +27,18 @@ class ResidualShares:
     """N·m in the decision band."""
     noise: float
     repeats: float | None
-    """With the motion, in every period alike; None where no period tells."""
+    """With the motion, in every period alike; None without a period."""
     wanders: float | None
-    """From period to period; None where no period tells."""
+    """From period to period; None without a period."""
     between_runs: float
-    """Constant within a run, and another in each run."""
+    """Constant within a run, and different from run to run."""
     unsplit: float
-    """More than noise, where no period tells whether it repeats; else zero."""
+    """More than noise, where no period shows whether it repeats; else zero."""
     with_person_only: float | None
-    """Part of what repeats that is there with a person only; None with one kind of run."""
+    """Part of the repeating share that is present with a person only; None with one kind of run."""
 
     def as_json(self) -> dict[str, float | None]:
-        """Return what ``router`` in the verdict says of a joint."""
+        """Return a joint's entry of ``router`` in the verdict."""
         return {
             "rms_nm": self.rms,
             "noise": self.noise,
@@ -53,7 +53,7 @@ class ResidualShares:
 def residual_shares(
     runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel
 ) -> list[ResidualShares]:
-    """Split the residuals (m, O) of each run, for each joint."""
+    """Split the residuals (m, O) N·m of each run, for each joint."""
     bands = [DecisionBand.of(run) for run in runs]
     averaged = [band.average(r) for band, r in zip(bands, residuals, strict=True)]
     joints = len(runs[0].motion.joints)

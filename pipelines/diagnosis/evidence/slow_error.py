@@ -1,9 +1,9 @@
-"""Residuals in the band where physics lives: below a few hertz.
+"""Compute residuals below a few hertz, the band of a machine's physics.
 
-The torque is averaged over 25 ms, the acceleration comes from a filter that lets 8 to 12 Hz pass.
-Between the two lies what the drive's control makes of counted angles: it repeats with the motion,
-is no missing physics, and no model of the motion can predict it. Whether error is systematic is
-therefore asked of longer averages.
+The torque is averaged over 25 ms, and the acceleration comes from a filter that passes 8 to 12 Hz.
+Between the two the torque holds the drive's response to counted angles. It repeats with the motion,
+but is no missing physics, and no model of the motion can predict it. So longer averages show
+whether an error is systematic.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ SLOW_S = 0.1
 
 @dataclass(frozen=True)
 class SlowError:
-    """Of each output, (O,) each; outputs that were not measured have an infinite floor."""
+    """Error of each output, (O,) each; outputs that were not measured have an infinite floor."""
 
     rms: NDArray
     """N·m."""
     floor: NDArray
-    """N·m, from what does not repeat."""
+    """N·m, from the part that does not repeat."""
     independent: NDArray
     """Independent samples."""
 
@@ -38,7 +38,7 @@ class SlowError:
 
 
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
-    """Return the error of residuals (m, O) in the slow band."""
+    """Return the error of residuals (m, O) N·m in the slow band."""
     slow = [slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     longer = [run for run, _ in slow]
     floor = noise_floor(longer, [residual for _, residual in slow])
@@ -46,8 +46,7 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     count = np.maximum(np.sum([run.usable.sum(axis=0) for run in longer], axis=0), 1)
     rms = np.sqrt(np.sum(squares, axis=0) / count)
     independent = count * floor.independent_share
-    # Where not even a second's worth of samples could be compared the floor is unknown: nothing is
-    # systematic.
+    # An unknown floor is infinite: without a second of comparable samples nothing is systematic.
     known = np.where(np.isfinite(floor.rms), floor.rms, np.inf)
     return SlowError(rms, known, independent)
 
@@ -55,8 +54,25 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
 def slowed(
     run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0
 ) -> tuple[Run, NDArray]:
-    """Average neighbouring blocks to a length, (m/k, O), where a share of them is usable; never
-    across a gap."""
+    """Average neighbouring blocks to a length, never across a gap.
+
+    Parameters
+    ----------
+    run : Run
+    residual : (m, O) array
+        N·m.
+    length_s : float, optional
+        Length of an average, s.
+    needed : float, optional
+        Share of its blocks that must be usable.
+
+    Returns
+    -------
+    Run
+        With the longer blocks.
+    (m/k, O) array
+        Averages, N·m.
+    """
     width = run.block.decimation / run.motion.sample_rate_hz
     k = max(1, round(length_s / width))
     whole = len(residual) // k * k

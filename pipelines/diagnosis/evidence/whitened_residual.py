@@ -1,8 +1,8 @@
-"""One joint's residual torque at the full sampling rate, weighted by its noise.
+"""Weight one joint's residual torque by its noise, at the full sampling rate.
 
 Slow content is removed. With S the spectrum of the noise, the score of a residual r is z = r / S,
-as generalized least squares asks for. The product of a line with z and the weight 1 / S at the
-line's own frequency are all that its likelihood needs, also where that frequency follows the speed.
+as in generalized least squares. The likelihood of a line needs only its product with z and the
+weight 1 / S at its own frequency, also where that frequency follows the speed.
 """
 
 from dataclasses import dataclass
@@ -17,11 +17,11 @@ from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.motion import Motion
 
 SEGMENT_S = 1.28
-"""Length of the segments whose spectra are averaged for the noise's."""
+"""Length of the segments whose spectra are averaged to the noise's, s."""
 SMOOTHED = 9
-"""Frequencies of that spectrum of which the median is taken, so that a hum does not hide itself."""
+"""Number of frequencies whose median is taken, so that a hum does not count as noise."""
 SPEEDS = 64
-"""Speeds that stand for all of a joint's: a line's frequency follows them."""
+"""Number of speeds that represent all of a joint's: a line's frequency follows them."""
 TINY = 1e-300
 """Keeps the division by a spectrum without power finite."""
 
@@ -75,11 +75,11 @@ class Grid:
     hz_per_order: NDArray
     """(u,) frequency of a line of one cycle a turn."""
     usual_hz_per_order: NDArray
-    """(``SPEEDS``,) such frequencies that stand for all."""
+    """(``SPEEDS``,) representative values of these frequencies."""
     residual: NDArray
     """(u,) N·m."""
     place: NDArray
-    """(u,) where the samples stand on the grid."""
+    """(u,) place of each sample on the grid."""
     mask: NDArray
     """(N,) 1 where a sample is usable, 0 elsewhere."""
     around: NDArray
@@ -93,7 +93,7 @@ class Grid:
 
     @classmethod
     def of(cls, trace: Trace, slow_hz: float) -> "Grid":
-        """Lay out a trace whose content below a frequency is slow."""
+        """Place a trace on a grid, with content below ``slow_hz`` as slow."""
         used = trace.usable
         hz_per_order = np.abs(trace.speed[used]) / (2.0 * np.pi)
         place = np.round((trace.time - trace.time[0]) * trace.rate_hz).astype(int)
@@ -134,11 +134,11 @@ class Grid:
 
 @dataclass(frozen=True)
 class Channel:
-    """What the likelihood of a line needs of a residual."""
+    """The score and weights of a residual, from which a line's likelihood follows."""
 
     grid: Grid
     gain: NDArray
-    """(k,) by which torque becomes score at each of the grid's frequencies, 1/(N·m)^2."""
+    """(k,) factor from torque to score at each of the grid's frequencies, 1/(N·m)²."""
     score: NDArray
     """(u,) of the residual, 1/(N·m)."""
 
@@ -152,13 +152,13 @@ class Channel:
         return filtered(self.grid.fast(torque), self.gain)[self.grid.place]
 
     def weight(self, hz: NDArray) -> NDArray:
-        """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)^2.
+        """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)².
 
-        Above half of the sampling rate a line is sampled as one below.
+        Above half of the sampling rate a line is aliased to a lower frequency.
         """
         rate = self.grid.rate_hz
         folded = np.abs((hz + 0.5 * rate) % rate - 0.5 * rate)
-        # The frequencies are equidistant, so that none needs to be searched for.
+        # The frequencies are equidistant, so places follow without a search.
         place = np.minimum(folded / self.grid.hz[1], len(self.weights) - 1.001)
         below = place.astype(int)
         share = place - below
@@ -166,15 +166,15 @@ class Channel:
 
 
 def filtered(x: NDArray, response: NDArray) -> NDArray:
-    """Return (N,) samples whose transform is multiplied by a response (k,)."""
+    """Return samples (N,) whose transform is multiplied by a response (k,)."""
     return np.asarray(fft.irfft(fft.rfft(x) * response, len(x)))
 
 
 def noise(x: NDArray, mask: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
-    """Return frequencies (k,) Hz, and the power of a sample of noise at them, (k,) (N·m)^2.
+    """Return frequencies (k,) Hz, and the power of a sample of noise at them, (k,) (N·m)².
 
     Spectra of half-overlapping segments are averaged (Welch, 1967, IEEE Trans. Audio and
-    Electroacoustics 15(2)), each by what of it is usable.
+    Electroacoustics 15(2)), weighted by their usable part.
     """
     length = min(len(x), max(32, round(SEGMENT_S * rate_hz)))
     window = np.hanning(length)

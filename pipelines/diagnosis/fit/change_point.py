@@ -1,11 +1,10 @@
-"""When something begins in a run: the one change in time that is sought exactly, and how far it is
-known.
+"""Find when an effect begins in a run, exactly, and with what uncertainty.
 
-What has begun acts as if it had always been there. So the squared error of every instant at once is
-made of two running sums: of what is left without it before, and with it after. That error grows
-with the distance from the instant and not with its square, so no curvature tells how far the
-instant is known; its ratio of likelihoods does, whatever the motion (Hansen, 2000, Econometrica
-68(3), theorem 2).
+After its onset an effect acts as if it had always been present. So the squared error of every
+instant is the sum of two running sums: the residual without the effect before, and with it after.
+That error grows with the distance from the instant, not with its square, so its curvature does not
+give the uncertainty. The ratio of likelihoods gives it, whatever the motion (Hansen, 2000,
+Econometrica 68(3), theorem 2).
 """
 
 from dataclasses import dataclass
@@ -18,40 +17,47 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.estimation.long_run import long_run_covariance
 
 ALIKE_S = 0.5
-"""How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are
-about 1 Hz."""
+"""Correlation time of model error, s. It depends on the motion, whose fastest parts are about 1
+Hz."""
 ALIKE = 4.0
-"""Weighted squared error within which two onsets explain a run alike."""
+"""Weighted squared error within which two onsets explain a run equally well."""
 CRITICAL = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
-"""Of the ratio of likelihoods: 7.35, below which the larger peak of two walks that drift down is in
-95 % of cases."""
+"""95 % quantile of the ratio of likelihoods, 7.35: that of the larger peak of two walks that drift
+down."""
 
 
 @dataclass(frozen=True)
 class Onset:
-    """Weighted squared error of a run for each instant at which something may begin in it."""
+    """Weighted squared error of a run for each instant at which an effect may begin."""
 
     instants: NDArray
     """(m + 1,) s: ``ALWAYS``, between each block and the next, ``NEVER``."""
     squares: NDArray
     """(m + 1,)."""
     pull: NDArray
-    """(m, O) 1/(N·m): what begins, weighed; nought where it was not learnt from."""
+    """(m, O) 1/(N·m): the weighted effect; zero where no sample is learnt from."""
     size: float
-    """Weighted square of all that it would do."""
+    """Weighted square of the whole effect."""
     inflation: float
-    """How much further an instant is in doubt than if every block were news: the long-run variance
-    of what noise adds to the difference of two instants' likelihoods, over its variance were the
-    noise white and as the weights say."""
+    """Variance inflation of the instant for correlated blocks: the long-run variance of the noise
+    in the difference of two instants' likelihoods, over that of white noise with the given
+    weights."""
 
     @classmethod
     def of(
         cls, run: Run, without: NDArray, throughout: NDArray, learnt: NDArray, weights: NDArray
     ) -> "Onset":
-        """Weigh what is left (m, O) where it never comes and where it was there throughout, on
-        ``learnt`` (m, O).
+        """Compute the squared errors of all instants from residuals without and with the effect.
 
-        ``weights`` (O,) are the outputs' inverse variances.
+        Parameters
+        ----------
+        run : Run
+        without, throughout : (m, O) arrays
+            Residuals where the effect never begins, and where it is always present, N·m.
+        learnt : (m, O) array of bool
+            Samples that are fitted.
+        weights : (O,) array
+            The outputs' inverse variances, 1/(N·m)².
         """
         before, after = (
             np.where(learnt, residual**2, 0.0) @ weights for residual in (without, throughout)
@@ -70,9 +76,9 @@ class Onset:
 
     @property
     def likeliest(self) -> float:
-        """The middle one of the instants that explain the run alike, s.
+        """The middle one of the instants that explain the run equally well, s.
 
-        What was there all along, or never, needs no coincidence, and is taken where chance may make
+        An effect that is always or never present is simpler, and is preferred where chance may make
         the difference.
         """
         doubt = CRITICAL * self.inflation
@@ -83,16 +89,18 @@ class Onset:
         return float(likely[len(likely) // 2])
 
     def interval(self, run: Run, misfit: NDArray) -> tuple[float, float]:
-        """Return the ends of the 95 % interval, s, no further than from the run's first block to
-        its last.
+        """Return the ends of the 95 % interval, s, from the run's first block to its last.
 
-        ``misfit`` (O,) N·m is what the model gets wrong with the motion, and so alike from block to
-        block.
+        Parameters
+        ----------
+        run : Run
+        misfit : (O,) array
+            Model error that depends on the motion, and so is correlated from block to block, N·m.
         """
         wrong = run.blocks_in(ALIKE_S) * float(np.sum((self.pull * misfit) ** 2))
         doubt = CRITICAL * (self.inflation + wrong / self.size) if self.size > 0.0 else np.inf
         held = np.flatnonzero(self.squares <= self.squares.min() + doubt)
-        # Where between two of these it began, no block tells.
+        # Between two of these instants no block shows when it began.
         ends = np.clip([held.min() - 1, held.max() + 1], 1, len(self.instants) - 2)
         low, high = self.instants[ends]
         return float(low), float(high)

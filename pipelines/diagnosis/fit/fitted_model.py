@@ -1,5 +1,4 @@
-"""A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells
-of."""
+"""Return a fit as a model for replays and control loops, the same as ``parameters.parquet``."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,9 +19,11 @@ from pipelines.model import Model, model_from_parameters
 
 
 def fitted_model(fit: Fit, baseline: Baseline, kind: str) -> Model:
-    """Return a fit as the model of a kind of run; what each run has for itself is as in the first
-    one fitted."""
-    # Nobody asks how sure the values are.
+    """Return a fit as the model of a kind of run.
+
+    Per-run values are those of the first run fitted.
+    """
+    # The intervals of these rows are not used, so any covariance will do.
     size = len(fit.values)
     frame, _ = parameter_rows.parameters(
         fit, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size))
@@ -31,7 +32,7 @@ def fitted_model(fit: Fit, baseline: Baseline, kind: str) -> Model:
 
 
 def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
-    """Return a fit as the model of one run, with the onsets and phases that it has for itself."""
+    """Return a fit as the model of one run, with its own onsets and phases."""
     model = fitted_model(fit, baseline, run.motion.run)
     if not any(cause.effect.per_run for cause in fit.causes):
         return model
@@ -42,11 +43,18 @@ def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
 def values_of_each_run(
     fit: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return what each run has for itself of the causes that have such values, by label, as
-    ``verdict.json`` tells.
+    """Return the per-run values of causes, by label, as entries of ``verdict.json``.
 
-    Those of the runs that were trained on are the fit's own, with its intervals; the others were
-    learnt from their runs, all else held, and have none.
+    Those of the training runs are the fit's own, with its intervals. Those of the others are fitted
+    to their runs, all else held, and have none.
+
+    Parameters
+    ----------
+    fit : Fit
+    baseline : Baseline
+    sure : Uncertainty
+        Of the fit.
+    train, validate : sequences of Run
     """
     values_of: dict[str, list[dict[str, Any]]] = {
         c.label: [] for c in fit.causes if c.effect.per_run
@@ -70,11 +78,9 @@ def values_of_each_run(
 def _stated_values(
     effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None
 ) -> dict[str, Any]:
-    """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a
-    verdict tells it.
+    """Return a run's own values (p,), and the ends (p, 2) of their intervals, as JSON objects.
 
-    An instant outside the run is none: what never came has no value, and what was there all along
-    came at its begin.
+    An effect that never began has no value; one that was always present began at zero.
     """
     own = {p.name: i for i, p in enumerate(effect.parameters) if p.per_run}
     came, values = values < NEVER, np.where(values <= ALWAYS, 0.0, values)

@@ -1,8 +1,8 @@
-"""What a model leaves of the validation runs, which no fit has seen.
+"""Compute a model's residuals on the validation runs, which no fit has seen.
 
-Shared parameters come from training. What is tied to wall time, an onset or a phase, or set anew at
-each start, each validation run fits for itself: on one half of its seconds to be scored on the
-other, and the other way round.
+Shared parameters come from training. Per-run parameters (an onset, a phase, a zero set at each
+start) are fitted to each validation run: on one half of its seconds to be scored on the other, and
+the other way round.
 """
 
 from collections.abc import Sequence
@@ -20,16 +20,16 @@ from pipelines.diagnosis.fit.joint_fit import Fit, laden, step_of
 from pipelines.model import Model, Term
 
 STRETCH_S = 1.0
-"""Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
+"""Length of the stretches of a run that alternate between the two halves, s."""
 ROUNDS = 2
-"""How often onsets are sought and all else fitted anew, for each is found with the others held."""
+"""Rounds in which onsets are sought and all else is fitted again, as each is found with the others
+held."""
 NEWTON_STEPS = 3
-"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear
-in."""
+"""Steps of Gauss and Newton along per-run shapes, in which the torque is nearly linear."""
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
-    """Return the residuals (m, O) of each run under a model fitted elsewhere."""
+    """Return the residuals (m, O) N·m of each run under a model fitted elsewhere."""
     return [_residual(fit, run, baseline) for run in laden(runs, fit, baseline)]
 
 
@@ -49,9 +49,9 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
 
 
 def _halves(run: Run) -> NDArray:
-    """Deal the blocks out to two halves, second by second: an onset is as well known as that.
+    """Assign the blocks to two halves, second by second, in Thue and Morse's order.
 
-    In Thue and Morse's order, which no rhythm shares.
+    No rhythm shares that order. An onset is known to about a second.
     """
     return np.bitwise_count(np.floor((run.time - run.time[0]) / STRETCH_S).astype(np.int64)) % 2
 
@@ -71,8 +71,7 @@ Learnt = tuple[NDArray, NDArray, list[Term]]
 
 
 def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
-    """Fit the run's own onsets, phases and bends to those samples that are to be learnt from, (m,
-    O)."""
+    """Fit the run's own onsets, phases and shapes to the samples ``learnt``, (m, O)."""
     begins = [
         (number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None
     ]
@@ -104,7 +103,7 @@ def _begun(
 def _learn_amplitudes(
     fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray
 ) -> Learnt:
-    """Fit the run's own amplitudes and bends to samples (m, O)."""
+    """Fit the run's own amplitudes and shapes to samples (m, O)."""
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     bent, (columns, measured) = _bent(
         fit, terms, run, baseline, columns_under(terms, run, baseline), learnt
@@ -122,10 +121,10 @@ def _bent(
     plain: tuple[NDArray, NDArray],
     learnt: NDArray,
 ) -> tuple[list[Term], tuple[NDArray, NDArray]]:
-    """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and
-    columns under them.
+    """Fit per-run shapes that transform the motion to some samples, (m, O).
 
-    By Gauss and Newton's steps; ``plain`` are the columns and torques under the terms as given.
+    Return the terms, and the columns under them, after steps of Gauss and Newton; ``plain`` are the
+    columns and torques under the terms as given.
     """
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     places = [
@@ -146,8 +145,7 @@ def _bent(
 
 
 def _solved(columns: NDArray, target: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
-    """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O)
-    where it is learnt."""
+    """Return the amplitudes (k,) of columns (m, O, k) that fit a target (m, O) where learnt."""
     root = np.sqrt(weights) * learnt
     A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
     return np.asarray(np.linalg.lstsq(A, (target * root).ravel(), rcond=1e-9)[0])
@@ -162,7 +160,7 @@ def _slope(
     baseline: Baseline,
     plain: tuple[NDArray, NDArray],
 ) -> NDArray:
-    """Return the column (m, O, 1) of a shape of one term, as ``fit.slope`` does of all runs."""
+    """Return the column (m, O, 1) of a shape of one term, as ``joint_fit.slope`` of all runs."""
     number, i = place
     step = step_of(fit.causes[number], i)
     ahead, read = columns_under(
@@ -173,5 +171,5 @@ def _slope(
 
 
 def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
-    """Return the terms with another shape of one of them."""
+    """Return the terms with a new shape of one of them."""
     return [term.with_shape(i, value) if k == number else term for k, term in enumerate(terms)]

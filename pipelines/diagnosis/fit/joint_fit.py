@@ -1,4 +1,4 @@
-"""The extended model: baseline and causes fitted together, at given shapes."""
+"""Fit the extended model, baseline and causes together, at given shapes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from pipelines.effects import Side
 from pipelines.model import ParameterLayout, TermColumns
 
 STEP = 0.01
-"""Of a difference along a shape parameter, as a share of its typical range."""
+"""Step of a difference along a shape parameter, as a share of its typical range."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class Fit:
     weights: NDArray
     """(O,) inverse variances under this fit."""
     rms: NDArray
-    """(O,) N·m on what was fitted."""
+    """(O,) N·m on the fitted samples."""
     cost: float
-    """Sum over outputs of samples times log rms: what refinement lowers."""
+    """Sum over outputs of samples times log rms, which refinement minimises."""
     layout: ParameterLayout
     """Of the values: the baseline's terms, then the causes."""
     loads: NDArray | None = None
-    """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those
-    the runs came with."""
+    """Values (size + ...,) from whose bodies the joint loads were computed again; None if
+    unchanged."""
 
     def instead(self, number: int, cause: Candidate) -> list[Candidate]:
-        """Return the causes with another in the place of one."""
+        """Return the causes with one replaced by another."""
         return [cause if k == number else c for k, c in enumerate(self.causes)]
 
     def columns_of(self, number: int) -> TermColumns:
@@ -54,10 +54,22 @@ def fit(
     weights: NDArray,
     loads: NDArray | None = None,
 ) -> Fit:
-    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that
-    ``Fit.loads`` tells of.
+    """Fit baseline and causes at their shapes.
 
-    ``weights`` (O,) are the outputs' inverse variances.
+    Parameters
+    ----------
+    causes : sequence of Candidate
+    runs : sequence of Run
+        With joint loads computed from ``loads``.
+    baseline : Baseline
+    weights : (O,) array
+        The outputs' inverse variances, 1/(N·m)².
+    loads : array, optional
+        As of ``Fit.loads``.
+
+    Returns
+    -------
+    Fit
     """
     causes = tuple(sorted(causes, key=_last_sensors))
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
@@ -67,7 +79,7 @@ def fit(
 
 
 def laden(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
-    """Return runs with the loads that a fit is for."""
+    """Return runs with the joint loads of a fit."""
     return (
         list(runs)
         if fitted.loads is None
@@ -76,7 +88,7 @@ def laden(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
 
 
 def residuals_on(fitted: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
-    """Return what a fit leaves of each run that it was made on, (m, O) N·m."""
+    """Return a fit's residuals on each run that it was fitted to, (m, O) N·m."""
     columns = stacked_columns(fitted.causes, laden(runs, fitted, baseline), baseline)
     return [measured - c @ fitted.values for c, measured in columns]
 
@@ -96,8 +108,10 @@ def _layout(
 def stacked_columns(
     causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 ) -> list[tuple[NDArray, NDArray]]:
-    """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in
-    places of their own."""
+    """Return columns (m, O, c) and measured torque (m, O) N·m of each run.
+
+    Per-run parameters have columns of their own.
+    """
     layout = _layout(causes, runs, baseline)
     of_runs = (
         columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)
@@ -117,8 +131,7 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
 def onsets_of(
     fitted: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline
 ) -> list[Onset]:
-    """Return for each run when a cause may begin in it by its shape parameter ``i``, all else as it
-    was fitted."""
+    """Return for each run when a cause may begin, by its shape ``i``, all else held."""
     ends = [
         fitted.instead(number, fitted.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)
     ]
@@ -142,10 +155,17 @@ def slope(
     baseline: Baseline,
     plain: Sequence[tuple[NDArray, NDArray]],
 ) -> list[NDArray]:
-    """Return what a shape does to the prediction, per unit of it, (m, O) of each run.
+    """Return the change of the prediction by a shape, per unit of it, (m, O) of each run.
 
-    ``place`` is (cause, shape parameter, run), run -1 for all; ``plain`` are the fit's own columns
-    and torques.
+    Parameters
+    ----------
+    fitted : Fit
+    place : (cause, shape parameter, run)
+        Run -1 for all.
+    runs : sequence of Run
+    baseline : Baseline
+    plain : sequence of ((m, O, c) array, (m, O) array)
+        The fit's own columns and torques.
     """
     number, i, run = place
     cause = fitted.causes[number]
@@ -159,7 +179,6 @@ def slope(
 
 
 def step_of(cause: Candidate, i: int, run: int = 0) -> float:
-    """Return the step of a difference along a shape parameter, as large as in one run its value
-    asks for."""
+    """Return the step of a difference along a shape parameter, scaled to its value in a run."""
     low, high = cause.effect.shape[i].typical
     return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)

@@ -1,7 +1,7 @@
-"""All shapes of a set of causes refined together, at the full rate: Gauss and Newton's method.
+"""Refine all shapes of a set of causes together, at full rate, by Gauss and Newton's method.
 
 Each step solves for amplitudes and shapes at once, along the slopes of the prediction, and is
-halved until it lowers the cost. Instants at which something begins are found exactly in between.
+halved until it lowers the cost. Onsets are found exactly between steps.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacked_columns
 
 ROUNDS = 3
-"""Rounds in which loads follow the rigid bodies that they are of."""
+"""Rounds in which joint loads are computed again from the refitted rigid bodies."""
 SETTLING = 5
-"""Steps in which rigid bodies come to rest at given shapes, each half way to the refitted ones."""
+"""Steps in which rigid bodies converge at given shapes, each half way to the refitted ones."""
 STEPS = 3
 """Steps of a round."""
 HALVINGS = 3
@@ -36,15 +36,15 @@ class Refinement:
     """Refines the shapes of one set of causes on the training runs."""
 
     def __init__(self, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> None:
-        """Prepare; ``weights`` (O,) are the outputs' inverse variances."""
+        """Prepare; ``weights`` (O,) are the outputs' inverse variances, 1/(N·m)²."""
         self._runs, self._baseline, self._weights = runs, baseline, weights
 
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit with every shape at its best.
 
-        A load that swings is simulated with the rigid bodies that the fit itself finds. Where these
-        come to no rest, and the cause would do harm, it is simulated with those that the library
-        had: the fit may then predict other runs badly.
+        A swinging load is simulated with the rigid bodies of the fit itself. Where these do not
+        converge, and the cause would do harm, it is simulated with those of the library: the fit
+        may then predict other runs badly.
         """
         start = self._start(causes)
         still = [cause for cause in causes if not cause.effect.swings]
@@ -55,7 +55,7 @@ class Refinement:
         return self._refined(start)
 
     def _at_rest(self, best: Fit) -> Fit:
-        """Return the fit at the same shapes with loads of its own rigid bodies."""
+        """Return the fit at the same shapes with joint loads of its own rigid bodies."""
         for _ in range(SETTLING):
             loads = self._loads_after(best)
             best = self._fit(best.causes, self._laden(loads), loads)
@@ -65,7 +65,7 @@ class Refinement:
         """Return the best fit of some rounds from a start."""
         fits = [best]
         for _ in range(ROUNDS if best.causes else 0):
-            # The bodies of the fit before were biased by what was missing, and so were the loads.
+            # Without this cause the fit's bodies were biased, and so were the loads.
             loads = self._loads_after(best)
             runs = self._laden(loads)
             start = self._fit(best.causes, runs, loads)
@@ -77,8 +77,7 @@ class Refinement:
         return min(fits, key=lambda one: one.cost)
 
     def _start(self, causes: Sequence[Candidate]) -> Fit:
-        """Return the fit of the shapes as they are, with the rigid bodies with which the library
-        simulated them."""
+        """Return the fit of the shapes as they are, with the library's rigid bodies."""
         bodies = next((cause.bodies for cause in causes if cause.bodies), None)
         if bodies is None:
             return self._fit(causes, self._runs, None)
@@ -86,8 +85,7 @@ class Refinement:
         return self._fit(causes, self._laden(loads), loads)
 
     def _loads_after(self, best: Fit) -> NDArray:
-        """Return the baseline values (size,) whose rigid bodies make the loads of the round after a
-        fit."""
+        """Return baseline values (size,) whose bodies make the loads of the next round."""
         size = self._baseline.size
         return relaxed(best.values[:size], None if best.loads is None else best.loads[:size])
 
@@ -103,7 +101,7 @@ class Refinement:
         return self._stepped(self._forms(best, runs), runs)
 
     def _stepped(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the fit after a few steps of its shapes at the forms that it has."""
+        """Return the fit after a few steps of its shapes, its forms unchanged."""
         for _ in range(STEPS):
             best = self._onsets(best, runs)
             ahead = self._step(best, runs)
@@ -113,11 +111,10 @@ class Refinement:
         return best
 
     def _forms(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the best fit of all that change the form of one cause, shapes refined at each
-        form.
+        """Return the best fit of all that change the form of one cause, shapes refined.
 
         The library chose forms at the rate of the decision band, and a transmission's is always
-        straight: with the other causes, and in shorter blocks, another form may be the best.
+        straight. With the other causes, and in shorter blocks, another form may be the best.
         """
         tried = [best]
         for number, cause in enumerate(best.causes):
@@ -131,7 +128,7 @@ class Refinement:
         return min(tried, key=lambda one: one.cost)
 
     def _onsets(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Move instants at which causes begin to where they explain most, all else held."""
+        """Move onsets to the instants at which they explain most, all else held."""
         for number, cause in enumerate(best.causes):
             if (i := cause.onset) is None:
                 continue
@@ -146,7 +143,7 @@ class Refinement:
         return best
 
     def _step(self, best: Fit, runs: Sequence[Run]) -> Fit | None:
-        """Return the fit after one step that lowers the cost; None where there is none."""
+        """Return the fit after one step that lowers the cost; None if no step does."""
         places = self._places(best)
         if not places:
             return None
@@ -168,7 +165,7 @@ class Refinement:
         return None
 
     def _places(self, fitted: Fit) -> list[Place]:
-        """Return the free shapes: of a cause that bends each run in its own way, one of each."""
+        """Return the free shapes; a per-run shape has one for each run."""
         places: list[Place] = []
         for number, cause in enumerate(fitted.causes):
             for i, unit in free_shapes(cause):
@@ -181,9 +178,9 @@ class Refinement:
 def _moved(
     causes: Sequence[Candidate], places: Sequence[Place], steps: NDArray, runs: Sequence[Run]
 ) -> list[Candidate]:
-    """Return the causes after steps of their shapes, each in its own unit, not in units of change.
+    """Return the causes after steps of their shapes, in units of the shapes.
 
-    No step goes to waves so long that the runs do not tell them from a law of the angle.
+    No wave becomes longer than the runs can separate from a law of the angle.
     """
     moved = list(causes)
     for (number, i, run, unit), step in zip(places, steps, strict=True):

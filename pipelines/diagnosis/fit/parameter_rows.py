@@ -1,5 +1,4 @@
-"""The tables a diagnosis writes: parameters of the extended model, residuals before and after,
-candidates."""
+"""Build the tables of a diagnosis: parameters of the extended model, and residuals."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -23,7 +22,7 @@ from pipelines.estimation.parameter_table import Row, interval, rows_of, table_o
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
     """Return ``parameters/1`` of a fit, p rows, and their covariance (p, p).
 
-    A rigid body for each kind of run, and the human's.
+    There is a rigid body for each kind of run, and the human's.
     """
     units = np.eye(len(sure.covariance))
     values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
@@ -52,8 +51,10 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
 
 
 def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:
-    """Return the ends of the interval of the instant at which a cause begins in a run, by its place
-    among the cause's parameters; nothing where it has none."""
+    """Return the interval of a cause's onset in a run, by its place among the parameters.
+
+    The result is empty for a cause without an onset.
+    """
     linear = len(fit.causes[number].effect.linear)
     return {
         linear + i: ends
@@ -63,8 +64,10 @@ def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tup
 
 
 def _bodies(baseline: Baseline) -> dict[str, NDArray]:
-    """Return the columns of the rigid bodies, (bodies, parameters), whose sum each row of a body
-    tells of."""
+    """Return the columns of the rigid bodies, (bodies, parameters).
+
+    Each row of a body is the sum of its columns.
+    """
     layout = baseline.layout
     if len(layout.bodies) == 1:
         return {baseline.kinds[0]: layout.bodies_in(baseline.kinds[0])}
@@ -73,10 +76,9 @@ def _bodies(baseline: Baseline) -> dict[str, NDArray]:
 
 
 def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's fitted values in a run that it was fitted to and acts in, (p,), and their
-    slopes.
+    """Return a cause's fitted values in a run that it acts in, (p,), and their slopes.
 
-    The slopes, (p, size), are how they change with what the covariance is of.
+    The slopes, (p, size), are derivatives by the parameters of the covariance.
     """
     cause, columns = fit.causes[number], fit.columns_of(number)
     linear = len(cause.effect.linear)
@@ -90,8 +92,7 @@ def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray
 
 
 def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their
-    intervals, (p, 2)."""
+    """Return a cause's parameters in a run, (p,), and the ends of their intervals, (p, 2)."""
     effect = fit.causes[number].effect
     fitted, fitted_slopes = _in_run(fit, sure, number, run)
     values, slopes = effect.physical(fitted), effect.jacobian(fitted) @ fitted_slopes
@@ -104,7 +105,7 @@ def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[N
 
 
 def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
-    """Return a run's rows of ``residuals/1`` for what a model leaves of it, (m, O) N·m."""
+    """Return a run's rows of ``residuals/1`` for a model's residual, (m, O) N·m."""
     joints = joints_of(run.motion.metadata)
     J = len(joints)
     columns: dict[str, Any] = {

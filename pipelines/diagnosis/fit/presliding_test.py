@@ -1,11 +1,10 @@
-"""What the verdict leaves out: whether friction turns round at once where a joint does, or builds
-up over a travel.
+"""Test whether a joint's friction reverses at once, or builds up over a travel.
 
-A faultless joint with dry friction may stand at a reversal while the torque swings; one whose
-friction is elastic gives way all along. The torque of the two is alike, their angles are not: of
-the first nothing moves while friction changes sides, of the second the encoder tells the travel
-over which it does. So the model's own Coulomb friction is put on its other side at once, late, over
-a range of speeds and over a travel, and each is held against the torque there.
+No fit uses these samples. A faultless joint with dry friction may stand at a reversal while the
+torque changes; one whose friction is elastic yields all along. Their torques are alike, their
+angles are not: the first does not move while friction changes sides, and the encoder shows the
+travel of the second. So the model's own Coulomb friction is reversed at once, late, over a range of
+speeds and over a travel, and each is compared with the torque there.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,29 +28,31 @@ from pipelines.model import Model
 from pipelines.signals.blocks import dilate
 
 NEAR_S = 0.12
-"""About a reversal: as long as a low-pass of ``CUTOFF_HZ`` feels what happens there."""
+"""Half width of a reversal's neighbourhood, s: the memory of a low-pass of ``CUTOFF_HZ``."""
 SHORTEST, LONGEST = 2e-5, 0.01
-"""rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more
-shows away from reversals too."""
+"""Range of travels, rad, on an exoskeleton's scale. A shorter travel is at once; a longer one shows
+away from reversals too."""
 TRAVELS = 16
 """Number of travels tried between ``SHORTEST`` and ``LONGEST``."""
 SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
-"""rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
+"""Speeds, rad/s, on an exoskeleton's scale, within which friction that depends on speed
+reverses."""
 LATE_S = (0.02, 0.04, 0.06)
-"""After the reversal, as far as ``time_delay`` goes: friction does so where a torque is read late,
-and nobody knows."""
+"""Delays after the reversal, as far as ``time_delay`` goes, s. Friction is late where the torque is
+read late."""
 ROUNDING = 1e-9
 """Share of the largest angle below which a step between two readings is rounding."""
 TAKEN = 0.2
-"""Share of the error's power about reversals that a travel must take beyond what speed or a delay
-takes."""
+"""Share of the error's power near reversals that a travel must explain in addition to speed or
+delay."""
 NEEDED = 6.0
 """Log likelihood that a travel must gain over the best way without one."""
 COUNTS = 2
-"""Of the encoder: over a shorter travel friction changes sides between two readings."""
+"""Shortest travel in counts of the encoder: over a shorter one friction changes sides between two
+readings."""
 GIVES = (PreslidingHysteresis, Backlash, JointElasticity)
-"""Causes by which friction changes sides over a travel of the angle as it is read; where one is
-named, that is told."""
+"""Causes by which friction changes sides over a travel of the measured angle. A joint with such a
+named cause is not tested."""
 
 
 @dataclass(frozen=True)
@@ -60,27 +61,27 @@ class BuildUp:
 
     joint: str
     travel: float
-    """rad, m at a prismatic joint: that over which 63 % of it change sides."""
+    """rad, m at a prismatic joint: the travel over which 63 % of it changes sides."""
     at_once: float
     otherwise: float
     over_travel: float
-    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what friction leaves
-    that changes sides at once, in the best way that is no travel, and over it."""
+    """N·m rms near reversals of the validation runs, below ``CUTOFF_HZ``: the residual of friction
+    that changes sides at once, in the best way without a travel, and over it."""
 
 
 @dataclass(frozen=True)
 class _About:
-    """A run about the reversals of a joint."""
+    """A run near the reversals of a joint."""
 
     motion: Motion
     model: Model
     j: int
     read: NDArray
-    """(n,) the joint's angle as its encoder gave it."""
+    """(n,) the joint's angle as measured by its encoder."""
     speed: NDArray
     """(n,)."""
     rest: NDArray
-    """(n,) N·m measured less what the model tells without Coulomb friction, below the cut-off."""
+    """(n,) N·m measured less the model's torque without Coulomb friction, below the cut-off."""
     level: float
     """N·m of Coulomb friction."""
     near: NDArray
@@ -92,15 +93,17 @@ class _About:
 
     @classmethod
     def of(cls, motion: Motion, model: Model, baseline: Baseline, j: int) -> "_About | None":
-        """Return None where the angle as read is not known, nor the motion at 5 Hz, or the joint
-        never turns round."""
+        """Prepare a run; return None if its reversals show nothing.
+
+        They show nothing without measured angles or Coulomb friction, or without motion above the
+        cut-off.
+        """
         label = Friction(baseline.joints[j], on=baseline.machine).label
         coulomb = [
             (effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters
         ]
         level, near = float(model.linear_values[coulomb].sum()), _near(motion, j)
-        # A motion that was filtered as low as the torque is here lacks some of what its torque
-        # holds.
+        # A motion that is filtered as low as the torque here lacks a part that its torque has.
         if (
             motion.measured_angle is None
             or motion.cutoff_hz <= CUTOFF_HZ
@@ -116,7 +119,7 @@ class _About:
         return cls(motion, model, j, read, speed, rest, level, near)
 
     def remainder(self, side: "Side") -> NDArray:
-        """Return what friction on that side leaves about reversals, (near,) N·m."""
+        """Return the residual near reversals with friction on that side, (near,) N·m."""
         column = np.zeros((*self.motion.q.shape, 1))
         column[:, self.j, 0] = self.level * side(self)
         seen = self.model.observed(column, self.motion)[:, self.j, 0]
@@ -124,8 +127,7 @@ class _About:
 
 
 def _near(motion: Motion, j: int) -> NDArray:
-    """Tell which samples are about a joint's reversals and can be trusted below the cut-off, (n,)
-    bool."""
+    """Return the valid samples near a joint's reversals, (n,) bool."""
     about = dilate(turns(motion)[:, j], round(NEAR_S * motion.sample_rate_hz))
     return np.asarray(about & motion.valid & ~unsure(motion, CUTOFF_HZ))
 
@@ -137,10 +139,18 @@ Side = Callable[[_About], NDArray]
 def built_up(
     fit: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
 ) -> list[BuildUp]:
-    """Return the joints whose friction builds up; the travel is told by the runs to train on, and
-    the others judge."""
+    """Return the joints whose friction builds up over a travel.
+
+    The training runs determine the travel, and the validation runs confirm it.
+
+    Parameters
+    ----------
+    fit : Fit
+    baseline : Baseline
+    train, validate : sequences of Run
+    """
     known = {cause.label for cause in fit.causes}
-    # Once: what a run has for itself is learnt for that.
+    # Once for all joints: per-run values are fitted for each model.
     runs = [
         [(run.motion, model_of_run(fit, baseline, run)) for run in some]
         for some in (train, validate)
@@ -171,10 +181,10 @@ def _of_joint(
     over = [_side_over(0.5 * count, travel) for travel in travels]
     best, trained = _best(train, over)
     if best in (0, TRAVELS - 1):
-        # At once, as far as the encoder tells, or over more than what is about a reversal.
+        # At once, within the encoder's resolution, or over more than a reversal's neighbourhood.
         return None
     by_speed = [_side_by_speed(speed * scale.speed) for speed in SPEEDS]
-    # At once by the angle as it was read, too: what that alone gains is not the travel's.
+    # At once by the measured angle is a rival too: its gain is not the travel's.
     as_read = _side_over(0.5 * count, SHORTEST * scale.travel)
     rivals = [_side_at_once, as_read, *by_speed, *map(_side_late, LATE_S)]
     beaten, otherwise = (_best(some, rivals)[1] for some in (train, validate))
@@ -191,7 +201,7 @@ def _of_joint(
 
 
 def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:
-    """Return which side leaves the least power, and how much."""
+    """Return the side with the least remaining power, and that power."""
     powers = [_power(some, side) for side in sides]
     return int(np.argmin(powers)), min(powers)
 
@@ -219,7 +229,7 @@ def _side_over(grain: float, travel: float) -> Side:
 
 
 def _count(angle: NDArray) -> float:
-    """Return the smallest step of an angle as it was read, but for rounding."""
+    """Return the smallest step of a measured angle above rounding."""
     read = angle[np.isfinite(angle)]
     steps = np.abs(np.diff(read))
     return float(np.min(steps[steps > ROUNDING * np.abs(read).max(initial=0.0)], initial=np.inf))
@@ -227,11 +237,10 @@ def _count(angle: NDArray) -> float:
 
 @njit(cache=True)
 def dahl(angle: NDArray, grain: float, travel: float) -> NDArray:
-    """Return Dahl's friction along an angle (n,), from -1 to 1: it goes with the travel, whatever
-    the time it takes.
+    """Return Dahl's friction along an angle (n,), from -1 to 1, (n,).
 
-    An encoder that flickers by less than ``grain`` has not moved. Dahl (1976), AIAA Journal 14(12),
-    eq. 4, exponent 1.
+    It depends on the travel, not on time. An encoder that flickers by less than ``grain`` has not
+    moved. Dahl (1976), AIAA Journal 14(12), eq. 4, exponent 1.
     """
     out = np.zeros(len(angle))
     at, z = angle[0], 0.0

@@ -1,4 +1,4 @@
-"""How far simulations of 1 s drift from the recorded angles."""
+"""Measure how far simulations of 1 s drift from the recorded angles."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,9 @@ from pipelines.errors import ExoidError
 
 
 def simulation_error(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArray | None:
-    """Return the rms angle error of 1 s simulations, one after the other, over all runs, (J,) rad.
+    """Return the rms angle error of consecutive 1 s simulations over all runs, (J,) rad.
 
-    None where the forward dynamics cannot hold the fitted model, or runs away.
+    None where the forward dynamics cannot simulate the fitted model, or diverge.
     """
     squares, count = 0.0, 0
     for run in runs:

@@ -1,5 +1,7 @@
-"""Intervals of an extended model's parameters, shapes included, that survive autocorrelation and
-small misfit."""
+"""Compute intervals of an extended model's parameters and shapes.
+
+They remain valid with autocorrelated noise and small model error.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +20,8 @@ from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stac
 from pipelines.estimation.long_run import long_run_covariance
 
 RECURRENCE_S = 10.0
-"""Time after which a motion without a period is taken to pass through the same states again, s."""
+"""Time after which a motion without a period is assumed to pass through the same states again,
+s."""
 
 
 @dataclass(frozen=True)
@@ -28,22 +31,21 @@ class Uncertainty:
     covariance: NDArray
     critical: float
     shapes: tuple[tuple[int, int, int], ...]
-    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where
-    shared. First those that are fitted, then those that were chosen among forms."""
+    """(cause, shape parameter, run) of each shape after the linear values; run -1 where shared.
+    First those that are fitted, then those that were chosen among forms."""
     normal: NDArray
-    """Weighted normal matrix of the same parameters in the same order: what collinearity is read
-    from."""
+    """Weighted normal matrix of the same parameters in the same order, from which collinearity is
+    computed."""
     onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
-    """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval,
-    s."""
+    """The ends of the 95 % interval of each shape that is an onset, s."""
 
     def includes_zero(self, values: NDArray, amplitudes: slice) -> bool:
-        """Tell whether the joint 95 % region of some amplitudes includes zero (Wald's test).
+        """Return whether the joint 95 % region of some amplitudes includes zero (Wald's test).
 
         Parameters
         ----------
-        values : NDArray
-            (p,) linear values of the fit.
+        values : (p,) array
+            Linear values of the fit.
         amplitudes : slice
             Places of the amplitudes among them.
 
@@ -62,16 +64,26 @@ class Uncertainty:
 def uncertainty(
     fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray
 ) -> Uncertainty:
-    """Linearise about a fit: its columns, and what a step in each free shape does to the
-    prediction.
+    """Return the covariance of a fit, linearised in its columns and its free shapes.
 
-    Two errors add: noise, and model error, which is what is left of slow error, at the least what
-    no model of a good rig gets right, ``imperfect`` (O,) N·m rms. Model error is small, but it is
-    correlated over half a second and repeats in every period, so more data do not average it out.
-    Shapes that are not fitted but taken at a usual value may be anywhere in their typical range. Of
-    a shape that was chosen among a few forms, as an exponent, what is between them is as likely:
-    data and typical range tell how far from the form it may be. When something begins is known so
-    much better than how large it is that neither makes the other less sure.
+    Two errors add: noise, and model error. Model error is the remaining slow error, at least
+    ``imperfect``. It is small, but it is correlated over half a second and repeats in every period,
+    so more data do not average it out. Shapes that are held at a default may be anywhere in their
+    typical range. A shape that was chosen among a few forms, as an exponent, may lie between them:
+    data and typical range give its distance from the form. An onset is known so much better than
+    the size of its effect that neither widens the other.
+
+    Parameters
+    ----------
+    fit : Fit
+    runs : sequence of Run
+    baseline : Baseline
+    imperfect : (O,) array
+        Error that every model of a good rig has, N·m rms.
+
+    Returns
+    -------
+    Uncertainty
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
@@ -130,8 +142,10 @@ def uncertainty(
 
 
 def _correlated_blocks(run: Run) -> float:
-    """Return the number of blocks with the same model error: neighbours within ``ALIKE_S``, once a
-    period."""
+    """Return the number of blocks with the same model error.
+
+    They are neighbours within ``ALIKE_S``, once a period.
+    """
     seconds = len(run.time) / run.blocks_in(1.0)
     return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or RECURRENCE_S), 1.0)
 
@@ -139,8 +153,7 @@ def _correlated_blocks(run: Run) -> float:
 def _onsets(
     fit: Fit, runs: Sequence[Run], baseline: Baseline, misfit: NDArray
 ) -> dict[tuple[int, int, int], tuple[float, float]]:
-    """Return the ends of the interval of each instant at which a cause begins, by (cause, shape
-    parameter, run)."""
+    """Return the interval of each cause's onset, by (cause, shape parameter, run)."""
     ends: dict[tuple[int, int, int], tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
         if (i := cause.onset) is not None:
@@ -153,10 +166,10 @@ def _onsets(
 
 
 def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
-    """Return shapes that were chosen among forms and could lie between them: (cause, shape
-    parameter, -1).
+    """Return shapes that were chosen among forms and could lie between them.
 
-    Where no value is negative, zero stands for a form without the parameter.
+    Each is (cause, shape parameter, -1). Where no value is negative, zero stands for a form without
+    the parameter.
     """
     return [
         (number, i, -1)
@@ -169,8 +182,10 @@ def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
-    """Return shapes but onsets that are fitted, or not: (cause, shape parameter, run), run -1 where
-    all share it."""
+    """Return shapes other than onsets that are fitted, or not.
+
+    Each is (cause, shape parameter, run), run -1 where all share it.
+    """
     return [
         (number, i, run)
         for number, cause in enumerate(causes)

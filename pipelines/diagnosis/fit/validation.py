@@ -1,4 +1,4 @@
-"""A model on the validation runs, which no fit has seen, and what that says of its causes."""
+"""Evaluate a model on the validation runs, which no fit has seen, and judge its causes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from pipelines.diagnosis.fit.validation_error import Errors, Gain, errors_of, ga
 
 @dataclass(frozen=True)
 class Validated:
-    """A fitted model and what it leaves of the validation runs."""
+    """A fitted model and its residuals on the validation runs."""
 
     fit: Fit
     runs: Sequence[Run]
@@ -45,20 +45,24 @@ class Validated:
         return bool(self.above(self.floor).any())
 
     def above(self, floor: Floor) -> NDArray:
-        """Return at which joints the error is above a noise floor, (J,) bool."""
+        """Return whether each joint's error is above a noise floor, (J,) bool."""
         return np.asarray(self.errors.rms > CRITERIA.at_floor * floor.rms[: len(self.errors.rms)])
 
 
 def without_each(
     fitted: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
-    """Return the model without each of its causes, the others kept and fitted anew under the same
-    loads, by label.
+    """Return the model without each of its causes, by label.
+
+    The other causes are kept and fitted again under the same joint loads.
 
     Parameters
     ----------
-    weights : NDArray
-        (O,) inverse variances of the outputs, 1/(N·m)².
+    fitted : Fit
+    train, validate : sequences of Run
+    baseline : Baseline
+    weights : (O,) array
+        Inverse variances of the outputs, 1/(N·m)².
     """
     validated, runs = {}, laden(train, fitted, baseline)
     for label in dict.fromkeys(cause.label for cause in fitted.causes):
@@ -70,7 +74,7 @@ def without_each(
 
 
 def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Gain]:
-    """Return what each cause gains beside the others, by label."""
+    """Return the gain of each cause, the others kept, by label."""
     return {label: gain(less.errors, whole.errors) for label, less in without.items()}
 
 
@@ -97,9 +101,9 @@ def removed_share(less: Validated, whole: Validated) -> float | None:
 
 
 def log_likelihoods(validated: Validated, noise: NoiseModel) -> NDArray:
-    """Return the log likelihood of the validation runs, for each drive (J,), up to a constant.
+    """Return the log likelihood of the validation runs for each drive, (J,), up to a constant.
 
-    In the decision band, under the noise that the training runs have.
+    It is computed in the decision band, under the noise of the training runs.
     """
     joints = len(validated.runs[0].motion.joints)
     sigma = noise.sigma(LENGTH_S)[:joints]

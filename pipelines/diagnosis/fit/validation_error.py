@@ -1,8 +1,7 @@
-"""What naming causes gains on validation runs, with an interval from whole periods.
+"""Measure errors and gains on validation runs, with intervals from whole periods.
 
-A cause's gain, wherever a user reads of one, is what the error grows by where that cause alone is
-left out and all else is fitted anew. What a set of causes takes together is of the error of rigid
-body and friction.
+A cause's gain is the increase of the error if that cause alone is left out and all else is fitted
+again. The gain of a set of causes is relative to rigid body and friction.
 """
 
 from collections.abc import Sequence
@@ -37,12 +36,12 @@ class Errors:
 
 
 def scored(run: Run) -> NDArray:
-    """Tell which samples the RMSE counts: every drive's output usable, (m,) bool."""
+    """Return the samples that the RMSE counts: every drive's output usable, (m,) bool."""
     return np.asarray(run.usable[:, : len(run.motion.joints)].all(axis=1))
 
 
 def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
-    """Sum up the residuals (m, O) of each run's drives."""
+    """Sum up the squared residuals (m, O) N·m of each run's drives."""
     squares, counts, everywhere, valid = [], [], 0.0, 0
     for run, residual in zip(runs, residuals, strict=True):
         J = len(run.motion.joints)
@@ -72,8 +71,10 @@ class Gain:
 
 
 def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0) -> Gain:
-    """Return the gain at a joint (the one that gains most by default), its interval by resampling
-    blocks."""
+    """Return the gain at a joint, with an interval by resampling blocks.
+
+    Without a ``joint`` it is at the one that gains most.
+    """
     if joint is None:
         joint = int(np.argmax(before.rms - after.rms))
     rng = np.random.default_rng(seed)

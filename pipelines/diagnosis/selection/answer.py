@@ -1,4 +1,4 @@
-"""Which causes are named, and what could stand in their place: read off the posterior."""
+"""Read off the posterior which causes are named, and which could replace them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class Named:
     alone: float
     """Of it without its ties."""
     ties: tuple[tuple[str, float], ...]
-    """Labels that cannot be told from it, with their probabilities."""
+    """Labels that the recordings cannot separate from it, with their probabilities."""
 
     @property
     def members(self) -> frozenset[str]:
@@ -29,7 +29,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the posterior says."""
+    """The answer of the posterior: named causes, and two probabilities."""
 
     named: tuple[Named, ...]
     """The most probable first."""
@@ -40,25 +40,33 @@ class Answer:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Labels of all that is named, the most probable first."""
+        """Labels of the named causes, the most probable first."""
         return tuple(one.element.label for one in self.named)
 
     @property
     def variants(self) -> frozenset[str]:
-        """Variants of all that is named."""
+        """Variants of the named causes."""
         return frozenset(one.element.variant for one in self.named)
 
     @property
     def members(self) -> frozenset[str]:
-        """Labels of all that is named, and of the ties."""
+        """Labels of all named causes and of their ties."""
         return frozenset(label for one in self.named for label in one.members)
 
 
 def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> Answer:
     """Name the likely causes of the median probability set, each with its ties.
 
-    ``together`` are groups of labels that were named as ties before: one of such a group is named
-    where the group is likely, though none of it may be as probable as nothing.
+    Parameters
+    ----------
+    posterior : Posterior
+    together : sequence of frozenset of str
+        Groups of labels that were named as ties before. One of a likely group is named, though none
+        of it may be as probable as nothing.
+
+    Returns
+    -------
+    Answer
     """
     best = _best(posterior)
     candidates = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
@@ -87,11 +95,10 @@ def _unlisted(posterior: Posterior) -> float:
 
 
 def _best(posterior: Posterior) -> Set:
-    """Return the most probable shapes of the most probable set of labels that has all that are
-    likely.
+    """Return the most probable shapes of the most probable set that has all likely labels.
 
-    What most sets have in common may be likely where the most probable single set lacks it
-    (Barbieri and Berger, 2004, Annals of Statistics 32(3): the median probability model).
+    The common part of most sets may be likely where the most probable single set lacks it (Barbieri
+    and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
     has_all = [labels for labels in posterior.by_labels if likely <= labels]
@@ -102,11 +109,10 @@ def _best(posterior: Posterior) -> Set:
 def in_place(
     posterior: Posterior, label: str, others: frozenset[str]
 ) -> tuple[float, dict[str, float]]:
-    """Return how probable a cause is beside others, and each other listed cause in its place, the
-    most probable first.
+    """Return the probability of a cause with others, and of each listed cause in its place.
 
     Each set with the cause is compared with the sets that have another listed cause instead, all
-    else alike.
+    else equal. The most probable comes first.
     """
     listed = {e.label for e in posterior.elements if not e.is_law}
     own, rivals = 0.0, dict.fromkeys(sorted(listed - others - {label}), 0.0)

@@ -1,6 +1,7 @@
-"""What the decision needs of a session, and nothing else: products of columns, and what they are.
+"""Compute the evidence of a session: products of columns, and their meaning.
 
-Small enough to be kept for thousands of sessions, from which the criteria are learned.
+The decision needs nothing else. It is small enough to be kept for thousands of sessions, from which
+the criteria are learned.
 """
 
 import json
@@ -25,17 +26,18 @@ from pipelines.effects import Cogging, Family
 from pipelines.wording.law import FAMILIES, law_label
 
 LEAST_VARIANCE = 1e-10
-"""Of slow noise's coefficients, squared shares of the torque: keeps their precision finite."""
+"""Least variance of slow noise's coefficients, in squared shares of the torque: keeps their
+precision finite."""
 Shown = tuple[float, float, int]
-"""A line's log likelihood ratio, its share of the torque, and the phases that it has."""
+"""A line's log likelihood ratio, its share of the torque, and its number of phases."""
 
 
 @dataclass(frozen=True)
 class Element:
-    """A cause at one shape, or a smooth law: what sets are made of."""
+    """A cause at one shape, or a smooth law: the element of sets."""
 
     label: str
-    """``effect@joint``, ``law:kind@joint``; without a joint where it is of none alone."""
+    """``effect@joint``, ``law:kind@joint``; without a joint where it belongs to none alone."""
     name: str
     """The effect's name, or the law's kind."""
     joint: str | None
@@ -50,13 +52,13 @@ class Element:
     amplitudes: list[list[float]] = field(default_factory=list)
     """Rows: those amplitudes of the effect that are never negative, per coefficient."""
     repeats: bool = True
-    """Whether it does the same in every period of the motion."""
+    """Whether it is the same in every period of the motion."""
     first: bool = True
     """Whether it is the best shape of its cause."""
     each_run: bool = False
-    """Whether its value is another in every run."""
+    """Whether its value differs from run to run."""
     sized_each_run: bool = False
-    """Of a cause: whether each run has a size of it for itself, so that one run says nothing of
+    """Of a cause: whether each run has its own size of it, so that one run is no evidence of
     another's."""
     worn: bool = False
     """Whether the person carries it."""
@@ -65,17 +67,17 @@ class Element:
     place: int = -1
     """Of a cause: its number in the library."""
     log_prior: float = 0.0
-    """Of a cause: what its shape and form add to the log odds."""
+    """Of a cause: the part of the log odds from its shape and form."""
     log_searched: float = 0.0
-    """The log number of values among which its waves, tones, onsets or steps were sought."""
+    """The log number of values that the search for its waves, tones, onsets or steps tried."""
     shown: list[Shown] = field(default_factory=list)
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
-    """Of a cause: the set beside whose others it was refined; -1 where it was refined alone."""
+    """Of a cause: the set with whose others it was refined; -1 where it was refined alone."""
 
     @property
     def variant(self) -> str:
-        """The label, and what kind of it: in every run anew, or the person's."""
+        """The label, with a suffix for a per-run cause, or for the person's."""
         if self.is_law:
             return self.label + ("" if self.wearer == "all" else f"/{self.wearer}")
         return self.label + ("/each_run" if self.each_run else "") + ("/worn" if self.worn else "")
@@ -83,21 +85,21 @@ class Element:
 
 @dataclass(frozen=True)
 class Nonnegative:
-    """Values of the baseline that are never negative, as friction and inertia are; f of them."""
+    """Baseline values that are never negative, as friction and inertia; f of them."""
 
     alone: NDArray
     """(f,) as fitted with no cause."""
     variance: NDArray
     """(f, O) by the noise of each output."""
     imitation: NDArray
-    """(f, n): those that imitate each column best, before the baseline is projected out of it."""
+    """(f, n): values that imitate each column best, before the baseline is projected out of it."""
 
     @classmethod
     def of(cls, library: Library, at: "_Places", count: int) -> "Nonnegative":
-        """Read them off a library, whose columns stand at places among ``count``."""
+        """Compute them from a library, whose columns have places among ``count``."""
         regression, chosen = library.regression, library.prepared.baseline.nonnegative
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-        # An unlisted law may hold friction itself: it imitates none.
+        # An unlisted law may contain friction itself, so it imitates none.
         imitation = np.zeros((len(values), count))
         for cause, columns, derivatives in zip(
             library.causes, at.causes, at.derivatives, strict=True
@@ -108,7 +110,7 @@ class Nonnegative:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Products over the searched runs' rows, of each output (O,) apart: drives first; n columns."""
+    """Products over the searched runs' rows, for each output (O,), drives first; n columns."""
 
     gram: NDArray
     """(O, n, n) of the columns with one another."""
@@ -116,22 +118,22 @@ class Evidence:
     """(O, n) of the columns with the measured torque."""
     elements: tuple[Element, ...]
     background: tuple[tuple[int, float, float], ...]
-    """What a good rig has: column, its variance relative to other causes' (zero for slow noise),
-    and that of noise."""
+    """The background of a good rig: column, its variance relative to other causes' (zero for slow
+    noise), and that of noise."""
     auxiliary: Mapping[str, float]
-    """Log likelihood of causes besides what they do to the mean torque, by label."""
+    """Log likelihood of causes from evidence other than the mean torque, by label."""
     explained: NDArray
-    """(O,) what all columns together explain of each output's rows, squared and in units of the
+    """(O,) explained by all columns together of each output's rows, squared and in units of the
     noise."""
     nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
-    """Sets of elements whose causes were refined beside one another."""
+    """Sets of elements whose causes were refined together."""
     about: Mapping[str, Any] = field(default_factory=dict)
     """Noise, torque, kinds of run: for reports."""
 
     @classmethod
     def of(cls, library: Library, auxiliary: Mapping[str, float]) -> "Evidence":
-        """Multiply a library's columns out."""
+        """Compute the products of a library's columns."""
         X, at = _stack(library)
         regression = library.regression
         outputs = [regression.output == o for o in range(len(regression.torque))]
@@ -150,7 +152,7 @@ class Evidence:
         )
 
     def packed(self) -> dict[str, Any]:
-        """Return a row of a table: symmetric matrices as their upper triangles."""
+        """Return a row of a table, with symmetric matrices as their upper triangles."""
         upper = np.triu_indices(self.gram.shape[1])
         return {
             "gram": self.gram[:, *upper].astype(np.float32).tobytes(),
@@ -171,7 +173,7 @@ class Evidence:
 
     @classmethod
     def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
-        """Return the evidence of a row that ``packed`` made."""
+        """Return the evidence of a row from ``packed``."""
         text = json.loads(row["text"])
         explained, nonnegative = np.array(text["explained"]), text["nonnegative"]
         right = np.frombuffer(row["right"]).reshape(len(explained), -1)
@@ -190,8 +192,10 @@ class Evidence:
 
 
 def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -> Iterator[float]:
-    """Yield what all columns together explain of each output's rows; curves of time are of
-    drives."""
+    """Yield the part of each output's rows that all columns explain together.
+
+    Curves of time belong to drives.
+    """
     variance = np.array([curve.noise for curve in library.curves])
     for output, (products, target) in enumerate(zip(gram, right, strict=True)):
         own = sum(curve.joint == output for curve in library.curves)
@@ -199,22 +203,22 @@ def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -
 
 
 def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, most: int) -> float:
-    """Return what columns explain of one output's rows, squared and in units of the noise.
+    """Return the part of one output's rows that columns explain, in squared units of noise.
 
-    What they would explain of noise alone is subtracted. Slow noise has no form that could be
-    wrong, but its variance is an estimate: what it explains counts as far as one for each of its
-    coefficients.
+    The part of noise alone that they would explain is subtracted. Slow noise has no form that could
+    be wrong, but its variance is an estimate: the part that it explains counts at most as one for
+    each of its coefficients.
 
     Parameters
     ----------
-    gram, right : NDArray
-        (n, n) and (n,) products of the columns with one another and with the measured torque.
-    slow : NDArray
-        (s,) places of the curves of time, by which slow noise is described.
-    variance : NDArray
-        (s,) of slow noise's coefficients.
+    gram, right : (n, n) and (n,) arrays
+        Products of the columns with one another and with the measured torque.
+    slow : (s,) array
+        Places of the curves of time, by which slow noise is described.
+    variance : (s,) array
+        Variance of slow noise's coefficients.
     most : int
-        How many of these curves are of this output.
+        Number of these curves that belong to this output.
     """
     rest = np.setdiff1d(np.arange(len(gram)), slow)
     order = np.concatenate([slow, rest]).astype(int)
@@ -228,12 +232,11 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
 
 
 def _beyond_noise(gram: NDArray, right: NDArray, precision: NDArray, first: int) -> float:
-    """Return what columns from ``first`` on explain beside those before, less what they would
-    explain of noise.
+    """Return the part that columns from ``first`` on add, less the part of noise they explain.
 
     ``precision`` (n,) is that of the prior of each column's coefficient.
     """
-    # Rows of the inverse factor from there on: what the columns before leave to explain.
+    # Rows of the inverse factor from there on: the columns less their projection on those before.
     inverse = dtrtri(np.linalg.cholesky(gram + np.diag(precision)), lower=1)[0][first:]
     # The trace of S^-1 G where S = G + the precision.
     of_noise = len(inverse) - np.sum(precision[first:] * inverse[:, first:] ** 2)
@@ -250,7 +253,7 @@ def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
 
 @dataclass(frozen=True)
 class _Places:
-    """Where in the matrix columns stand: causes, their derivatives, laws, curves of time."""
+    """Places in the matrix of columns: causes, their derivatives, laws, curves of time."""
 
     causes: list[NDArray]
     derivatives: list[NDArray]
@@ -259,7 +262,7 @@ class _Places:
 
 
 def _stack(library: Library) -> tuple[NDArray, _Places]:
-    """Put all columns side by side, (N, n)."""
+    """Stack all columns, (N, n)."""
     columns = [cause.columns for cause in library.causes]
     derivatives = [cause.derivative for cause in library.causes]
     parts = [*columns, *derivatives, library.law_columns, library.curve_columns]
@@ -307,8 +310,10 @@ def _elements(library: Library, at: _Places) -> list[Element]:
 
 
 def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> list[Element]:
-    """Give laws that are a listed cause in any form that cause's label; ``any_form`` has laws by
-    label."""
+    """Give laws that describe any form of a listed cause that cause's label.
+
+    ``any_form`` has laws by label.
+    """
     best = {e.label: e for e in elements if e.label in any_form and e.first and e.context < 0}
     of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
     return [
@@ -342,7 +347,7 @@ def _normalised(variance: Sequence[float]) -> list[float]:
 
 
 def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
-    """Return what a joint's lines of one kind tell."""
+    """Return the evidence of a joint's lines of one kind."""
     phases = 1 if kind is Kind.ANGLE else len(prepared.runs)
     lines = prepared.lines[joint].of_kind(kind)
     rms = np.sqrt(2.0) * float(prepared.torque[joint])
@@ -386,17 +391,17 @@ def _positive(cause: Cause) -> list[int]:
     if cause.candidate.directions:
         return []
     if bends:
-        # A column is the effect at its shape: turned over, it would be a spring that pushes, a
-        # delay that comes early.
+        # A column is the effect at its shape. Reversed, it would be a spring that pushes, or a
+        # negative delay.
         free = [p for p in effect.shape if p.default is None]
         return [0] if all(p.typical[0] >= 0 and p.unit != "1" for p in free) else []
     if len(effect.linear) != len(cause.amplitudes):
-        return []  # each run has some amplitude for itself
+        return []  # some amplitude is per run
     return [i for i, p in enumerate(effect.linear) if p.typical[0] >= 0]
 
 
 def _background(library: Library, at: _Places):
-    """Yield what a good rig has: column, relative variance, and the variance of noise."""
+    """Yield the background of a good rig: column, relative variance, and variance of noise."""
     for curve, place in zip(library.curves, at.curves, strict=True):
         yield int(place), 0.0, curve.noise
     for cause, places in zip(library.causes, at.causes, strict=True):
@@ -409,7 +414,7 @@ def _background(library: Library, at: _Places):
 
 
 def _contexts(library: Library, elements: Sequence[Element]):
-    """Yield the elements of each set whose causes were refined beside one another."""
+    """Yield the elements of each set whose causes were refined together."""
     laws = {element.variant: i for i, element in enumerate(elements) if element.is_law}
     for context in library.contexts:
         yield (*context.causes, *(laws[variant] for variant in context.laws))

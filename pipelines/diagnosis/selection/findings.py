@@ -1,7 +1,8 @@
-"""The answer at the depth that the data support: what is missing, from its repeating to its cause.
+"""Report what is missing as precisely as the data support, from its repeating to its cause.
 
 Findings form a tree: whether it repeats with the motion, at which joint, which family of laws it
-belongs to, which cause it is. Each is told at the deepest node whose probability reaches one half.
+belongs to, which cause it is. Each is reported at the deepest node whose probability reaches one
+half.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,11 +14,11 @@ from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.posterior import Posterior
 
 CLOSEST = 3
-"""Most listed causes that are reported where none is named."""
+"""Largest number of listed causes that are reported where none is named."""
 LEVELS = ("repeats", "joint", "family")
 """From the root to the causes: attributes of elements."""
 Inside = frozenset[int]
-"""Numbers of the elements that a node holds."""
+"""Numbers of the elements in a node."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,11 @@ class Finding:
     joint: str | None
     family: str | None
     probability: float
-    """Of a cause with its ties, or of something in the deepest node besides what others tell."""
+    """Of a cause with its ties, or of something in the deepest node in addition to other
+    findings."""
     causes: tuple[tuple[str, float], ...]
-    """Of level ``cause`` the named one and its ties; else the listed causes that come closest. With
-    probabilities."""
+    """With probabilities: at level ``cause`` the named one and its ties, else the closest listed
+    causes."""
     laws: tuple[tuple[str, float], ...]
     """Unlisted laws in the deepest node above a cause, with their probabilities."""
     path: tuple[tuple[str, Any, float], ...]
@@ -43,7 +45,7 @@ class Finding:
     """
 
     def as_json(self) -> dict[str, Any]:
-        """Return what the verdict says of it."""
+        """Return its entry in the verdict."""
         return {
             "level": self.level,
             "repeats": self.repeats,
@@ -99,7 +101,7 @@ def _of_cause(posterior: Posterior, named: Named) -> Finding:
 
 
 def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
-    """Yield what is likely among the elements that no named cause stands for, the deepest first."""
+    """Yield the likely findings among elements that no named cause stands for, deepest first."""
     elements = posterior.elements
     families = [{"joint": e.joint, "family": e.family} for e in elements]
     joints = [{"joint": e.joint} for e in elements]
@@ -120,7 +122,7 @@ def _distinct(nodes: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 def _likely(
     posterior: Posterior, rest: Inside, node: Mapping[str, Any]
 ) -> Iterator[tuple[Finding, Inside]]:
-    """Yield the findings of a node that are likely, and the elements of each.
+    """Yield the likely findings of a node, and the elements of each.
 
     Whether it repeats is left out where neither is likely.
     """
@@ -139,7 +141,7 @@ def _likely(
 def _finding(
     posterior: Posterior, node: Mapping[str, Any], inside: Inside, probability: float
 ) -> Finding:
-    """Return the finding that something of these elements, which lie within a node, is missing."""
+    """Return the finding that one of these elements within a node is missing."""
     deepest = [level for level in LEVELS if level in node] or ["repeats"]
     return Finding(
         "repeatability" if deepest[-1] == "repeats" else deepest[-1],
@@ -154,7 +156,7 @@ def _finding(
 
 
 def _path(posterior: Posterior, node: Mapping[str, Any]) -> tuple[tuple[str, Any, float], ...]:
-    """Return the way to a node, given by its value at some levels."""
+    """Return the path to a node, given by its value at some levels."""
     path: list[tuple[str, Any, float]] = [("missing", True, 1.0 - posterior.nothing)]
     above: dict[str, Any] = {}
     for level in LEVELS:
@@ -173,7 +175,7 @@ def _within(posterior: Posterior, node: Mapping[str, Any]) -> Inside:
 
 
 def _ranked(posterior: Posterior, inside: Inside, *, are_laws: bool) -> Iterator[tuple[str, float]]:
-    """Yield the labels of causes or of laws, the most probable first, with their probabilities."""
+    """Yield the labels of causes or laws with probabilities, the most probable first."""
     labels = {
         posterior.elements[i].label for i in inside if posterior.elements[i].is_law == are_laws
     }
@@ -181,6 +183,6 @@ def _ranked(posterior: Posterior, inside: Inside, *, are_laws: bool) -> Iterator
 
 
 def _chance(posterior: Posterior, inside: Inside) -> float:
-    """Return the probability that the true set holds some of these elements."""
+    """Return the probability that the true set has at least one of these elements."""
     pairs = zip(posterior.sets, posterior.probabilities, strict=True)
     return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))

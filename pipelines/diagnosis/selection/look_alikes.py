@@ -1,9 +1,9 @@
-"""How probable it is that a named cause is an unlisted effect that only resembles it.
+"""Estimate the probability that a named cause is an unlisted effect that resembles it.
 
-No catalogue is complete. The posterior explains an effect that nobody listed by whichever listed
-cause resembles it most, and is as sure of it as of a true cause. The validation runs tell them
-apart: a true cause removes nearly all of the systematic error that the model leaves without it
-there, a mere resemblance a part.
+No catalogue is complete. The posterior explains an unlisted effect by the listed cause that
+resembles it most, and is as sure of it as of a true cause. The validation runs separate them: a
+true cause removes nearly all of the systematic error that remains without it there, a mere
+resemblance only a part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,18 +27,22 @@ def kept_share(
     smooth_law_ratio: ArrayLike = 0.0,
     look_alike: ArrayLike = CRITERIA.look_alike,
 ) -> NDArray:
-    """Return the share of its probability that a named cause keeps, (...): that it is no
-    look-alike.
+    """Return the share of its probability that a named cause keeps, (...), as no look-alike.
 
     Parameters
     ----------
-    removed : ArrayLike
-        (...) share of the systematic error of the validation runs that it removes, 0 to 1.
-    smooth_law_ratio : ArrayLike
-        (...) probability of smooth laws of its family and joint in its place, over its own. An
-        unlisted effect has that already.
-    look_alike : ArrayLike
-        (2,) the criterion.
+    removed : (...) array
+        Share of the systematic error of the validation runs that it removes, 0 to 1.
+    smooth_law_ratio : (...) array
+        Probability of smooth laws of its family and joint in its place, over its own. An unlisted
+        effect has that already.
+    look_alike : (2,) array
+        The criterion.
+
+    Returns
+    -------
+    (...) array
+        Between 0 and 1.
     """
     intercept, slope = np.asarray(look_alike)
     resembles = expit(-intercept - slope * np.log(np.maximum(removed, LEAST)))
@@ -46,12 +50,11 @@ def kept_share(
 
 
 def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], float]) -> Posterior:
-    """Return the posterior in which each named cause may be an unlisted effect of its family and
-    joint.
+    """Return the posterior in which each named cause may be an unlisted similar effect.
 
-    Every set with the cause gives a share of its probability to the same set with an unlisted law
-    in its place. What smooth laws of that family and joint have in its place already is no part of
-    that share.
+    Such an effect has its family and joint. Every set with the cause gives a share of its
+    probability to the same set with an unlisted law in its place. The probability that smooth laws
+    of that family and joint have in its place already is subtracted.
 
     Parameters
     ----------
@@ -84,8 +87,10 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
 
 
 def _smooth_law_ratio(posterior: Posterior, labels: frozenset[str]) -> float:
-    """Return the probability of smooth laws in the place of tied causes, of their family and joint,
-    over their own."""
+    """Return the probability of smooth laws in the place of tied causes, over their own.
+
+    The laws are of the causes' families and joints.
+    """
     places = {(e.family, e.joint) for e in posterior.elements if e.label in labels}
     laws = {e.label for e in posterior.elements if e.is_law and (e.family, e.joint) in places}
     probability = sum(
@@ -97,8 +102,7 @@ def _smooth_law_ratio(posterior: Posterior, labels: frozenset[str]) -> float:
 def _split(
     chosen: Sequence[int], law_of: Mapping[int, int], kept: Sequence[float]
 ) -> list[tuple[tuple[int, ...], float]]:
-    """Return the set with each choice of its causes replaced by unlisted laws, and its share of the
-    probability."""
+    """Return each way to replace causes of a set by unlisted laws, with its probability share."""
     ways = [
         [(i, p), (law_of[i], 1.0 - p)] if i in law_of else [(i, 1.0)]
         for i, p in zip(chosen, kept, strict=True)

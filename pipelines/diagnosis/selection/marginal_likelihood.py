@@ -1,4 +1,4 @@
-"""How well a set of causes and laws explains a session, all amplitudes integrated out.
+"""Compute how well a set of causes and laws explains a session, amplitudes integrated out.
 
 Given shapes everything is linear and Gaussian: y = sum over the set of (A a + D d) + F f + noise,
 with A the element's columns, D steps along its shapes and towards another form, and F the
@@ -21,15 +21,15 @@ from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.prior import FEATURES, features, of_set, weights
 
 ROUGH_SHARE = 0.08
-"""Prior share with which sets are screened before each is weighed in full."""
+"""Prior share with which sets are screened before they are weighed in full."""
 WIDEST = 12
-"""Columns of an element that count while screening."""
+"""Largest number of an element's columns that count in screening."""
 WIDTHS = (3, 6, WIDEST)
-"""Widths by which elements are screened together."""
+"""Numbers of columns by which elements are screened together."""
 CHUNK = 4000
-"""Sets that are screened at once: bounds the memory."""
+"""Number of sets that are screened at once: bounds the memory."""
 LEAST_SIZE = 1e-4
-"""Share that an element's size is at least: its logarithm is asked for."""
+"""Least share of an element's size, because its logarithm is taken."""
 
 
 class MarginalLikelihood:
@@ -100,7 +100,7 @@ class MarginalLikelihood:
         return np.append(amplitude * np.array(element.variance), shapes)
 
     def sizes(self, chosen: Sequence[int]) -> NDArray:
-        """Return the share that each element of a set has, (set,)."""
+        """Return the share of each element of a set, (set,)."""
         elements = [self.evidence.elements[i] for i in chosen]
         columns = np.concatenate([self.parts[i] for i in chosen])
         largest = max(self.criteria.amplitudes) ** 2
@@ -130,11 +130,10 @@ class MarginalLikelihood:
         return value + self._log_nonnegative(columns, lower, u, sd)
 
     def _log_nonnegative(self, columns: NDArray, lower: NDArray, u: NDArray, sd: NDArray) -> float:
-        """Return what knowing that the baseline's friction and inertia are not negative adds to the
-        log Bayes factor.
+        """Return the gain in log Bayes factor because friction and inertia are not negative.
 
-        Their prior is flat but for the sign. What causes take over from them is subtracted: y = B
-        (b - P a) + A a.
+        Their prior is flat but for the sign. The part that causes take over from them is
+        subtracted: y = B (b - P a) + A a.
         """
         known = self.evidence.nonnegative
         if known is None:
@@ -145,7 +144,7 @@ class MarginalLikelihood:
         return float(np.sum(log_ndtr(values / spread) - log_ndtr(known.alone / np.sqrt(variance))))
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
-        """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
+        """Return all pairs of elements with different labels, (p, 2), and rough log odds, (p,)."""
         numbers = np.asarray(chosen, dtype=int)
         labels = np.array([self.evidence.elements[i].label for i in numbers])
         one, other = np.triu_indices(len(numbers), 1)
@@ -166,7 +165,7 @@ class MarginalLikelihood:
         return np.column_stack([numbers[one], numbers[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Return elements' columns and prior sds padded to one width, and the width that counts."""
+        """Return elements' columns and prior sds padded to one width, and their true widths."""
         columns = np.zeros((len(chosen), WIDEST), dtype=int)
         sd, width = np.zeros((len(chosen), WIDEST)), np.zeros(len(chosen), dtype=int)
         for n, i in enumerate(chosen):
@@ -190,7 +189,7 @@ class MarginalLikelihood:
         return np.where(sign > 0.0, odds, -np.inf)
 
     def rough(self, chosen: Sequence[int]) -> float:
-        """Return a set's log odds without what its forms may differ by."""
+        """Return a set's log odds from its first columns alone."""
         columns = np.concatenate([self.parts[i] for i in chosen])
         elements = [self.evidence.elements[i] for i in chosen]
         variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])
@@ -204,10 +203,18 @@ class MarginalLikelihood:
 
 
 def power(explained: NDArray, weight: float, model_error: float) -> NDArray:
-    """Return how much of each output's likelihood counts, (o,): less where much is explained, for
-    no form is exact.
+    """Return the weight of each output's likelihood, (o,), less where more is explained.
 
-    ``explained`` (o,) is squared and in units of the noise.
+    The reason is that no form is exact.
+
+    Parameters
+    ----------
+    explained : (o,) array
+        Explained part, squared and in units of the noise.
+    weight : float
+        Where nothing is explained.
+    model_error : float
+        Criterion of that name.
     """
     return np.asarray(weight / (1.0 + model_error * weight * explained))
 
@@ -225,20 +232,20 @@ def _without(
 
 
 def _forward(lower: NDArray, right: NDArray) -> NDArray:
-    """Solve a lower triangular system: LAPACK at once, for a posterior solves thousands."""
+    """Solve a lower triangular system by LAPACK directly, as a posterior solves thousands."""
     return np.asarray(dtrtrs(lower, right, lower=1)[0])
 
 
 def _share(values: NDArray) -> float:
-    """Return the share that coefficients make; the columns of a cause are orthonormal."""
+    """Return the share of coefficients; the columns of a cause are orthonormal."""
     return float(np.linalg.norm(values))
 
 
 def _shown(element: Element, c: Criteria) -> float:
-    """Return how much likelier a ripple's or tone's lines are of a cause than of a good rig.
+    """Return how much likelier a cause shows a ripple's or tone's lines than a good rig.
 
-    The amplitudes of a line are Gaussian about zero in both, of a cause with the shares that any
-    cause may have, of a good rig with a small one; a good rig need not have it at all.
+    The amplitudes of a line are Gaussian about zero in both: with the shares of any cause in the
+    one, with a small share in the other. A good rig need not have it at all.
     """
     if not element.shown:
         return 0.0
@@ -254,17 +261,16 @@ def _shown(element: Element, c: Criteria) -> float:
 
 
 def _line(ratio: float, variance: float, phases: int, share: float) -> float:
-    """Return the log Bayes factor of a line whose sine and cosine have a prior share, against
-    none."""
+    """Return the log Bayes factor of a line with a prior share against none."""
     prior = 0.5 * share**2
     return ratio * prior / (prior + variance) - phases * float(np.log1p(prior / variance))
 
 
 def _log_sign(amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int) -> float:
-    """Return what knowing that amplitudes (p, k) are not negative adds to the log evidence.
+    """Return the gain in log evidence because amplitudes (p, k) are not negative.
 
-    The prior is symmetric, so the factor is twice the posterior probability of the sign; of
-    several, the product, as if they were independent.
+    The prior is symmetric, so the factor is twice the posterior probability of the sign. For
+    several amplitudes it is the product, as if they were independent.
     """
     k = amplitudes.shape[1]
     units = np.zeros((len(u), k))

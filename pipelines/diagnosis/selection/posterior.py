@@ -1,8 +1,8 @@
-"""The posterior over sets of causes and laws, and what it says of each.
+"""Compute the posterior over sets of causes and laws.
 
 Every element is weighed alone. Pairs of their two best shapes are screened, and the best weighed in
-full; triples extend the best pairs. What is reported are marginals: of nothing missing, of each
-cause, of something unlisted, of each family at each joint.
+full; triples extend the best pairs. Marginals are reported: of nothing missing, of each cause, of
+something unlisted, of each family at each joint.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,15 +21,15 @@ from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 
 SHAPES = 2
-"""Shapes of each cause that pairs are made of."""
+"""Number of shapes of each cause in pairs."""
 PAIRS = 150
-"""Pairs that are weighed in full."""
+"""Number of pairs that are weighed in full."""
 PARTNERS = 15
-"""Elements with which a torque that wanders is paired."""
+"""Number of elements that are paired with a wandering torque."""
 EXTENDED = 6
-"""Pairs that are extended to triples."""
+"""Number of pairs that are extended to triples."""
 TRIPLES = 8
-"""Triples of each pair that are weighed in full."""
+"""Number of triples of each pair that are weighed in full."""
 
 CONTEXTS = 8
 """Most sets whose causes are refined together."""
@@ -39,9 +39,9 @@ STRONGEST = 2
 partners."""
 
 SURE = 1.0 - 1e-12
-"""What counts as certain: beyond it rounding decides."""
+"""Probability that counts as certain: above it rounding decides."""
 TOLERANCE = 1e-6
-"""Log odds by which a probability may fall short of what it is to be at least."""
+"""Log odds by which a probability may fall short of its least value."""
 
 Set = tuple[int, ...]
 
@@ -65,12 +65,13 @@ class Posterior:
     def judged(self, charged: Mapping[str, float]) -> "Posterior":
         """Return the posterior after validation: a cause that harms there is less probable.
 
-        A cause that helps there gains nothing: the searched runs have counted what it explains.
+        A cause that helps there gains nothing: the searched runs have counted the part that it
+        explains.
 
         Parameters
         ----------
         charged : mapping of str to float
-            What the validation runs take from log odds, zero or negative, by variant of a cause.
+            Log odds that the validation runs subtract, zero or negative, by variant of a cause.
         """
         if not charged:
             return self
@@ -96,7 +97,7 @@ class Posterior:
         return self._with(self.log_odds + np.where(inside, lacking, 0.0))
 
     def _with(self, log_odds: NDArray) -> "Posterior":
-        """Return the posterior where the sets have other log odds, (sets,)."""
+        """Return the posterior with other log odds of the sets, (sets,)."""
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
@@ -110,7 +111,7 @@ class Posterior:
 
     @cached_property
     def by_labels(self) -> dict[frozenset[str], float]:
-        """Probability of each set of labels, whatever the shapes."""
+        """Probability of each set of labels, summed over shapes."""
         totals: dict[frozenset[str], float] = {}
         for chosen, p in zip(self.sets, self.probabilities, strict=True):
             labels = self.labels_of(chosen)
@@ -119,8 +120,7 @@ class Posterior:
 
     @cached_property
     def unweighed(self) -> frozenset[frozenset[str]]:
-        """Sets of labels without a finite log odds at any shape: rounding made their matrices
-        indefinite."""
+        """Sets of labels whose log odds are infinite because rounding made matrices indefinite."""
         pairs = zip(self.sets, self.log_odds, strict=True)
         weighed = {self.labels_of(chosen) for chosen, odds in pairs if np.isfinite(odds)}
         return frozenset(self.by_labels.keys() - weighed)
@@ -137,7 +137,7 @@ class Posterior:
         for labels, p in self.by_labels.items():
             for label in labels:
                 totals[label] = totals.get(label, 0.0) + p
-        # Rounding may carry a sum of probabilities a little beyond one.
+        # Rounding may make a sum of probabilities slightly larger than one.
         return {
             label: min(p, 1.0) for label, p in sorted(totals.items(), key=lambda item: -item[1])
         }
@@ -147,14 +147,13 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     """Weigh all sets of up to three elements."""
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
-    # A shape that a cause has beside others counts in their set only, or the cause would count
-    # twice.
+    # A shape refined in a set counts in that set only: otherwise the cause would count twice.
     odds |= {(i,): float(v) for i, v in enumerate(weigh.alone) if evidence.elements[i].context < 0}
     for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
         odds[chosen] = weigh(chosen)
-    # Should one cause of the best set be refuted, the others are what is left.
+    # If one cause of the best set is refuted, the others remain.
     best = max(odds, key=lambda chosen: odds[chosen])
     odds |= {chosen: weigh(chosen) for chosen in combinations(best, 2) if chosen not in odds}
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
@@ -166,8 +165,7 @@ def _ordered(chosen: Sequence[int]) -> Set:
 
 
 def likely_contexts(weighed: Posterior) -> list[Context]:
-    """Return the sets of several elements, more probable than nothing, to refine their causes
-    together."""
+    """Return sets of several elements that are more probable than nothing, to refine together."""
     contexts: dict[frozenset[str], Context] = {}
     for chosen in weighed.sets:
         elements = [weighed.elements[i] for i in chosen]
@@ -181,8 +179,10 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
 
 
 def strongest(weighed: Posterior) -> list[int]:
-    """Return the library's numbers of the causes that alone explain most, unless nothing is
-    missing."""
+    """Return the library's numbers of the causes that alone explain most.
+
+    The result is empty where nothing is missing.
+    """
     causes: dict[str, int] = {}
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
@@ -198,7 +198,7 @@ def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[i
     elements = weigh.evidence.elements
     shapes: dict[str, list[int]] = {}
     for i in np.argsort(-weigh.alone):
-        if elements[i].context < 0:  # others are meant for their own set
+        if elements[i].context < 0:  # others count in their own set only
             shapes.setdefault(elements[i].variant, []).append(int(i))
     wide = [i for i, e in enumerate(elements) if e.is_law and e.name == TIME]
     several = [i for own in shapes.values() for i in own[:SHAPES] if i not in wide]

@@ -1,4 +1,4 @@
-"""The prior over sets of elements: log odds that are linear in what a set has."""
+"""Define the prior over sets of elements: log odds that are linear in a set's features."""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,9 +9,9 @@ from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element
 
 FEATURES = ("cause", "law", "further", "searched", "each_run", "worn", "coherence")
-"""Names of the criteria that the features of a set are multiplied by."""
+"""Names of the criteria by which the features of a set are multiplied."""
 AUXILIARY = {"voluntary_torque": "coherence"}
-"""The criterion by which an effect's auxiliary evidence counts."""
+"""The criterion that weights an effect's auxiliary evidence."""
 
 
 def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
@@ -19,8 +19,9 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
 
     Parameters
     ----------
-    auxiliary : mapping
-        Log likelihood of causes besides what they do to the mean torque, by label.
+    element : Element
+    auxiliary : mapping of str to float
+        Log likelihood of causes from evidence other than the mean torque, by label.
     """
     own = dict.fromkeys(FEATURES, 0.0)
     at_both = element.is_law and element.joint is None  # as improbable as a law at each joint
@@ -41,8 +42,10 @@ def of_set(chosen: Sequence[NDArray]) -> NDArray:
 
 
 def weights(criteria: Criteria) -> NDArray:
-    """Return the log odds of one unit of each feature, (f,); the base rate counts once in a set
-    that is not empty."""
+    """Return the log odds of one unit of each feature, (f,).
+
+    The base rate counts once in a set that is not empty.
+    """
     by_name = {name: getattr(criteria, name) for name in FEATURES}
     by_name["cause"] += criteria.base_rate
     by_name["law"] += criteria.base_rate

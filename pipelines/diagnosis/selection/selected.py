@@ -1,5 +1,4 @@
-"""What the evidence of the runs that are searched says: the library, the posterior, the answer read
-off it."""
+"""Select causes from the searched runs: library, posterior, answer, findings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,47 +26,47 @@ from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE = 0.6
-"""Of the progress bar, where the library is done."""
+"""Position of the progress bar at which the library is done."""
 PARTNERS = 5
 """Number of causes that are refined together with each of the most probable ones."""
 ROUNDS = 50
-"""Rounds in which the probabilities of several groups are raised to their floors in turn."""
+"""Rounds in which the probabilities of several groups are raised to their least values in turn."""
 Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class AllRunsSearch:
-    """That causes were sought on all runs, and why."""
+    """A search for causes on all runs, and its reason."""
 
     train_count: int
-    """How many runs are to train on: the first ones."""
+    """Number of training runs: the first ones."""
     named_before: tuple[str, ...]
-    """Labels that these alone name, before validation."""
+    """Labels that the training runs alone name, before validation."""
 
 
 @dataclass(frozen=True)
 class Selected:
-    """What the evidence of the searched runs says, before and after the validation runs judge it.
+    """The answer from the searched runs, before and after the validation runs judge it.
 
-    The training runs are searched; where what they name leaves more than noise on the validation
-    runs, all runs are.
+    The training runs are searched. Where their named causes leave more than noise on the validation
+    runs, all runs are searched.
     """
 
     library: Library | None
-    """None where faults of acquisition keep physics from being looked at."""
+    """None where faults of acquisition prevent a search."""
     evidence: Evidence | None
     searched: Posterior | None
-    """How probable each set is by the runs that are searched."""
+    """The probability of each set from the searched runs."""
     posterior: Posterior | None
     """The same after judging: charges of the validation runs, then look-alikes."""
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
-    """Of each joint: how its residual repeats, in the runs that are searched."""
+    """Of each joint: how its residual repeats, in the searched runs."""
     dropped: frozenset[str] = frozenset()
-    """Labels that were named until the validation runs spoke against them."""
+    """Labels that were named until the validation runs contradicted them."""
     charged: Mapping[str, float] = field(default_factory=dict)
-    """What the validation runs take from log odds, by variant of a cause: its harm, or how far it
+    """Log odds that the validation runs subtract, by variant of a cause: its harm, or how far it
     falls behind the best of its ties, which has zero."""
 
     removed: Mapping[str, float] = field(default_factory=dict)
@@ -75,7 +74,7 @@ class Selected:
     being a look-alike, by label."""
 
     by_all: AllRunsSearch | None = None
-    """None where the evidence is of the training runs."""
+    """None where the evidence is from the training runs."""
 
     @property
     def shows_something(self) -> bool:
@@ -94,8 +93,7 @@ class Selected:
 
     @property
     def without_names(self) -> "Selected":
-        """What is missing, without the causes that are named: the validation runs speak against
-        them."""
+        """The same findings without named causes, which the validation runs contradict."""
         assert self.posterior is not None
         answer = replace(self.answer, named=())
         findings_now = tuple(findings(self.posterior, answer))
@@ -104,8 +102,10 @@ class Selected:
         )
 
     def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
-        """Return what all runs show, after what the first ``train_count`` of them, to train on,
-        showed alone."""
+        """Mark the result of all runs, after the training runs alone gave ``first``.
+
+        The training runs are the first ``train_count``.
+        """
         assert first.searched is not None
         by_all = AllRunsSearch(train_count, answer_of(first.searched).labels)
         return replace(self, by_all=by_all)
@@ -126,16 +126,15 @@ class Selected:
 
     @property
     def doubted(self) -> frozenset[str]:
-        """Labels that the validation runs speak against: they do harm there, or a tie of theirs
-        predicts better."""
+        """Labels that harm the validation runs, or that a tie of theirs predicts better."""
         return frozenset(e.label for e in self._elements if self.charged.get(e.variant, 0.0) < 0.0)
 
     def worst_harm(self, ratios: Mapping[str, float]) -> dict[str, float]:
-        """Return the charges for the named cause that harms the validation runs most, by variant;
-        empty if none does.
+        """Return the charges for the named cause that harms the validation runs most, by variant.
 
-        Where a named cause does harm, so do its ties: these data cannot tell them apart. A cause
-        whose size each run has for itself is not charged, for one run says nothing of another's.
+        The result is empty if none does. A harmful cause's ties harm too, because these data cannot
+        separate them. A cause with a size of its own in each run is not charged: one run is no
+        evidence of another's.
 
         Parameters
         ----------
@@ -157,10 +156,10 @@ class Selected:
         return {}
 
     def rivals_of(self, number: int) -> dict[str, Candidate]:
-        """Return the ties to fit in the place of a named cause, by variant, unless they were
-        compared before.
+        """Return the ties to fit in the place of a named cause, by variant.
 
-        A cause whose size each run has for itself is not compared: a validation run fits its own.
+        Ties that were compared before are left out, and so is a cause with a size of its own in
+        each run: a validation run fits its own.
         """
         one = self.answer.named[number]
         if one.element.variant in self.charged or one.element.sized_each_run:
@@ -178,11 +177,11 @@ class Selected:
         Parameters
         ----------
         charges : mapping of str to float
-            What the validation runs take from log odds as well, zero or negative, by variant of a
+            Log odds that the validation runs subtract as well, zero or negative, by variant of a
             cause.
         harms : bool
-            Whether the model predicts these runs worse with the charged cause, which is then told
-            as dropped.
+            Whether the model predicts these runs worse with the charged cause, which is then
+            reported as dropped.
         """
         assert self.searched is not None
         charged = {**self.charged, **charges}
@@ -197,10 +196,9 @@ class Selected:
         return replace(again, dropped=(self.dropped | doubted) - set(again.answer.labels))
 
     def _reweighed(self, weighed: Posterior) -> "Selected":
-        """Return the answer read off another posterior; only causes named or tied before may be
-        named."""
+        """Return the answer of another posterior; only causes named or tied before may be named."""
         likely = answer_of(weighed, [one.members for one in self.answer.named])
-        # Anything else that becomes likely is a finding: refuting one cause is no evidence for
+        # Other causes that become likely are findings only: refuting one cause is no evidence for
         # another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
@@ -246,17 +244,16 @@ class Selected:
 
 
 def _lowered(one: Named, charges: Mapping[str, float], elements: Sequence[Element]) -> float:
-    """Return the probability of a named cause and its ties after what the least charged of them is
-    charged itself.
+    """Return the probability of a named cause and its ties after the smallest of their charges.
 
-    It was fitted without what else is charged: that takes nothing from it.
+    It was fitted without the other charged causes, so their charges do not lower it.
     """
     own = [charges[e.variant] for e in elements if e.label in one.members and e.variant in charges]
     return float(expit(logit(min(one.probability, SURE)) + max(own, default=0.0)))
 
 
 def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> Posterior:
-    """Return the posterior where each group of labels has at least its probability."""
+    """Return the posterior where each group of labels has at least its least probability."""
     for _ in range(ROUNDS):
         before = weighed
         for members, probability in floors.items():
@@ -282,21 +279,21 @@ def select(prepared: Prepared, report: Report = silent) -> Selected:
 
 
 def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidence:
-    """Return what the decision needs of a session."""
+    """Return the evidence of a session, from which the decision follows."""
     data = training_data(motions, known)
     prepared = prepare(data.train, data.baseline)
     return weighed(prepared)[1]
 
 
 def nothing_selected(prepared: Prepared) -> Selected:
-    """Return the answer where faults of acquisition keep physics from being looked at."""
+    """Return the empty answer where faults of acquisition prevent a search."""
     return Selected(None, None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
 
 
 def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evidence, Posterior]:
-    """Return the library, its evidence, and how probable each set is.
+    """Return the library, its evidence, and the probability of each set.
 
-    Causes are refined alone first, then beside the others of likely sets.
+    Causes are refined alone first, then together with the others of likely sets.
     """
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
     report(LIBRARY_SHARE, "posterior")

@@ -1,1 +1,1 @@
-"""The verdict: what a diagnosis says in JSON, in sentences, in tables and in figures."""
+"""The verdict: the result of a diagnosis in JSON, in sentences, in tables and in figures."""

@@ -1,5 +1,4 @@
-"""``candidates/1``: every set of causes and laws that was weighed in full, and what became of
-it."""
+"""Build ``candidates/1``: every set of causes and laws that was weighed, and its verdict."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -68,7 +67,7 @@ def _log_odds(d: Diagnosis, probability: float) -> float | None:
 
 
 def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
-    """Return the set as it was fitted to the runs: the named one, or it less one cause."""
+    """Return the fit of a set: the named one, or it without one cause; else None."""
     named = frozenset(d.causes)
     if labels == named:
         return d.after
@@ -77,7 +76,7 @@ def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
 
 
 def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
-    """Return what was fitted, as files name it; what each run has for itself is left out."""
+    """Return the fitted parameters with their names in files; per-run parameters are left out."""
     rows: list[dict[str, Any]] = []
     for number, cause in enumerate(fitted.fit.causes):
         columns = fitted.fit.columns_of(number)
@@ -100,25 +99,25 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
         rest = named - {one.element.label}
         rivals = labels - rest
         if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
-            return "indistinguishable", f"these data cannot tell it from {one.element.label}"
+            return "indistinguishable", f"these data cannot separate it from {one.element.label}"
     is_likely = probability >= CRITERIA.likely and any(label.startswith(LAW) for label in labels)
     return "unlisted" if is_likely else "rejected", "; ".join(_against(d, labels, probability))
 
 
 def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterator[str]:
-    """Yield why a set is not named."""
+    """Yield the reasons why a set is not named."""
     if d.selected.posterior is not None and labels in d.selected.posterior.unweighed:
         yield "it was left out: rounding made its matrix indefinite"
         return
     yield f"its probability is {probability:.2g}"
     if any(label.startswith(LAW) for label in labels):
-        yield "it holds a law that is no listed cause"
+        yield "it contains a law that is no listed cause"
     if doubted := sorted(labels & d.selected.doubted - set(d.causes)):
         yield f"the validation runs speak against {' and '.join(doubted)}"
 
 
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
-    """Return the joints at which other parameters take an effect up whole, and which."""
+    """Return the joints at which other parameters absorb an effect whole, and which."""
     everywhere = machine.mechanism.absorbs.get(effect.name)
     by_joint = {
         joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
@@ -135,14 +134,13 @@ def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
         d,
         label,
         "rejected",
-        "it was left out: at no shape is its torque finite and other than what rigid body and"
-        " friction explain",
+        "it was left out: its torque is infinite, or rigid body and friction explain all of it",
     )
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
     return _without_numbers(
-        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it"
+        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be separated from it"
     )
 
 

@@ -1,4 +1,4 @@
-"""What speaks for a named cause: one sentence each."""
+"""Write the evidence for a named cause, one sentence each."""
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
@@ -7,18 +7,18 @@ from pipelines.effects import Effect, VoluntaryTorque
 from pipelines.wording.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
-"""Odds from which more is not told: no calibration could vouch for a figure."""
-TELLING = 3.0
+"""Odds above which no figure is given: no calibration supports one."""
+MENTIONED_FROM = 3.0
 """Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
 NEARLY_ALL = 0.9
-"""Share of the systematic error below which it is told that a cause may be a look-alike."""
+"""Share of the systematic error below which the evidence says that a cause may be a look-alike."""
 AUXILIARY = {
     VoluntaryTorque.name: (
         "cycle-to-cycle differences appear in cuff forces and drive torque "
         "alike, so they come from the wearer"
     ),
 }
-"""What auxiliary evidence is, by effect (``candidates/auxiliary_evidence.py``)."""
+"""The auxiliary evidence in words, by effect (``candidates/auxiliary_evidence.py``)."""
 
 
 def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
@@ -37,14 +37,14 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
         sentences.append(doubt[1])
     if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
         sentences.append(
-            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause"
-            " removes nearly all: a part of its probability is given to an unlisted effect that"
+            f"it removes {100.0 * share:.0f} % of the systematic error there, and a true cause"
+            " removes nearly all. So a part of its probability belongs to an unlisted effect that"
             " resembles it"
         )
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None
-    if d.selected.evidence.auxiliary.get(label, 0.0) > TELLING:
+    if d.selected.evidence.auxiliary.get(label, 0.0) > MENTIONED_FROM:
         sentences.append(AUXILIARY[effect.name])
     if lines := len(named.element.shown):
         plural = "s stand" if lines > 1 else " stands"
@@ -55,7 +55,7 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
 
 
 def _differs(d: Diagnosis, label: str, effect: Effect) -> str:
-    """List the values that runs have of a cause which differs from run to run."""
+    """List the values of a per-run cause."""
     (parameter,) = (p for p in effect.parameters if p.per_run)
     values = [f"{r['values'][parameter.name]:+.3g} in {r['file']}" for r in d.each_run[label]]
     return (
@@ -65,7 +65,7 @@ def _differs(d: Diagnosis, label: str, effect: Effect) -> str:
 
 
 def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
-    """Say that a cause gains no more than chance may, in the summary and alone; or None."""
+    """Return in words that a gain may be chance, for the summary and alone; None if it is not."""
     gained = d.gains.get(label)
     if gained is None or gained.low > 0.0:
         return None
@@ -78,8 +78,10 @@ def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
 
 
 def _next(d: Diagnosis, named: Named) -> str | None:
-    """Say how much less likely the next listed cause is in its place, beside the other named
-    ones."""
+    """Return in words how much less likely the next listed cause is in its place.
+
+    The other named causes are kept.
+    """
     assert d.selected.posterior is not None
     label, ties = named.element.label, dict(named.ties)
     own, rivals = in_place(d.selected.posterior, label, frozenset(d.causes) - {label})

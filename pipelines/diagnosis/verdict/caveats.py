@@ -1,4 +1,4 @@
-"""What the recordings at hand could not show, whatever is missing."""
+"""Write the caveats: limits of the recordings at hand, whatever is missing."""
 
 import numpy as np
 
@@ -12,15 +12,15 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.wording.label import amount, label_in_words
 
 HIDING = 0.2
-"""Share of a joint's torque from which an estimated noise floor is doubted: no sensor is as noisy,
-and friction is seldom more."""
+"""Share of a joint's torque above which an estimated noise floor is doubtful: no sensor is as
+noisy, and friction is seldom more."""
 
 LARGER = 2.0
-"""Error of the validation runs over that of the training runs from which a caveat tells of it."""
+"""Error of the validation runs over that of the training runs from which a caveat reports it."""
 
 
 def caveats(d: Diagnosis) -> list[str]:
-    """Return what must be known beside the verdict, a sentence or two each."""
+    """Return the caveats of the verdict, a sentence or two each."""
     noisy = (
         f"{IN_WORDS}. Fits would underestimate inertia, so only what is below {CUTOFF_HZ:g} Hz is "
         f"used: set filter.cutoff_hz = {CUTOFF_HZ:g} for the other stages, and check encoder "
@@ -60,16 +60,18 @@ def _high_floor(d: Diagnosis) -> list[str]:
     machine = d.baseline.machine
     return [
         f"the noise floor of {the(joint)} is estimated as {share:.0%} of its "
-        f"{machine.joint(joint).effort}, more than any sensor's noise: much of it may be what the "
-        "model lacks. Repeat one motion and record its period, and check unit, sign and time "
-        "stamps of that channel"
+        f"{machine.joint(joint).effort}, more than any sensor's noise: it may hide missing "
+        "effects. Repeat one motion and record its period, and check unit, sign and time stamps "
+        "of that channel"
         for joint, share in floor_that_hides(d).items()
     ]
 
 
 def _at_ends(d: Diagnosis) -> list[str]:
-    """Say which shape of a named cause ended where its search ends: its other values hold only with
-    it."""
+    """Report shapes of named causes that ended at the limit of their search.
+
+    Their other values hold only with that shape.
+    """
     return [
         f"the fit of {cause.label} ended at the limit of its search, {parameter.name} = {value:.3g}"
         f"{'' if parameter.unit == '1' else f' {parameter.unit}'}: "
@@ -83,7 +85,7 @@ def _at_ends(d: Diagnosis) -> list[str]:
 
 
 def _size_may_be_zero(d: Diagnosis) -> list[str]:
-    """Say of which named causes the size may be zero, by the training runs."""
+    """Report named causes whose size the training runs do not separate from zero."""
     return [
         "the training runs do not determine the size of"
         f" {label_in_words(cause.label, d.baseline.machine)}: its 95 % interval includes zero"
@@ -104,7 +106,7 @@ def _unrealizable(d: Diagnosis) -> list[str]:
 
 
 def _default_length(d: Diagnosis) -> list[str]:
-    """Say that the distance between two axes is an exoskeleton's default on another machine."""
+    """Report that the distance between two axes is an exoskeleton's default on another machine."""
     machine, length = d.baseline.machine, d.train[0].motion.geometry.thigh_length_m
     default = length == Geometry().thigh_length_m
     if machine.is_exoskeleton or not machine.mechanism.has_length or not default:
@@ -117,7 +119,7 @@ def _default_length(d: Diagnosis) -> list[str]:
 
 
 def _reversal(d: Diagnosis, one: BuildUp) -> str:
-    """Say what the samples about a joint's reversals show, which no fit uses."""
+    """Report the friction near a joint's reversals, which no fit uses."""
     machine = d.baseline.machine
     joint = machine.joint(one.joint)
     before, after = (amount(machine, one.joint, error) for error in (one.at_once, one.over_travel))
@@ -130,7 +132,7 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
 
 
 def _by_all_runs(d: Diagnosis) -> list[str]:
-    """Say that the validation runs helped to find what is missing, and why."""
+    """Report that the validation runs helped to find the causes, and why."""
     by_all = d.selected.by_all
     if by_all is None:
         return []
@@ -145,7 +147,7 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
 
 
 def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
-    """Return joints whose validation runs have a larger error, with it and with the training's."""
+    """Return joints whose validation error is larger, with it and with the training error."""
     errors = zip(d.after.errors.rms.tolist(), d.after.fit.rms.tolist(), strict=False)
     pairs = zip(d.baseline.joints, errors, strict=True)
     return (
@@ -156,7 +158,7 @@ def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
 
 
 def _differs(d: Diagnosis) -> list[str]:
-    """Say where the validation runs lack what no training run shows."""
+    """Report joints whose validation runs have an error that no training run shows."""
     machine = d.baseline.machine
     return [
         f"{the(joint)}'s {machine.joint(joint).effort} error is {amount(machine, joint, validated)}"
@@ -167,7 +169,7 @@ def _differs(d: Diagnosis) -> list[str]:
 
 
 def _one_run(d: Diagnosis) -> list[str]:
-    """Say what one training run cannot show, where nothing is named that it could be."""
+    """Report the limits of one training run, unless a cause is named."""
     if d.causes or d.data.spoilt or len(d.train) > 1 or d.selected.by_all:
         return []
     if d.status == "nothing_missing" and not _differing(d):
@@ -179,14 +181,14 @@ def _one_run(d: Diagnosis) -> list[str]:
 
 
 def _one_kind(d: Diagnosis) -> list[str]:
-    """Say what runs of one kind cannot show."""
+    """Report the limits of runs of one kind."""
     kinds = {run.motion.run for run in d.train}
     if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
-        return []  # nobody is meant to be in any other machine
+        return []  # other machines have no wearer
     if kinds == {"exo_alone"}:
         return [
-            "every run is without a person: what a person adds cannot be seen, and a shifted zero "
-            "cannot be told from a mass beside the axis. Record with_human runs as well"
+            "every run is without a person: effects of a person do not show, and a shifted zero "
+            "looks like a mass off the axis. Record with_human runs as well"
         ]
     if kinds == {"with_human"}:
         has_cuffs = any(run.motion.forces is not None for run in d.train)

@@ -1,7 +1,7 @@
-"""What naming the causes means for control: the adaptive loop on the model without and with them.
+"""Simulate the adaptive control loop on the model without and with the named causes.
 
-The controller has no model of the leg, its network learns one. So what changes is the leg it is
-simulated on, and with that the tracking error and the torque that a simulation promises.
+The controller has no model of the leg; its network learns one. So the causes change the simulated
+leg, and with it the predicted tracking error and torque.
 """
 
 from dataclasses import replace
@@ -27,10 +27,10 @@ NOT_OF_THE_LOOP = {"sweep_nm_s_rad", "figures"}
 
 
 def control(d: Diagnosis) -> dict[str, Any]:
-    """Return tracking error and peak torque of the adaptive loop without and with the named causes,
-    as JSON objects.
+    """Return tracking error and peak torque of the adaptive loop, as JSON objects.
 
-    Both count from ``settled_after_s`` on: before, the drives are at their limit, whatever the leg.
+    They are predicted without and with the named causes, from ``settled_after_s`` on: before, the
+    drives are at their limit, whatever the leg.
     """
     run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
     benefit: dict[str, Any] = {
@@ -56,7 +56,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
         try:
             benefit[which] = _tracked(fitted_model(fitted, d.baseline, run), run, d)
         except ExoidError as error:
-            # What is wrong; its second sentence tells those who asked for a simulation what to do.
+            # Only the first sentence applies: the second is advice for `exoid simulate`.
             reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
     return benefit | {"reason": "; ".join(reasons) or None}
 
@@ -80,7 +80,6 @@ def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]
 
 
 def _from_the_begin(term: Term) -> Term:
-    """Let what comes at some time of a run be there from its begin, or the loop might end
-    before."""
+    """Return a term whose onset is the run's begin, as the loop might end before it."""
     onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
     return replace(term, values=np.where(onset, 0.0, term.values))

@@ -1,5 +1,4 @@
-"""The error budget: what the baseline's squared error on validation runs is made of, joint by
-joint.
+"""Split the baseline's squared error on validation runs into causes, joint by joint.
 
 Mean squares of independent parts add up, root mean squares do not: every share is a mean square,
 (N·m)².
@@ -24,7 +23,8 @@ FLOOR, REPEATS, WANDERS, UNEXPLAINED = (
     "not_repeatable",
     "unexplained",
 )
-"""Shares next to the causes'; ``UNEXPLAINED`` stands for the two before it without a period."""
+"""Names of the shares that are no causes; without a period ``UNEXPLAINED`` replaces the two before
+it."""
 
 
 def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
@@ -54,17 +54,21 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
 def shares_of_causes(
     labels: Sequence[str], left_by: Callable[[frozenset[str]], NDArray]
 ) -> dict[str, NDArray]:
-    """Return what each cause takes away, averaged over all orders in which they can be named
-    (Shapley 1953).
+    """Return the mean square that each cause removes, averaged over all orders (Shapley 1953).
 
-    Causes overlap: what the first of two takes, the second cannot. The average is fair to both, and
-    adds up.
+    Causes overlap: the second of two cannot remove the part that the first removes. The average
+    over the orders in which they can be named is fair to both, and adds up.
 
     Parameters
     ----------
     labels : sequence of str
     left_by : callable
-        Mean squares (J,) that the model with a set of causes leaves.
+        Returns the mean squares (J,) of the model with a set of causes.
+
+    Returns
+    -------
+    dict of str to (J,) array
+        (N·m)², by label.
     """
     sets = [frozenset(s) for size in range(len(labels) + 1) for s in combinations(labels, size)]
     remaining = {s: left_by(s) for s in sets} if labels else {}
@@ -103,10 +107,10 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:
-    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)²;
-    None without periods.
+    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)².
 
-    Noise and all that moves from period to period, drift included: what is left above it repeats.
+    It has noise and all that changes from period to period, drift included; the rest of the mean
+    square repeats. None without periods.
     """
     squares, freedom = np.zeros(len(runs[0].motion.joints)), 0
     for run, residual in zip(runs, residuals, strict=True):

@@ -1,4 +1,5 @@
-"""``findings`` of the verdict: what is missing at the depth that the data support, in words."""
+"""Build ``findings`` of the verdict: what is missing, as precisely as the data support."""
+words."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -17,7 +18,7 @@ WORTH_A_LINE = 0.01
 
 
 def findings(d: Diagnosis) -> list[dict[str, Any]]:
-    """Return the findings as JSON objects, each with its words and the unlisted laws beside it."""
+    """Return the findings as JSON objects, each with its words and its unlisted laws."""
     weighed = d.selected.posterior
     return [] if weighed is None else [_as_json(d, one, weighed) for one in d.selected.findings]
 
@@ -37,14 +38,14 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
             "words": in_words(effect),
             "dropped": label in against,
         }
-    # The most probable law tells whose angle, speed or load it is.
+    # The most probable law has the joint whose angle, speed or load it is.
     law, p = next(iter(finding.laws), ("", 0.0))
     of_other_joint = p >= CRITERIA.likely and is_of_other_joint(law)
     for node in entry["path"]:
         node["words"] = _node_in_words(d, node, entry, of_other_joint)
     entry["laws"] = list(_laws(finding, machine))
     last = entry["path"][-1]["words"]
-    # Where it is unknown whether it repeats, the path ends at its beginning.
+    # If it is unknown whether it repeats, the path has its first node only.
     entry["words"] = last if len(entry["path"]) > 1 else "something that may repeat or not"
     return entry
 
@@ -57,7 +58,7 @@ def _node_in_words(
         return "something is missing"
     if level == "repeats":
         if not d.has_periods:
-            return f"something that {'goes' if value else 'does not go'} with the motion"
+            return f"something that {'depends' if value else 'does not depend'} on the motion"
         return f"something that {'repeats' if value else 'does not repeat'} with the motion"
     if level == "joint":
         return f"something at {the(value)}" if value else "something of no single joint"
@@ -69,7 +70,7 @@ def _node_in_words(
 
 
 def _laws(finding: Finding, machine: Machine) -> Iterator[dict[str, Any]]:
-    """Yield the unlisted laws beside a finding that are worth a line."""
+    """Yield the unlisted laws of a finding that are worth a line."""
     for label, p in finding.laws:
         if p >= WORTH_A_LINE:
             kind, joint = kind_and_joint(label)

@@ -1,4 +1,4 @@
-"""The verdict in one or two sentences: what a person reads first."""
+"""Write the summary: the verdict in one or two sentences, for the first look."""
 
 from typing import Any
 
@@ -14,9 +14,9 @@ from pipelines.wording.label import amount, cause_label, effect_of_cause, in_wor
 from pipelines.wording.law import UNLISTED
 
 MENTIONED = 3
-"""Tied causes in the summary; ``indistinguishable_from`` has all."""
+"""Largest number of tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
-"""Probability from which a cause is said to come closest."""
+"""Least probability of a cause that is reported as the closest."""
 
 
 def summary(d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None) -> str:
@@ -31,7 +31,7 @@ def summary(d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained |
 
 
 def _noise_without_periods(d: Diagnosis) -> str:
-    """Say which noise is estimated otherwise than from the differences of periods."""
+    """Report noise that is estimated without differences of periods."""
     weighed, floor = d.prepared.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
@@ -48,14 +48,14 @@ def _noise_without_periods(d: Diagnosis) -> str:
 
 
 def floor_from(d: Diagnosis) -> str:
-    """Say what the noise floor was estimated from."""
+    """Return the source of the noise floor in words."""
     return "periods" if d.floor.from_periods else _otherwise(d)
 
 
 def _otherwise(d: Diagnosis) -> str:
-    """Say what noise is estimated from without periods."""
+    """Return the source of the noise without periods, in words."""
     if d.data.noisy_angles:
-        return "what the model leaves of the motion's own band"
+        return "the residual in the motion's own band"
     return "the band above the motion"
 
 
@@ -69,7 +69,7 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
 def finding_in_words(
     d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None
 ) -> str:
-    """Return what was found, without remarks on floor and faults."""
+    """Return the finding in words, without remarks on floor and faults."""
     described = f" {remainder.description}" if remainder and remainder.description else ""
     if d.status == "nothing_missing":
         return f"{_nothing(d)}{described}"
@@ -83,15 +83,17 @@ def _worst_joint(d: Diagnosis) -> int:
 
 
 def _size(d: Diagnosis, place: int) -> str:
-    """Return a joint's error, and how many times the noise floor it is."""
+    """Return a joint's error, and its ratio to the noise floor, in words."""
     joint, error = d.baseline.joints[place], d.before.errors.rms[place]
     ratio = error / d.floor_rms[place]
     return f"{amount(d.baseline.machine, joint, error)}, {ratio:.2f} times the noise floor"
 
 
 def _error_there(d: Diagnosis) -> str:
-    """Return the error at the joint of the first finding; of none, where it is largest compared
-    with the noise."""
+    """Return the error at the joint of the first finding, in words.
+
+    Without a finding it is the joint whose error is largest compared with the noise.
+    """
     of_finding = d.selected.findings[0].joint if d.selected.findings else None
     place = d.baseline.joints.index(of_finding) if of_finding else _worst_joint(d)
     joint = d.baseline.joints[place]
@@ -109,7 +111,7 @@ def _nothing(d: Diagnosis) -> str:
         f" at {the(joint)}: {_size(d, place)}"
     )
     if hiding := floor_that_hides(d).get(joint):
-        text += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
+        text += f", but the floor itself is {hiding:.0%} of the {effort} and may hide effects"
     text = f"{text}.{_dropped(d) or _nearest(d)}"
     if d.is_mostly_unexplained:
         text += (
@@ -120,7 +122,7 @@ def _nothing(d: Diagnosis) -> str:
 
 
 def _nearest(d: Diagnosis) -> str:
-    """Say what comes closest where nothing is likely to be missing."""
+    """Return in words the closest cause where nothing is likely to be missing."""
     weighed = d.selected.posterior
     label, p = next(iter(weighed.marginals.items()), ("", 0.0)) if weighed else ("", 0.0)
     if p < CLOSEST:
@@ -130,7 +132,7 @@ def _nearest(d: Diagnosis) -> str:
 
 
 def _unlisted(d: Diagnosis) -> str:
-    """Say at which depth something is known that no listed cause explains."""
+    """Return in words, at the known depth, what is missing that no listed cause explains."""
     results = findings(d)
     if not results:
         return "Something is missing, and no listed cause is likely."
@@ -139,21 +141,21 @@ def _unlisted(d: Diagnosis) -> str:
     which = (
         "that no listed cause explains"
         if d.selected.shows_unlisted
-        else "and these data do not tell which listed cause it is"
+        else "and these data do not show which listed cause it is"
     )
     text = (
         f"Something is missing {which}: {first['words']} (probability"
         f" {first['probability']:.2f}){also}."
     )
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
-    # An effect that resembles a listed cause is told by that cause.
+    # An unlisted effect that resembles a listed cause is described by that cause.
     if laws and laws[0]["words"] != first["words"] and not laws[0]["law"].startswith(UNLISTED):
         text += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
     return f"{text}{_dropped(d) or _closest(d, first)}"
 
 
 def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
-    """Say which listed cause comes closest, if any does, and what keeps it from being named."""
+    """Return in words the closest listed cause, if any, and why it is not named."""
     close = [one for one in finding["causes"] if one["probability"] >= CLOSEST]
     if not close:
         return ""
@@ -167,7 +169,7 @@ def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
 
 
 def _dropped(d: Diagnosis) -> str:
-    """Say which causes the validation runs speak against, and how."""
+    """Return in words which causes the validation runs contradict, and how."""
     labels = sorted(d.selected.dropped)
     if not labels:
         return ""
@@ -188,7 +190,7 @@ def _dropped(d: Diagnosis) -> str:
 
 
 def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
-    """Name the causes, and say what naming them gains."""
+    """Return in words the named causes and their gain."""
     doubts = [doubt_of_gain(d, cause_label(cause)) for cause in causes]
     named = "; and ".join(
         _in_words(cause) + (f", {doubt[0]}" if doubt else "")
@@ -212,15 +214,14 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 
 
 def _they(causes: list[dict[str, Any]]) -> str:
-    """Return what stands for the causes that were fitted; of those tied with one another the first
-    is."""
+    """Return the pronoun of the fitted causes; of tied causes the first is fitted."""
     if len(causes) > 1:
         return "them"
     return "the first of them" if causes[0]["indistinguishable_from"] else "it"
 
 
 def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
-    """Say at which joints that have a cause the error does not fall."""
+    """Report joints with a named cause whose error does not fall."""
     joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
     with_one = {cause["joint"] for cause in causes}
     none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
@@ -230,7 +231,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 
 
 def _remains(d: Diagnosis, most: int) -> str:
-    """Say how far the joint is from its floor, and where else something stays unexplained."""
+    """Return in words the joint's distance from its floor, and other joints above theirs."""
     ratio = d.after.errors.rms / d.floor_rms
     above = d.left_over
     here = f"{'still ' if above[most] else ''}{ratio[most]:.2f} times the floor"
@@ -244,11 +245,11 @@ def _remains(d: Diagnosis, most: int) -> str:
 
 
 def _in_words(cause: dict[str, Any]) -> str:
-    """Return a cause, those tied with it, and how probable they are together."""
+    """Return a cause, its ties, and their probability together, in words."""
     alike = [in_words(effect_of_cause(one)) for one in (cause, *cause["indistinguishable_from"])]
     likely = f"{cause['probability']:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
     more = [f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else []
     *most, last = [*alike[:MENTIONED], *more]
-    return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"
+    return f"{', '.join(most)} or {last}, which these data cannot separate (together {likely})"

@@ -1,11 +1,11 @@
-"""Causes that data of a kind can never separate, why, and what would."""
+"""Describe causes that data of a kind can never separate, why, and how to separate them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Tie:
-    """Why two causes look alike, and how to part them."""
+    """Why two causes look alike, and how to separate them."""
 
     why: str
     how_to_separate: str
@@ -23,18 +23,18 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         "put a spirit level on the base, or let the machine hang freely and read its first angle",
     ),
     frozenset({"encoder_offset", "mass_off_axis"}): Tie(
-        "under one load a shifted zero and a mass beside the axis turn gravity alike",
+        "under one load a shifted zero and a mass off the axis turn gravity alike",
         "record with another load as well, a person or a known weight: an offset is one angle in"
         " both, a mass is not",
     ),
     frozenset({"base_tilt", "mass_off_axis"}): Tie(
-        "under one load a tilted base and a mass beside the axis turn gravity alike",
+        "under one load a tilted base and a mass off the axis turn gravity alike",
         "record with another load as well, a person or a known weight, or put a spirit level on the"
         " base",
     ),
     frozenset({"torque_gain"}): Tie(
-        "where nothing else tells the load only the ratio of both gains shows: one too high is the"
-        " other too low",
+        "without another measurement of the load only the ratio of both gains shows: one too high"
+        " looks like the other too low",
         "hang a known weight on each joint in turn; or record the cuff forces, with and without the"
         " person",
     ),
@@ -75,13 +75,20 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
 
 
 def tie_between(named: str, other: str, confirm_named: str, confirm_other: str) -> Tie:
-    """Return why two effects (names without joints) are not told apart, structural or only on this
-    motion."""
+    """Return why two effects are not separated, for any data or on this motion only.
+
+    Parameters
+    ----------
+    named, other : str
+        Names of the effects, without joints.
+    confirm_named, confirm_other : str
+        Their experiments.
+    """
     structural = STRUCTURAL.get(frozenset({named, other}))
     if structural:
         return structural
     return Tie(
-        "along this motion their torques differ by less than noise and the other parameters can"
-        " make up",
+        "on this motion the difference of their torques is below the noise, or other parameters"
+        " compensate it",
         f"for the one: {confirm_named}; for the other: {confirm_other}",
     )

@@ -1,5 +1,4 @@
-"""What the named causes leave: what it depends on, and a smooth term that extends the model by
-it."""
+"""Describe the residual of the named causes, and extend the model by a smooth term."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,10 +24,11 @@ class Unexplained:
     smooth: str
     """The smooth term in words."""
     rmse_nm: dict[str, float]
-    """Of the model with the smooth term, on validation runs: measured, for it may do harm there."""
+    """Of the model with the smooth term, on validation runs. It is measured, as the term may do
+    harm there."""
 
     def as_json(self) -> dict[str, Any]:
-        """Return what the verdict says of it."""
+        """Return the entry of the verdict."""
         return {
             "description": self.description,
             "depends_on": [
@@ -40,10 +40,9 @@ class Unexplained:
 
 
 def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
-    """Describe the residual of validation runs and extend the model by a smooth term learnt on
-    train runs.
+    """Describe the residual of the validation runs, and fit a smooth term to the training runs.
 
-    ``found`` is what the extended model's residual depends on.
+    ``dependences`` are those of the extended model's residual.
     """
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)

@@ -1,4 +1,4 @@
-"""``verdict.json``: the diagnosis in the words of its contract."""
+"""Build ``verdict.json``: the diagnosis as its contract has it."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -126,7 +126,7 @@ def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _depends_on(
     before: Sequence[Dependence], after: Sequence[Dependence]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return what each joint's residual depends on, under the baseline and the extended model."""
+    """Return the dependences of each joint's residual, under baseline and extended model."""
     shares = {(one.joint, one.variable): one.share for one in after}
     return {
         joint: [

@@ -1,5 +1,7 @@
-"""The diagnosed models beside the recording they get most wrong: torque, and 1 s simulations under
-that torque."""
+"""Find the stretch that the baseline predicts worst, and simulate the models there.
+
+Simulations are of 1 s each, under the measured torque.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,7 +38,7 @@ class Stretch:
 
 
 def worst_stretch(d: Diagnosis) -> Stretch:
-    """Return where the baseline leaves most of the torque, in units of each joint's noise floor."""
+    """Return the stretch with the largest residual, in units of each joint's noise floor."""
     return max(_stretches(d), key=lambda pair: pair[0])[1]
 
 
@@ -56,11 +58,10 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
 def simulated_error(
     validated: Validated, d: Diagnosis, stretch: Stretch
 ) -> tuple[NDArray, NDArray] | None:
-    """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN
-    between two.
+    """Return times (k,) s and angle errors (k, J) rad of consecutive 1 s windows.
 
-    None where the model cannot be simulated: causes that the forward dynamics cannot hold together,
-    or a mass matrix that no leg has.
+    NaN separates two windows. None where the model cannot be simulated: the forward dynamics cannot
+    combine its causes, or its mass matrix is that of no leg.
     """
     run = d.validate[stretch.run]
     try:

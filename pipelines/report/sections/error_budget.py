@@ -189,11 +189,11 @@ def tied_in_words(cause: dict[str, Any]) -> str:
     if not ties:
         return words
     if len(ties) > 1:
-        return f"{words} or {len(ties)} others that these data cannot tell apart"
+        return f"{words} or {len(ties)} others that these data cannot separate"
     other, where = cause_in_words(ties[0]), f" at {the(cause['joint'])}"
     return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"
 
 
 def ties_of(cause: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what data of this kind cannot tell from a named cause."""
+    """Return the causes that data of this kind cannot separate from a named one."""
     return list(cause["indistinguishable_from"])

@@ -66,7 +66,7 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
             "probability" + (", with its ties" if ties else ""),
             f"{100 * cause['probability']:.0f}",
             "%",
-            words + (f", or one of {ties} that these data cannot tell from it" if ties else ""),
+            words + (f", or one of {ties} that these data cannot separate from it" if ties else ""),
         ),
         Tile(
             f"gain of {words}",

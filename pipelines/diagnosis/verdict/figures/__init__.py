@@ -1,5 +1,7 @@
-"""The figures of a diagnosis. Their names alone are here: a diagnosis without figures starts
-without matplotlib."""
+"""Name the figures of a diagnosis.
+
+Only their names are here: a diagnosis without figures starts without matplotlib.
+"""
 
 FIGURES = ("decision", "verdict", "error-budget", "simulation", "dependence")
 """Names of their files."""

@@ -1,5 +1,4 @@
-"""A joint's residual against one variable: dots, and the mean of what stands above the same
-value."""
+"""Draw a joint's residual against one variable: dots, and the mean at each value."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,32 +18,31 @@ from pipelines.plotting.style import NOISE
 from pipelines.signals.binned_mean import binned_mean
 
 DOTS = 2000
-"""At most, or a cloud hides its shape (and takes long to draw)."""
+"""Largest number of dots: more hide the shape, and take long to draw."""
 LINES = ("-", "--", ":", "-.")
-"""Of the parts' means."""
+"""Line styles of the parts' means."""
 TALLEST = 99.0
-"""Percentile of the residual's size that a panel must show."""
+"""Percentile of the residual's size that a panel shows."""
 
 
 @dataclass(frozen=True)
 class Against:
-    """Where one joint's residuals stand along a variable, n usable blocks of some runs together."""
+    """One joint's residuals along a variable, n usable blocks of some runs together."""
 
     label: str
     x: NDArray
     """(n,)."""
     parts: tuple[NDArray, ...]
-    """(n,) bool each: what has a mean of its own, as the two directions of motion, or each run over
-    time."""
+    """(n,) bool each: blocks with a mean of their own, as the two directions of motion, or each run
+    over time."""
     before: NDArray
-    """(n,) N·m that the baseline leaves."""
+    """(n,) N·m under the baseline."""
     after: NDArray
-    """(n,) N·m that the extended model leaves."""
+    """(n,) N·m under the extended model."""
 
 
 def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Against:
-    """Return a joint's residuals of the validation runs of some kinds along the variable of a name,
-    or ``tone``."""
+    """Return a joint's residuals of validation runs of some kinds along a variable or ``tone``."""
     j = d.baseline.joints.index(joint)
     variable = next((v for v in VARIABLES if v.name == name), None)
     chosen = [
@@ -98,8 +96,7 @@ def _title(variable: Variable, joints: Sequence[str], j: int) -> str:
 def _along_tone(
     runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> tuple[str, list[NDArray]]:
-    """Fold time at the frequency of the strongest tone in residuals (m,), each run from its own
-    tone's crest."""
+    """Fold time at the strongest tone in residuals (m,), each run from its tone's crest."""
     wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
     frequency, _ = tone(runs, wide, j)
     x = []
@@ -112,15 +109,14 @@ def _along_tone(
 
 
 def reach(*residuals: NDArray) -> float:
-    """Return how tall a panel must be to show residuals (m,), N·m either side of nought."""
+    """Return the height of a panel for residuals (m,), N·m on either side of zero."""
     return 1.1 * max(
         (float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0
     )
 
 
 def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) -> None:
-    """Draw before (grey) and, where a cause was named, after (blue), on the band of the noise
-    floor."""
+    """Draw before (grey) and, with named causes, after (blue), on the band of the noise floor."""
     axis.axhspan(-floor, floor, color=NOISE, alpha=0.5, lw=0)
     axis.axhline(0, color="black", lw=0.6)
     step = max(1, len(seen.x) // DOTS)

@@ -1,5 +1,4 @@
-"""The error budget: one bar for each joint, as long as its mean square error, cut into what it is
-made of."""
+"""Draw the error budget: a bar for each joint, as long as its mean square error, in shares."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,15 +17,15 @@ from pipelines.wording.label import SHARES, in_words
 
 COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, UNEXPLAINED: BLUE}
 ROOM = 0.07
-"""Share of a bar that a number needs to stand in it."""
+"""Share of a bar from which its number fits in it."""
 SMALL = 0.095
 """Root mean square below which two digits are written, not two decimals."""
 NEGLIGIBLE = 0.005
-"""Share of a bar that is not worth a line."""
+"""Share of a bar below which its line reads "none"."""
 
 
 def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
-    """Draw a bar for each joint, and beside it every share in N·m, at a prismatic joint in N."""
+    """Draw a bar for each joint, next to it every share in N·m, at a prismatic joint in N."""
     budget, units = (
         verdict["error_budget"],
         {joint: of["torque"] for joint, of in verdict["units"].items()},
@@ -65,7 +64,7 @@ def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
 
 
 def words_of(key: str, d: Diagnosis) -> str:
-    """Say what a share is."""
+    """Return a share's name in words."""
     return SHARES.get(key) or in_words(d.effects[key])
 
 
@@ -76,8 +75,7 @@ def stack(
     colours: Mapping[str, str],
     scale: float = 1.0,
 ) -> None:
-    """Lay the shares end to end; those below zero, of causes that raise a joint's error, go to the
-    left."""
+    """Draw the shares end to end; negative ones, of causes that raise an error, go to the left."""
     right = left = 0.0
     whole = highest(shares) * scale
     for key, share in shares.items():
@@ -99,17 +97,17 @@ def stack(
 
 
 def highest(shares: Mapping[str, float]) -> float:
-    """Return how far a bar goes to the right."""
+    """Return the length of a bar to the right."""
     return sum(share for share in shares.values() if share > 0)
 
 
 def lowest(shares: Mapping[str, float]) -> float:
-    """Return how far a bar goes to the left of zero."""
+    """Return the length of a bar to the left of zero."""
     return sum(share for share in shares.values() if share < 0)
 
 
 def rms(share: float) -> str:
-    """Return a mean square as root mean square; minus where it is taken from the others."""
+    """Return a mean square as root mean square, with a minus sign for a negative share."""
     root = np.sqrt(abs(share))
     return (
         f"{'−' if share < 0 else ''}{root:.2f}"

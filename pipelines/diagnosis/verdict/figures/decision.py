@@ -1,4 +1,4 @@
-"""The first figure: how each joint's residual repeats, what it depends on, and what explains it."""
+"""Draw the first figure: how residuals repeat, their dependence, and their explanation."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ COLOURS = {
     "repeats": BLUE,
     "unsplit": GREY,
 }
-"""Of the residual's parts: the more of it a model could explain, the darker."""
+"""Colours of the residual's parts: the more of it a model could explain, the darker."""
 DARK = ("repeats", "unsplit", "between_runs")
-"""Parts on which numbers are white."""
+"""Parts with white numbers."""
 ORDER = ("noise", "wanders", "between_runs", "unsplit", "repeats")
 FAMILIES = {
     "person": "#3b0764",
@@ -40,26 +40,27 @@ FAMILIES = {
     "sensor": "#f59e0b",
     "time": "#fde68a",
 }
-"""Of each family of laws, by rising lightness, so that they differ in grey too."""
+"""Colours of the families of laws, by rising lightness, so that they differ in grey too."""
 UNLISTED = "////"
-"""Hatching of a law that nobody listed."""
+"""Hatching of an unlisted law."""
 SHOWN, LEAST = 6, 0.01
-"""Sets in the figure at most, and the least probable one: the others share one bar."""
+"""Largest number of sets in the figure, and the least probability of one: the others share one
+bar."""
 TEXT = 0.08
-"""Share of a bar in which its number fits."""
-TELLING = 0.05
-"""Share that a variable must predict to be shown, except the usual ones."""
+"""Share of a bar from which its number fits in it."""
+PREDICTS = 0.05
+"""Least share that a variable must predict to be shown, except the usual ones."""
 OTHERS = 3
-"""Variables besides the usual ones."""
+"""Number of variables besides the usual ones."""
 SHORT = {"acceleration": "accel-\neration"}
 """Names that need two lines."""
 NEGLIGIBLE = 0.01
-"""Share that has no entry in the legend."""
+"""Share below which a part has no entry in the legend."""
 PERSON = "of it with a person only"
 LABEL = 34
 """Characters in a line of a label."""
 LINE_IN, SMALLEST_IN, FEWEST = 0.17, 4.4, 17
-"""Height of a line of a label, least height of the figure, and lines that it has room for."""
+"""Height of a line of a label, least height of the figure, and its least number of lines."""
 SHADES = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
 NOTHING = "nothing is missing"
 PROBABILITY = "probability of each set of causes and laws; bold: named, or tied with it"
@@ -76,12 +77,12 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     _shares(drawn.add_subplot(grid[0, 0]), verdict)
     _dependence(drawn.add_subplot(grid[1, 0]), verdict)
     _sets(drawn.add_subplot(grid[:, 1]), bars)
-    drawn.draw_without_rendering()  # lays out, which whoever measures the figure relies on
+    drawn.draw_without_rendering()  # lays out: callers measure the figure
     return drawn
 
 
 def _shares(axis: Axes, verdict: Mapping[str, Any]) -> None:
-    """Draw a bar for each joint, cut into what its residual is made of."""
+    """Draw a bar for each joint, split into the parts of its residual."""
     seen: dict[str, Patch] = {}
     router = verdict["router"]
     for row, shares in enumerate(router.values()):
@@ -144,7 +145,7 @@ def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None
 
 
 def _dependence(axis: Axes, verdict: Mapping[str, Any]) -> None:
-    """Draw a field for each joint and variable: how much of the error a curve of it predicts."""
+    """Draw a field for each joint and variable: the share of the error that its curve predicts."""
     ranked = {
         joint: {one["variable"]: one["share_before"] for one in ranking}
         for joint, ranking in verdict["depends_on"].items()
@@ -168,11 +169,11 @@ def _dependence(axis: Axes, verdict: Mapping[str, Any]) -> None:
 
 
 def _variables(ranked: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return the usual variables, and others that are telling; the phase is what repeats."""
+    """Return the usual variables, and others that predict enough, without the phase."""
     every = dict.fromkeys(name for of in ranked.values() for name in of if name != "phase")
     most = {name: max(of.get(name, 0.0) for of in ranked.values()) for name in every}
     usual = [name for name in VARIABLES if name in every]
-    others = [name for name in every if name not in usual and most[name] >= TELLING]
+    others = [name for name in every if name not in usual and most[name] >= PREDICTS]
     return usual + sorted(others, key=lambda name: -most[name])[:OTHERS]
 
 
@@ -182,7 +183,7 @@ class Bar:
 
     probability: float
     elements: tuple[tuple[str, str | None, bool, bool], ...]
-    """Words, family, whether unlisted, and whether an answer, of each."""
+    """Words, family, whether unlisted, and whether an answer, of each element."""
 
 
 def _bars(d: Diagnosis) -> list[Bar]:
@@ -221,7 +222,7 @@ def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str |
 
 
 def _height(bar: Bar) -> float:
-    """Return how many lines a bar takes, with the gap below it."""
+    """Return the number of lines of a bar, with the gap below it."""
     return sum(1.3 + words.count("\n") for words, *_ in bar.elements) + 0.6
 
 
@@ -229,7 +230,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     """Draw a bar for each set, with a stripe for each of its elements."""
     _title(axis, "What explains it?")
     if not bars:
-        axis.text(0.0, 0.9, "not asked: acquisition is at fault", transform=axis.transAxes)
+        axis.text(0.0, 0.9, "not searched: acquisition is at fault", transform=axis.transAxes)
         axis.set_axis_off()
         return
     ticks, families, top = [], dict[str, Patch](), 0.0

@@ -1,4 +1,4 @@
-"""The residual against everything that the runs know, most telling first."""
+"""Draw the residual against the variables of the runs, the most predictive first."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ from pipelines.diagnosis.verdict.figures.against import against, draw, reach
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 
 SHOWN = ("angle", "speed", "load", "time", "phase")
-"""Always; another variable only where it predicts something."""
+"""Variables that are always shown; others only where they predict something."""
 SOMETHING, MOST = 0.05, 6
-"""Share from which a variable predicts something, and most variables beside the phase."""
+"""Share from which a variable predicts something, and most variables in addition to the phase."""
 EXPLAINED = (
     "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward,"
     " or another run."
@@ -55,8 +55,7 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
 
 
 def _shown(ranking: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return what is drawn, the phase last: it can imitate whatever repeats, and says only that
-    something does."""
+    """Return the variables to draw, the phase last: it can imitate everything that repeats."""
     chosen = [one for one in ranking if one["share_before"] > SOMETHING or one["variable"] in SHOWN]
     phase = [one for one in chosen if one["variable"] == "phase"]
     others = [one for one in chosen if one["variable"] != "phase"]

@@ -1,5 +1,4 @@
-"""The figures of a diagnosis: what the simulation gets wrong, and what naming the cause makes of
-it."""
+"""Draw all figures of a diagnosis."""
 
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,13 @@ DRAWN_BY = {
     "simulation": simulation.figure,
     "dependence": dependence.figure,
 }
-"""By file name, all of ``FIGURES``: what draws it from a diagnosis and what is said of it."""
+"""The function that draws each of ``FIGURES`` from a diagnosis and its verdict, by file name."""
 ON_SCREEN = ("simulation", "dependence")
-"""Many panels to look at, not to print: a PDF of each would take as long as all the rest."""
+"""Figures of many panels for the screen: a PDF of each takes as long as all others."""
 
 
 def draw(d: Diagnosis, verdict: dict[str, Any], folder: Path) -> None:
-    """Write every figure as PNG, and what is to be printed as PDF too; ``said`` is the diagnosis's
-    verdict."""
+    """Write every figure as PNG, and those to print as PDF too."""
     with plt.rc_context(STYLE):
         for name, figure in DRAWN_BY.items():
             save(

@@ -3,5 +3,5 @@
 from pipelines.plotting.style import BLUE, GREY
 
 BEFORE, AFTER = GREY, BLUE
-"""What the baseline leaves or simulates; what the extended model does."""
+"""Residual or simulation of the baseline, and of the extended model."""
 MEASURED = "black"

@@ -1,4 +1,4 @@
-"""The replayed simulation against what was measured, where the baseline gets it most wrong."""
+"""Draw replayed simulation and measurement where the baseline is worst."""
 
 from typing import Any
 
@@ -16,9 +16,9 @@ from pipelines.plotting.style import NOISE
 from pipelines.wording.label import number
 
 NARROWEST = 8.0
-"""Inches that the titles need."""
+"""Width that the titles need, inches."""
 FAR_MRAD = 500.0
-"""Error beyond which a window has nothing more to show."""
+"""Largest error that is shown, mrad."""
 
 
 def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
@@ -41,7 +41,7 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
             -d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor"
         )
         column[0].set_title(
-            f"{joint}: 1 s simulations stray {_strayed(verdict, joint)}", loc="left", fontsize=9
+            f"{joint}: 1 s simulations drift {_drift(verdict, joint)}", loc="left", fontsize=9
         )
         column[2].set_title(
             f"{joint}: {d.baseline.machine.joint(joint).effort} is off by"
@@ -91,18 +91,18 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _strayed(verdict: dict[str, Any], joint: str) -> str:
+def _drift(verdict: dict[str, Any], joint: str) -> str:
     before, after = (
         verdict[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended")
     )
     if before is None:
-        return "no one can tell: these parameters move no leg"
-    words = f"{1e3 * before:.1f}"
-    if verdict["causes"]:
-        words += (
-            f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
-        )
-    return f"{words} m{verdict['units'][joint]['angle']} rms"
+        return "(cannot be simulated)"
+    unit = f"m{verdict['units'][joint]['angle']} rms"
+    if not verdict["causes"]:
+        return f"{1e3 * before:.1f} {unit}"
+    if after is None:
+        return f"{1e3 * before:.1f} {unit} → cannot be simulated"
+    return f"{1e3 * before:.1f} → {1e3 * after:.1f} {unit}"
 
 
 def _off(d: Diagnosis, verdict: dict[str, Any], joint: str) -> str:
@@ -144,10 +144,10 @@ def _angles(
         if simulated is None:
             angle.plot([], [], color=colour, lw=2, label=f"{name} (cannot be simulated)")
             continue
-        time, strayed = simulated
+        time, drift = simulated
         recorded = np.interp(time, motion.time, motion.q[:, j])
-        angle.plot(time, recorded - strayed[:, j], color=colour, lw=2, label=name)
-        error.plot(time, 1e3 * strayed[:, j], color=colour, lw=1.4)
+        angle.plot(time, recorded - drift[:, j], color=colour, lw=2, label=name)
+        error.plot(time, 1e3 * drift[:, j], color=colour, lw=1.4)
 
 
 def _torques(

@@ -1,5 +1,4 @@
-"""The one figure beside the summary: what the torque error is made of, and what the cause made of
-it."""
+"""Draw the figure of the summary: parts of the torque error, and the effect of the causes."""
 
 import textwrap
 from typing import Any
@@ -34,8 +33,7 @@ LINE_IN, BODY_IN = 0.19, 3.5
 
 
 def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
-    """Draw the error budget, and the residual against the variable that shows best what is
-    wrong."""
+    """Draw the error budget, and the residual against the variable that shows the cause best."""
     summary = textwrap.wrap(verdict["summary"], WIDTH)
     head = 0.1 + LINE_IN * len(summary)
     height = head + BODY_IN
@@ -86,7 +84,7 @@ def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
 
 
 def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
-    """Draw the residual where the first cause shows best, or where the unexplained does."""
+    """Draw the residual where the first cause, or the unexplained part, shows best."""
     if d.causes:
         joint, variable, kinds = _shown_best(d, verdict)
     else:
@@ -94,7 +92,7 @@ def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
             verdict["noise_floor_nm"],
             key=lambda j: verdict["baseline_rmse_nm"][j] / verdict["noise_floor_nm"][j],
         )
-        # When a fault of acquisition sets in tells more than what it goes with.
+        # The time at which a fault of acquisition begins is its best description.
         variable, kinds = (
             "time" if d.data.spoilt else verdict["depends_on"][joint][0]["variable"],
             RUNS,
@@ -123,8 +121,7 @@ def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
 
 
 def _shown_best(d: Diagnosis, verdict: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
-    """Return joint, variable and kinds of run: what the first cause adds goes with the variable
-    most."""
+    """Return joint, variable and kinds of run that show the first cause's torque best."""
     first = verdict["causes"][0]
     joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
     runs = [
