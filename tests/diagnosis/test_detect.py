@@ -12,7 +12,7 @@ from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detectability import (
     POWER,
-    Look,
+    DetectionResult,
     _alike,
     detectability,
     needed_noncentrality,
@@ -186,5 +186,7 @@ def test_planned_noise_is_what_block_averages_of_coloured_noise_have():
 
 
 def test_what_a_motion_shows_at_no_size_is_like_nothing_that_it_shows():
-    unseen = Look((), np.inf, np.inf, "exo_alone", np.inf, *[np.zeros((0, 0))] * 3, plausible=False)
+    unseen = DetectionResult(
+        (), np.inf, np.inf, "exo_alone", np.inf, *[np.zeros((0, 0))] * 3, plausible=False
+    )
     assert not _alike(unseen, np.array([0.0, 0.5, 1.0])).any()

@@ -21,7 +21,7 @@ COLUMNS = ("left out", "learned from", "judged on", "learned without it", "as sh
 ABOUT = """\
 Measured by `python -m tests.learn cross-validate --most {most}`. Each world is left
 out in turn, and so is each third of the forms that effects have in the worlds. The criteria are
-learned anew from the other sessions and judged on those left out. Each learned number starts at
+learned again from the other sessions and judged on those left out. Each learned number starts at
 twice its shipped value, the prior's learned odds at zero. Numbers that are not learned, and the
 choice of the sets that are compared, come from the shipped criteria, which were learned from all
 sessions. So these losses are lower bounds. The last two columns are the mean log probability of the

@@ -1,5 +1,4 @@
 """Build ``findings`` of the verdict: what is missing, as precisely as the data support."""
-words."""
 
 from collections.abc import Iterator
 from typing import Any
