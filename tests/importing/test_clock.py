@@ -201,7 +201,7 @@ def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, t
     )
     assert (
         uniform.code,
-        "joint[0].torque.time: found 'fast' beside time.rate_hz" in uniform.err,
+        "joint[0].torque.time: found 'fast' with time.rate_hz" in uniform.err,
     ) == (2, True)
 
 

@@ -86,10 +86,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
         (
             'scale = 0.1, unit = "mA"',
             'scale = 0.0, unit = "mA"',
-            (
-                "map.drive.servo.read.current: scale: found 0, "
-                "expected units per count; every value would be the offset"
-            ),
+            ("map.drive.servo.read.current: scale: found 0, expected units per count"),
         ),
         (
             "angle_rad = [-0.35, 1.75]",

@@ -98,7 +98,7 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
                 f" {columns['time_s'][far[0]]:.6g} s; 99 % lie between {middle - usual:.4g} and"
                 f" {middle + usual:.4g}"
             )
-            yield Finding(name, seen, "kept; if it is a slip, a range at the reading leaves it out")
+            yield Finding(name, seen, "kept; to exclude an outlier, set a range at the reading")
 
 
 def _every_kth(values: NDArray) -> NDArray:

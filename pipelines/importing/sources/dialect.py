@@ -20,7 +20,7 @@ COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
 STRAY = 0.1
-"""Share of NUL bytes up to which a file may be a text with slips; of UTF-16 they are half."""
+"""Share of NUL bytes up to which a file may be a damaged text; UTF-16 has half."""
 ENOUGH = 0.5
 """Least share of numbers among the fields of a row of data; others are dates and states."""
 

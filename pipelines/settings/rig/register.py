@@ -83,9 +83,7 @@ class Register(Settings):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         if self.scale == 0.0:
-            raise ValueError(
-                "scale: found 0, expected units per count; every value would be the offset"
-            )
+            raise ValueError("scale: found 0, expected units per count")
         if self.address + self.registers > 65536:
             raise ValueError(
                 f"address: found {self.address}, but a {self.type} there ends beyond address 65535"
