@@ -34,7 +34,7 @@ OF_SINGLES: tuple[tuple[Table, str], ...] = (
         "joint under *joint*.",
     ),
 )
-"""What the examination with most single effects tells best, and what is said above each table."""
+"""Tables of the examination with most single effects, each with the remark above it."""
 OF_EACH: tuple[tuple[Table, str], ...] = (
     (tables.by_world, ""),
     (tables.pairs, ""),
@@ -55,7 +55,7 @@ OF_EACH: tuple[tuple[Table, str], ...] = (
     (
         tables.probabilities,
         "Of every named cause, whether it or what it is tied with was there.\n\n"
-        "![Probability said against how often it was so]({picture})\n\n"
+        "![Stated probability against how often the cause was there]({picture})\n\n"
         "*Drawn from examination 1.*",
     ),
     (
@@ -65,22 +65,22 @@ OF_EACH: tuple[tuple[Table, str], ...] = (
     ),
     (
         tables.seconds,
-        "Quantiles of wall time, beside whatever else ran; `make bench` measures speed.",
+        "Quantiles of wall time, on a machine with other work; `make bench` measures speed.",
     ),
 )
-"""What every examination tells that has such cases; a remark may show the page's ``{picture}``."""
+"""Tables of every examination that has such cases; a remark may show the page's ``{picture}``."""
 
 INTRODUCTION = """\
 # How often a diagnosis is right
 
-Written by `make blind-page` from the records of the blind examination;
-[tests/blind/README.md](../tests/blind/README.md) says what that is, what is hidden and how answers
-are scored. Recordings come from simulators that share no code with exoid, and `exoid diagnose` gets
-them and nothing else. Shares with Wilson's 95 % interval in brackets.
+For everyone who asks how far to trust a verdict. Written by `make blind-page` from the records of
+the blind examination; [tests/blind/README.md](../tests/blind/README.md) explains what is hidden and
+how answers are scored. The recordings come from simulators that share no code with exoid, and
+`exoid diagnose` gets nothing else. Brackets hold Wilson's 95 % interval of a share.
 """
 OF_ONE_JOINT = """\
-Here they are of machines of one joint, of sizes far from an exoskeleton's: a pendulum, a turntable,
-a level slide and a lift, each with one run of 60 to 80 s to train on and one to validate on.
+These are machines of one joint, of sizes far from an exoskeleton's: a pendulum, a turntable, a
+level slide and a lift. Each has one run of 60 to 80 s to train on and one to validate on.
 """
 
 
@@ -161,7 +161,7 @@ def _targets(examinations: Sequence[Examination]) -> str:
             cells += [m.shown, {True: "yes", False: "**no**", None: ""}[m.met]]
         rows.append(tuple(cells))
     note = "*Met* says whether the measured value itself, not its interval, is within the target.\n"
-    return f"{titled(Page('What was asked for, and what was measured', tuple(head), rows))}\n{note}"
+    return f"{titled(Page('Targets and measurements', tuple(head), rows))}\n{note}"
 
 
 def main(

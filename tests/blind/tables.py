@@ -61,7 +61,7 @@ def by_magnitude(scores: Sequence[Score]) -> Page:
 
 def by_visibility(scores: Sequence[Score]) -> Page:
     """Count singles by what of them is there to be seen."""
-    title = "By visibility (what the baseline cannot imitate, over the noise floor)"
+    title = "By visibility (the part that the baseline cannot imitate, over the noise floor)"
     return _rates(title, of(scores, "single"), _visibility_of)
 
 
@@ -212,7 +212,7 @@ def probabilities(scores: Sequence[Score]) -> Page:
     """Show whether probabilities mean what they say."""
     curve = reliability([f for s in scores for f in s.probabilities])
     rows = [(f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", str(b.happened)) for b in curve]
-    return Page("Reliability of the probabilities", ("said", "mean", "was so"), rows)
+    return Page("Reliability of the probabilities", ("stated", "mean", "frequency"), rows)
 
 
 def coverage(scores: Sequence[Score]) -> Page:

@@ -79,7 +79,7 @@ def test_a_record_reads_as_it_was_written(tmp_path):
 
 
 def test_the_page_sets_what_was_measured_beside_what_was_asked_for():
-    said = section(page([MIXED]), "What was asked for, and what was measured")
+    said = section(page([MIXED]), "Targets and measurements")
     assert (
         "| single: right cause and joint first | >= 93 % | 50.0 % of 2 (9 to 91) | **no** |" in said
     )

@@ -25,11 +25,11 @@ GENERATED = {
 """Pages that a program writes as a whole."""
 
 NOT_YET: dict[str, int] = {
-    "docs/believe.md": 2,
+    "docs/believe.md": 1,
     "docs/command-line.md": 2,
     "docs/contracts.md": 27,
     "docs/design.md": 5,
-    "docs/diagnosis.md": 3,
+    "docs/diagnosis.md": 1,
     "docs/estimators.md": 10,
     "docs/export.md": 6,
     "docs/identification.md": 13,
@@ -38,9 +38,8 @@ NOT_YET: dict[str, int] = {
     "docs/real-data.md": 21,
     "docs/report.md": 7,
     "docs/rig-check.md": 5,
-    "docs/science.md": 25,
+    "docs/science.md": 24,
     "docs/simulation.md": 4,
-    "docs/tutorial.md": 1,
     "docs/verdict.md": 3,
 }
 """Sentences that are too long in pages that hold some still; a new one fails, and so does a page
@@ -56,7 +55,7 @@ NOT_PROSE = re.compile(r"^(?:    |\||#|!\[).*$", re.MULTILINE)
 """Indented code, tables, headings and pictures."""
 BLOCKS = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )")
 BULLET = re.compile(r"^\s*(?:[-*>]|\d+\.) +")
-ENDS = re.compile(r"(?<!\bet al)[.?!][\"')*]*\s+(?=[\"'(*\[]*(?:[A-Z0-9`]|exoid\b))")
+ENDS = re.compile(r"(?<!\bet al)[.?!][\"')*]*\s+(?=[\"'(*]*(?:[A-Z0-9`\[]|exoid\b))")
 
 
 def sentences(page: str) -> Iterator[str]:
