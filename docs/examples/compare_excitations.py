@@ -1,4 +1,4 @@
-"""Compare two excitations before anything moves: how well each tells the parameters apart."""
+"""Compare two excitations before anything moves: how well each separates the parameters."""
 
 import numpy as np
 
@@ -21,18 +21,19 @@ RICH = FourierTrajectory(
     omega=0.4 * np.pi,
 )
 
-judged = {
+qualities = {
     name: quality(motion, DesignSettings(), Geometry())
     for name, motion in (("sine", SINE), ("rich", RICH))
 }
 
-print(f"{'':22s}" + "".join(f"{name:>10s}" for name in judged))
+print(f"{'':22s}" + "".join(f"{name:>10s}" for name in qualities))
 print(
-    f"{'condition number':22s}" + "".join(f"{found.condition:10.1f}" for found in judged.values())
+    f"{'condition number':22s}"
+    + "".join(f"{motion.condition:10.1f}" for motion in qualities.values())
 )
-print(f"{'log det':22s}" + "".join(f"{found.log_det:10.2f}" for found in judged.values()))
-for parameter, unit in judged["rich"].units.items():
-    errors = "".join(f"{found.standard_errors[parameter]:10.4f}" for found in judged.values())
+print(f"{'log det':22s}" + "".join(f"{motion.log_det:10.2f}" for motion in qualities.values()))
+for parameter, unit in qualities["rich"].units.items():
+    errors = "".join(f"{motion.standard_errors[parameter]:10.4f}" for motion in qualities.values())
     print(f"{'± ' + parameter:22s}{errors} {unit}")
 
-assert judged["rich"].log_det > judged["sine"].log_det
+assert qualities["rich"].log_det > qualities["sine"].log_det

@@ -1,5 +1,4 @@
-"""Hide a knee spring in a virtual leg, record it without any device, and let the diagnosis find
-it."""
+"""Hide a knee spring in a virtual leg, record it without any device, and diagnose it."""
 
 import numpy as np
 
@@ -15,8 +14,8 @@ from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig.plant import PlantSettings
 
-# Angles in rad: a mean, and sines and cosines of three harmonics for hip and knee; the period is 5
-# s.
+# Angles in rad: a mean, and sines and cosines of three harmonics for hip and knee.
+# The period is 5 s.
 EXCITATION = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),
     a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
@@ -37,10 +36,10 @@ def recorded(run: str, purpose: str, seed: int):
 
 runs = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("train", "validate")]
 motions = [recorded(run, purpose, seed) for seed, (run, purpose) in enumerate(runs)]
-said = verdict(diagnose(motions))
+result = verdict(diagnose(motions))
 
-print(said["summary"])
-for cause in said["causes"]:
+print(result["summary"])
+for cause in result["causes"]:
     for parameter in cause["parameters"]:
         low, high = parameter["ci95"]
         print(
@@ -48,6 +47,6 @@ for cause in said["causes"]:
             f" {low:.3f} to {high:.3f}"
         )
 
-assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [
+assert [(cause["effect"], cause["joint"]) for cause in result["causes"]] == [
     ("parallel_spring", "knee")
 ]

@@ -1,5 +1,4 @@
-"""Identify a pendulum from arrays of one's own: put them into the recording contract, filter,
-fit."""
+"""Identify a pendulum from arrays: write recordings of them, filter, fit."""
 
 import tempfile
 from pathlib import Path
@@ -49,11 +48,11 @@ with tempfile.TemporaryDirectory() as folder:
         }
         # What breaks the contract is refused here, with file, column and row.
         RECORDING.write(files[-1], swing(seed), about)
-    found = identify(read_motions(files, FilterSettings()))
+    result = identify(read_motions(files, FilterSettings()))
 
-table = found.parameters[["name", "joint", "value", "ci95_low", "ci95_high", "unit"]]
+table = result.parameters[["name", "joint", "value", "ci95_low", "ci95_high", "unit"]]
 print(table.to_string(index=False))
-print(f"torque error on the run no fit has seen: {found.validation.pooled.rmse[0]:.4f} N·m")
+print(f"torque error on the run no fit has seen: {result.validation.pooled.rmse[0]:.4f} N·m")
 
 truth = np.array([INERTIA, MOMENT, COULOMB, VISCOUS])
-assert np.allclose(found.parameters["value"], truth, rtol=0.05)
+assert np.allclose(result.parameters["value"], truth, rtol=0.05)

@@ -1,5 +1,4 @@
-"""How Sphinx makes the site of docs/: `make docs`. It needs no network, neither to be built nor to
-be read."""
+"""How Sphinx makes the site of docs/ (`make docs`), without a network."""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,4 @@
-"""Equations as drawings in the page: no script, no font and no network, and alike in every browser
-and on paper."""
+"""Equations as drawings in the page, which need no script, no font and no network."""
 
 from html import escape
 from xml.etree import ElementTree
@@ -20,12 +19,12 @@ ziafont.config.svg2 = False
 
 
 def drawn(node: nodes.math | nodes.math_block, inline: bool) -> str:
-    """Return an equation as SVG, which says its LaTeX to those who do not see it."""
+    """Return an equation as SVG, with its LaTeX for those who do not see it."""
     latex = node.astext()
     try:
         equation = ziamath.Latex(latex, size=SIZE, color="currentColor", inline=inline)
         picture = equation.svgxml()
-    except Exception as error:  # the library raises whatever it stumbles over
+    except Exception as error:  # The library has no errors of its own.
         raise SphinxError(
             f"{node.source}:{node.line}: cannot draw the equation {latex!r}: {error}"
         ) from error
@@ -47,12 +46,12 @@ def visit_inline(self: HTML5Translator, node: nodes.math) -> None:
 
 
 def visit_block(self: HTML5Translator, node: nodes.math_block) -> None:
-    """Write an equation that stands by itself."""
+    """Write an equation in a block of its own."""
     self.body.append(f'<div class="equation">{drawn(node, inline=False)}</div>')
     raise nodes.SkipNode
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register with Sphinx."""
     app.add_html_math_renderer("drawn", (visit_inline, None), (visit_block, None))
     return {"parallel_read_safe": True}

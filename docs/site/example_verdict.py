@@ -1,7 +1,7 @@
-"""What README.md and the pages show of a verdict: ``python docs/site/example_verdict.py``.
+"""The example verdict of README.md and of pages: ``python docs/site/example_verdict.py``.
 
 A knee spring and a hip encoder's offset are hidden in a virtual leg. ``exoid diagnose`` gets its
-recordings; its figures go to docs/images, and what it prints goes into the pages, below each
+recordings; its figures go to docs/images, and its output into the pages, below each
 comment ``<!-- example_verdict: PART -->``.
 """
 
@@ -65,7 +65,7 @@ def record_all(folder: Path) -> list[Path]:
 
 
 def diagnosed(folder: Path) -> str:
-    """Diagnose the recordings into a folder and return what is printed, 80 columns wide."""
+    """Diagnose the recordings into a folder and return the output, 80 columns wide."""
     recordings = record_all(folder)
     command = [sys.executable, "-m", "exoid_cli", "diagnose", *recordings, "-o", folder]
     wide = os.environ | {"COLUMNS": "80"}
@@ -74,17 +74,17 @@ def diagnosed(folder: Path) -> str:
 
 
 def paragraphs(printed: str) -> dict[str, str]:
-    """Return the parts of what was printed by their names."""
-    found = {}
+    """Return the parts of the output by their names."""
+    parts = {}
     for paragraph in printed.split("\n\n"):
         for name, begin in PARTS.items():
             if paragraph.startswith(begin):
-                found[name] = "\n".join(map(_wrapped, paragraph.splitlines())) + "\n"
-    return found
+                parts[name] = "\n".join(map(_wrapped, paragraph.splitlines())) + "\n"
+    return parts
 
 
 def _wrapped(line: str) -> str:
-    """Break a sentence as a terminal of 80 columns would; a pipe gets it whole."""
+    """Break a sentence as a terminal of 80 columns does; a pipe gets it whole."""
     return re.sub(r"(?=.{81})(.{1,80})(?: |$)", r"\1\n", line).rstrip("\n")
 
 

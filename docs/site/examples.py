@@ -1,5 +1,4 @@
-"""The examples on the site: scripts as they are, notebooks with what they print and draw as the
-site is built."""
+"""The examples on the site: scripts as they are, notebooks with their output and figures."""
 
 import re
 from pathlib import Path
@@ -12,7 +11,7 @@ FOLDER = "_notebooks"
 
 
 def add_sources(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Show below the list of examples what is in each of its scripts; links to them lead there."""
+    """Append each script to the list of examples, and let the list's links lead there."""
     if docname == "examples/README":
         page = Path(app.srcdir) / "examples"
         scripts = SCRIPT.findall(source[0])
@@ -32,14 +31,14 @@ def _anchor(name: str) -> str:
 
 
 def run_notebook(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Put what a notebook's cells print and draw where they stand."""
+    """Add the output and figures of a notebook's cells."""
     if Path(app.env.doc2path(docname)).suffix == ".ipynb":
         folder = Path(app.outdir) / FOLDER
         source[0] = as_markdown(source[0], folder / Path(docname).name, f"../{FOLDER}")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register with Sphinx."""
     app.connect("source-read", add_sources)
     app.connect("source-read", run_notebook)
     return {"parallel_read_safe": True}

@@ -1,5 +1,4 @@
-"""The gallery of effects: their signatures, drawn while the site is built so that they are those of
-the code beside it.
+"""The gallery of effects: their signatures, drawn by the code of now while the site is built.
 
 The pages in docs/effects stay plain Markdown; figures are added to them here.
 """
@@ -50,18 +49,18 @@ def add_figures(app: Sphinx, docname: str, source: list[str]) -> None:
         name = docname.removeprefix("effects/")
         if _chosen(app, name):
             head, looks, rest = source[0].partition("**Looks like:**")
-            told, end, tail = rest.partition("\n\n")
-            source[0] = f"{head}{looks}{told}\n\n{_image(name)}\n\n{CAPTION}{end}{tail}"
+            text, end, tail = rest.partition("\n\n")
+            source[0] = f"{head}{looks}{text}\n\n{_image(name)}\n\n{CAPTION}{end}{tail}"
 
 
-CAPTION = """*What a model of rigid body and friction, fitted to a quiet virtual leg that has this,
-leaves of the torque: one run with a wearer, fitted together with one of the empty machine.*"""
+CAPTION = """*The residual of rigid body and friction on a quiet virtual leg that has this effect:
+a run with a wearer, fitted together with one of the machine alone.*"""
 
 
 def _image(name: str) -> str:
     return (
-        f'<img class="signature" src="../{FOLDER}/{name}.png" alt="What {name} leaves of the'
-        ' torque" loading="lazy">'
+        f'<img class="signature" src="../{FOLDER}/{name}.png" alt="The residual that {name}'
+        ' causes" loading="lazy">'
     )
 
 
@@ -75,7 +74,7 @@ def _index(app: Sphinx) -> str:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register with Sphinx."""
     app.add_config_value(
         "gallery_effects", [], "html", description="Effects to draw; all where none is named."
     )

@@ -1,8 +1,6 @@
-"""The site's navigation is docs/README.md: its sections, and the pages that their tables link to,
-in that order.
+"""The site's navigation: the sections of docs/README.md, and the pages that their tables link to.
 
-So a page is listed once, where readers of the repository find it too, and one that nobody listed is
-an error.
+So a page is listed once, for readers of the repository too. A page that is not listed is an error.
 """
 
 import re
@@ -23,11 +21,19 @@ def pages_of(section: str) -> list[str]:
 
 def toctrees(text: str) -> str:
     """Return a hidden table of contents for each section of an index."""
-    made = []
+    trees = []
     for section in text.split("\n## ")[1:]:
         caption, _, body = section.partition("\n")
-        made += ["```{toctree}", ":hidden:", f":caption: {caption}", "", *pages_of(body), "```", ""]
-    return "\n".join(made)
+        trees += [
+            "```{toctree}",
+            ":hidden:",
+            f":caption: {caption}",
+            "",
+            *pages_of(body),
+            "```",
+            "",
+        ]
+    return "\n".join(trees)
 
 
 def add_toctrees(app: Sphinx, docname: str, source: list[str]) -> None:
@@ -37,7 +43,7 @@ def add_toctrees(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def leave_out_links_to_code(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Keep the words of a link to what is not in docs/: the site may stand alone."""
+    """Keep only the text of links out of docs/, so that the site works by itself."""
     source[0] = OUTSIDE.sub(r"\1", source[0])
 
 
@@ -50,7 +56,7 @@ def front_page(app: Sphinx, exception: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register with Sphinx."""
     app.connect("source-read", add_toctrees)
     app.connect("source-read", leave_out_links_to_code)
     app.connect("build-finished", front_page)

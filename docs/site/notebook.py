@@ -1,5 +1,4 @@
-"""A notebook's cells, run one after the other in this process, as Markdown with what they print and
-draw."""
+"""A notebook as Markdown, with the output and figures of its cells, run in this process."""
 
 import io
 import json
@@ -35,14 +34,15 @@ def as_markdown(text: str, stem: Path, shown_in: str) -> str:
             parts.append(code)
             continue
         parts.append(f"```python\n{code}\n```")
-        if printed := _run(code, names):
+        printed = _run(code, names)
+        if printed:
             parts.append(f"```text\n{printed}\n```")
         for number in plt.get_fignums():
             figures += 1
             file = stem.with_name(f"{stem.name}-{figures}.png")
             plt.figure(number).savefig(file, dpi=130, bbox_inches="tight")
             plt.close(number)
-            parts.append(f'<img src="{shown_in}/{file.name}" alt="what the cell above draws">')
+            parts.append(f'<img src="{shown_in}/{file.name}" alt="figure of the cell above">')
     return "\n\n".join(parts) + "\n"
 
 

@@ -1,5 +1,4 @@
-"""Figures of what each effect leaves in a residual, drawn from a leg of the virtual rig that has
-it.
+"""Figures of the residual that each effect causes, for a virtual leg that has it.
 
 `python docs/site/signatures.py FOLDER [EFFECT ...]` draws them; `make docs` does so for the
 effects' pages.
@@ -35,7 +34,7 @@ EXCITATION = FourierTrajectory(
     b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
     omega=0.2 * np.pi,
 )
-"""Moves both joints both ways through most of their range."""
+"""Both joints move both ways through most of their range."""
 SECONDS = 20.0
 QUIET = PlantSettings(
     ripple_nm=(0.1, 0.1), temperature=TemperatureSettings(heating_c_nm2=0.05, time_constant_s=10.0)
@@ -49,38 +48,38 @@ LARGE = {
     "rotor_inertia": (0.6,),
     "time_delay": (0.05,),
 }
-"""Sizes of effects that hide in the baseline where they are small, other than the catalogue's."""
+"""Sizes other than the catalogue's, of effects that the baseline hides if they are small."""
 LONGEST_TITLE = 48
-"""Characters of sizes beside the legend."""
+"""Characters of sizes that leave room for the legend."""
 LEAST_NM = 0.5
-"""Half the height of a figure at least: where nothing is left, noise does not fill it."""
+"""Least half of a figure's height, so that mere noise does not fill it."""
 
 
 @dataclass(frozen=True)
 class Signature:
-    """What a model without an effect leaves of the torque of a leg that has it."""
+    """The residual of a model without an effect, for a leg that has it."""
 
     term: Term | None
     """The effect as the leg has it; None for the baseline's own."""
     regression: Regression
     """Of the run with the wearer."""
-    left: NDArray
+    residual: NDArray
     """(m, J) N·m."""
 
     @property
     def joint(self) -> int:
-        """The joint at which most is left."""
+        """The joint with the largest residual."""
         return int(
             np.argmax(
-                [np.std(self.left[usable, j]) for j, usable in enumerate(self.regression.usable.T)]
+                [np.std(self.residual[rows, j]) for j, rows in enumerate(self.regression.usable.T)]
             )
         )
 
     @property
-    def told(self) -> str:
-        """What the leg has, with sizes and units."""
+    def sizes(self) -> str:
+        """The effect's place and parameters, with units."""
         if self.term is None:
-            return "what a model without it leaves"
+            return "residual of a model without it"
         effect = self.term.effect
         values = zip(effect.parameters, effect.physical(self.term.values), strict=True)
         sizes = [
@@ -90,27 +89,26 @@ class Signature:
         ]
         while len(sizes) > 1 and len(", ".join(sizes)) > LONGEST_TITLE:
             sizes.pop()
-        return f"{f'at the {effect.joint}, ' if effect.joint else ''}{', '.join(sizes)}".replace(
-            "_", " "
-        )
+        place = f"at the {effect.joint}, " if effect.joint else ""
+        return (place + ", ".join(sizes)).replace("_", " ")
 
 
 def signature(effect: type[Effect]) -> Signature:
-    """Record a leg that has the effect, empty and with a wearer, and fit rigid body and friction to
-    both runs.
+    """Fit rigid body and friction to two runs of a leg that has the effect.
 
-    Of the baseline's own two effects it is what the other one leaves.
+    One run is without a wearer, one with. For rigid body and friction themselves, the model lacks
+    that one.
     """
     bodies_and_friction = baseline(THE_LEG, RUNS)
     hidden = None if effect in map(type, bodies_and_friction) else _sized(effect)
     assumed = Model.of(e for e in bodies_and_friction if e.name != effect.name)
-    found = [next(regressions(motion, assumed)) for motion in _recorded([hidden] if hidden else [])]
+    fits = [next(regressions(motion, assumed)) for motion in _recorded([hidden] if hidden else [])]
     A, y = (
-        np.concatenate([part[r.usable] for r, part in zip(found, parts, strict=True)])
-        for parts in ([r.regressor for r in found], [r.torque for r in found])
+        np.concatenate([part[r.usable] for r, part in zip(fits, parts, strict=True)])
+        for parts in ([r.regressor for r in fits], [r.torque for r in fits])
     )
     values = np.linalg.lstsq(A, y, rcond=None)[0]
-    return Signature(hidden, found[-1], residual_of(found[-1], values))
+    return Signature(hidden, fits[-1], residual_of(fits[-1], values))
 
 
 def _sized(effect: type[Effect]) -> Term:
@@ -130,25 +128,24 @@ def _recorded(hidden: list[Term]) -> list[Motion]:
 
 
 def draw(effect: type[Effect], stem: Path) -> None:
-    """Write the signature of an effect as ``stem``.png: what is left against time, angle and
-    speed."""
-    made = signature(effect)
-    r, joint = made.regression, made.joint
+    """Write the residual of an effect against time, angle and velocity as ``stem``.png."""
+    shown = signature(effect)
+    r, joint = shown.regression, shown.joint
     name = THE_LEG.names[joint]
-    left = made.left[:, joint]
-    half = max(LEAST_NM, 1.15 * np.abs(left[r.usable[:, joint]]).max())
+    residual = shown.residual[:, joint]
+    half = max(LEAST_NM, 1.15 * np.abs(residual[r.usable[:, joint]]).max())
     against = {
         "time, s": r.time,
         f"{name} angle, rad": r.state[0],
-        f"{name} speed, rad/s": r.state[1],
+        f"{name} velocity, rad/s": r.state[1],
     }
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 3, figsize=(8.4, 2.4), sharey=True, width_ratios=[4, 3, 3])
         for axis, (label, x) in zip(axes, against.items(), strict=True):
-            _scatter(axis, x if x.ndim == 1 else x[:, joint], left, r, joint)
+            _scatter(axis, x if x.ndim == 1 else x[:, joint], residual, r, joint)
             axis.set(xlabel=label, ylim=(-half, half))
-        axes[0].set_ylabel(f"left at the {name}, N·m")
-        figure.suptitle(f"{effect.title}: {made.told}", x=0.01, ha="left", fontsize=9)
+        axes[0].set_ylabel(f"residual at the {name}, N·m")
+        figure.suptitle(f"{effect.title}: {shown.sizes}", x=0.01, ha="left", fontsize=9)
         figure.legend(
             *axes[0].get_legend_handles_labels(),
             loc="upper right",
@@ -160,7 +157,7 @@ def draw(effect: type[Effect], stem: Path) -> None:
         save(figure, stem, kinds=["png"])
 
 
-def _scatter(axis: Axes, x: NDArray, left: NDArray, r: Regression, joint: int) -> None:
+def _scatter(axis: Axes, x: NDArray, residual: NDArray, r: Regression, joint: int) -> None:
     usable, forward = r.usable[:, joint], r.state[1][:, joint] > 0
     shown = [
         (~usable & r.valid, GREY, "near a reversal"),
@@ -168,7 +165,7 @@ def _scatter(axis: Axes, x: NDArray, left: NDArray, r: Regression, joint: int) -
         (usable & ~forward, ORANGE, "back"),
     ]
     for rows, colour, label in shown:
-        axis.plot(x[rows], left[rows], ".", ms=1.6, color=colour, label=label)
+        axis.plot(x[rows], residual[rows], ".", ms=1.6, color=colour, label=label)
     axis.axhline(0.0, color="black", lw=0.6)
 
 

@@ -1,7 +1,7 @@
 """How readable is the code?
 
 ``python tests/campaigns/readability.py`` measures the packages of the product by numbers that hold
-for any Python code, beside those of well-known numerical projects.
+for any Python code, next to those of well-known numerical projects.
 """
 
 import ast

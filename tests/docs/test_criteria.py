@@ -1,4 +1,4 @@
-"""docs/criteria.md tells every number that decides, as it is in force."""
+"""docs/criteria.md has the current value of every number that decides."""
 
 from dataclasses import fields
 from pathlib import Path

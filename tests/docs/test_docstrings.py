@@ -1,5 +1,4 @@
-"""What every public name of pipelines says of itself: that it is there ruff sees to, here it is
-what must be in it."""
+"""The content of the docstrings of public names; ruff checks that there is one."""
 
 import inspect
 import re
@@ -20,8 +19,7 @@ RAISED = re.compile(r"^\s*raise (\w+)\(", flags=re.MULTILINE)
 
 
 def functions_of(module):
-    """Yield each public function and method that a module defines, with where it is, its doc and
-    the class it is of."""
+    """Yield the name, object and docstring of each public function and method of a module."""
     for name, value in vars(module).items():
         if name.startswith("_") or getattr(value, "__module__", None) != module.__name__:
             continue
@@ -39,7 +37,7 @@ def functions_of(module):
                     yield f"{module.__name__}.{name}.{own}", function, "\n".join(docs)
 
 
-EVERY = [found for name in MODULES for found in functions_of(import_module(name))]
+EVERY = [entry for name in MODULES for entry in functions_of(import_module(name))]
 
 
 def test_the_walk_finds_the_library():
@@ -47,13 +45,13 @@ def test_the_walk_finds_the_library():
     assert "pipelines.estimation.long_run.long_run_covariance" in {name for name, *_ in EVERY}
 
 
-def test_what_takes_or_returns_arrays_tells_their_shape():
+def test_a_function_of_arrays_states_their_shapes():
     with_arrays = [(name, doc) for name, f, doc in EVERY if "ndarray" in str(inspect.signature(f))]
     assert len(with_arrays) > 200
     assert [name for name, doc in with_arrays if not SHAPE.search(doc)] == []
 
 
-def test_what_raises_an_error_tells_that_it_does():
+def test_a_function_that_raises_an_error_says_so():
     raising = [
         (name, set(RAISED.findall(inspect.getsource(f))) & ERRORS, doc) for name, f, doc in EVERY
     ]

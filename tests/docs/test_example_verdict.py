@@ -1,5 +1,4 @@
-"""What the pages show of a verdict is what ``exoid diagnose`` prints, put where a page asks for
-it."""
+"""The pages show the verdict that ``exoid diagnose`` prints."""
 
 import sys
 from pathlib import Path
@@ -29,7 +28,7 @@ def test_every_part_that_a_page_asks_for_is_there(example):
         assert set(asked) <= set(example.PARTS)
 
 
-def test_parts_are_told_by_how_they_begin_and_long_sentences_are_broken(example):
+def test_parts_are_recognized_by_their_first_words_and_long_sentences_are_broken(example):
     sentence = "Missing from the simulation: " + "a cause and " * 10
     parts = example.paragraphs(
         f"{sentence.strip()}\n\nis anything missing?   probability\nnothing   0.00\n\nother\n"

@@ -126,7 +126,7 @@ def package_of(path: Path) -> str:
 def counted() -> Counter[str]:
     """Count the words to avoid by package and page."""
     counts: Counter[str] = Counter()
-    for root in ("pipelines", "exoid_cli"):
+    for root in ("pipelines", "exoid_cli", "docs"):
         for path in (ROOT / root).rglob("*.py"):
             found = avoided_in(path.read_text(encoding="utf-8"))
             found += [path.stem] * in_name(path.stem)

@@ -1,5 +1,4 @@
-"""docs/tutorial.md does what it says: every command of it runs, and the whole of it says what is
-printed there.
+"""Every command of docs/tutorial.md runs, and prints the output that the page shows.
 
 A ``console`` block is a session: ``$ exoid ...`` is run, what follows is what it prints, ``...``
 stands for anything. A ``toml`` block that begins with ``# in FILE`` or ``# at the end of FILE`` is
@@ -31,7 +30,7 @@ SHORT = {
     },
     "rigs/plain.toml": {"ramp_s = 3.0": "ramp_s = 1.0"},
 }
-"""Of the new experiment's files, for one of seconds instead of minutes."""
+"""Changes of the new experiment's files, so that it takes seconds and not minutes."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ def steps() -> Iterator[Command | Edit]:
         if kind == "toml":
             head, _, body = text.partition("\n")
             place = re.fullmatch(r"# (in|at the end of) (\S+)", head)
-            assert place, f"a toml block of the tutorial says not where it belongs: {head}"
+            assert place, f"a toml block of the tutorial lacks its file: {head}"
             yield Edit(place[2], place[1] != "in", body)
             continue
         for session in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
@@ -112,20 +111,20 @@ def test_every_command_of_the_tutorial_runs(exoid, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_tutorial_prints_what_stands_in_it(exoid, monkeypatch, tmp_path):
+def test_the_tutorial_prints_the_output_that_it_shows(exoid, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for step, out in do_all(exoid, monkeypatch, {}):
         assert alike(step.printed, out), f"{step.line} printed\n{out}"
 
 
-def alike(wanted: str, found: str) -> bool:
+def alike(wanted: str, printed: str) -> bool:
     """Compare words as they are, numbers to 5 % and blanks not at all; ``...`` in the page stands
     for anything."""
     numbers = [
         value(number) for word in wanted.split() if word != "..." for number in NUMBER.findall(word)
     ]
     pattern = r"\s*".join(r".*?" if word == "..." else pattern_of(word) for word in wanted.split())
-    match = re.fullmatch(pattern, found.strip(), flags=re.DOTALL)
+    match = re.fullmatch(pattern, printed.strip(), flags=re.DOTALL)
     return match is not None and all(
         abs(value(x) - number) <= 0.05 * abs(number) + 0.02
         for x, number in zip(match.groups(), numbers, strict=True)
@@ -140,7 +139,7 @@ def value(number: str) -> float:
     return float(number.replace(",", ""))
 
 
-def test_a_page_that_tells_another_number_or_word_is_not_alike():
+def test_a_page_with_another_number_or_word_is_not_alike():
     assert alike("rms ... 2.95 N·m,\n  done", "rms  of 4 runs 3.01 N·m, done\n")
     assert not alike("rms 2.95 N·m", "rms 3.95 N·m")
     assert not alike("rms 2.95 N·m", "rms 2.95 N")
