@@ -26,7 +26,10 @@ class SampleWriter:
         return self._journal.rows
 
     def write(self, row: Row, sample: int) -> None:
-        """Write a sample of the recording by its number, and note those missed before it."""
+        """Write a sample of the recording by its number, and note those missed before it.
+
+        Raise DeviceError if the journal cannot be written.
+        """
         missing = range(self._next, min(sample, self._samples))
         if missing:
             self.gaps.append((missing.start / self._rate_hz, len(missing)))
