@@ -13,16 +13,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 MOST_WORDS = 30
 
-GENERATED = {
-    "docs/blind-machines.md",
-    "docs/blind.md",
-    "docs/criteria.md",
-    "docs/faults.md",
-    "docs/import-map.md",
-    "docs/peers.md",
-    "docs/settings.md",
-}
-"""Pages that a program writes as a whole."""
+GENERATED = {"docs/import-map.md"}
+"""Pages that a program writes as a whole, with lists in sentences."""
 
 NOT_YET: dict[str, int] = {
     "docs/command-line.md": 2,
@@ -48,7 +40,7 @@ WRITTEN = re.compile(
     r"|<!--.*?-->",
     re.DOTALL | re.MULTILINE,
 )
-NOT_PROSE = re.compile(r"^(?:    |\||#|!\[).*$", re.MULTILINE)
+NOT_PROSE = re.compile(r"^(?:    |\s*\||#|!\[).*$", re.MULTILINE)
 """Indented code, tables, headings and pictures."""
 BLOCKS = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )")
 BULLET = re.compile(r"^\s*(?:[-*>]|\d+\.) +")

@@ -1,5 +1,4 @@
-"""``make faults``: let every fault loose on a run and write what became of it into
-docs/faults.md."""
+"""``make faults``: cause every fault in a run, and write the results into docs/faults.md."""
 
 import argparse
 import re
@@ -18,10 +17,10 @@ from tests.faults.runs import run_through, wrong_rows
 
 TABLE = """\
 ## Each fault
-| line | fault | the run | samples missing | samples wrong | what is said |
+| line | fault | the run | samples missing | samples wrong | reason |
 |---|---|---|---|---|---|
 """
-"""The end of the page, which is measured; what stands above it is written by hand."""
+"""The end of the page, which is measured; the text above it is written by hand."""
 
 
 def rows() -> Iterator[str]:

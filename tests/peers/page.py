@@ -39,20 +39,20 @@ def _without(legs: Sequence[dict[str, Any]]) -> str:
     ]
     rows.append("|---|---|---|---|---|")
     for tool in TOOLS:
-        found = [leg["tools"][tool] for leg in legs]
-        inside = np.concatenate([f["inside"] for f in found])
-        errors = np.array([f["parameter_error"] for f in found])
+        results = [leg["tools"][tool] for leg in legs]
+        inside = np.concatenate([f["inside"] for f in results])
+        errors = np.array([f["parameter_error"] for f in results])
         rows.append(
             _row(
                 tool,
                 f"{100 * inside.mean():.0f} % of {len(inside)}",
                 f"{100 * np.median(errors):.1f} / {100 * errors.max():.0f} %",
-                _pooled([f["error"] for f in found]),
-                f"{np.median([f['seconds'] for f in found]):.2g}",
+                _pooled([f["error"] for f in results]),
+                f"{np.median([f['seconds'] for f in results]):.2g}",
             )
         )
     statuses = [leg["diagnosed"]["status"] for leg in legs]
-    told = ", ".join(
+    counts = ", ".join(
         f"`{status}` {statuses.count(status)} of {len(legs)}" for status in sorted(set(statuses))
     )
     named = [f"{cause}" for leg in legs for cause in leg["diagnosed"]["causes"]]
@@ -63,7 +63,7 @@ def _without(legs: Sequence[dict[str, Any]]) -> str:
 
 Held-out torque: RMS error at hip / knee, N·m, of {_pooled([leg["torque_rms"] for leg in legs])} N·m
 rms. `exoid diagnose`, {seconds:.0f} s a leg, says
-{told}{"; it names " + "; ".join(named) if named else ""}. """
+{counts}{"; it names " + "; ".join(named) if named else ""}. """
 
 
 def _with(legs: Sequence[dict[str, Any]]) -> str:
@@ -77,17 +77,17 @@ def _with(legs: Sequence[dict[str, Any]]) -> str:
     ]
     rows.append("|---|---|---|---|")
     for tool in TOOLS:
-        found = [leg["tools"][tool] for leg in legs]
-        worst = ", ".join(f"{f['worst']} {f['half_widths_off']:.0f}" for f in found)
-        says = "; ".join(dict.fromkeys(word for f in found for word in f["says"])) or "nothing"
+        results = [leg["tools"][tool] for leg in legs]
+        worst = ", ".join(f"{f['worst']} {f['half_widths_off']:.0f}" for f in results)
+        says = "; ".join(dict.fromkeys(word for f in results for word in f["says"])) or "nothing"
         name = "`exoid identify`" if tool == "exoid" else tool
-        rows.append(_row(name, _pooled([f["error"] for f in found]), worst, says))
+        rows.append(_row(name, _pooled([f["error"] for f in results]), worst, says))
     after = [leg["diagnosed"] for leg in legs]
-    said = "; ".join(f"`{d['status']}`: {', '.join(d['causes']) or 'no cause'}" for d in after)
-    rows.append(_row("`exoid diagnose`", _pooled([d["error"] for d in after]), "", said))
+    verdicts = "; ".join(f"`{d['status']}`: {', '.join(d['causes']) or 'no cause'}" for d in after)
+    rows.append(_row("`exoid diagnose`", _pooled([d["error"] for d in after]), "", verdicts))
     return f"""## {len(legs)} legs with a spring of {STIFFNESS:g} N·m/rad hidden at the knee
 
-The spring rests at {REST:g} rad. No tool is told of it.
+The spring rests at {REST:g} rad. No tool's model has it.
 
 {chr(10).join(rows)}
 """
@@ -98,9 +98,9 @@ def _real(real: dict[str, Any]) -> str:
         _row("tool", "held-out torque", "below 5 Hz", "s", "what it says"),
         "|---|---|---|---|---|",
     ]
-    said = real["diagnosed"]
-    causes = f"`{said['status']}`: {', '.join(said['causes']) or 'no cause'}"
-    diagnosed = {"`exoid diagnose`": said | {"says": [causes]}}
+    verdict = real["diagnosed"]
+    causes = f"`{verdict['status']}`: {', '.join(verdict['causes']) or 'no cause'}"
+    diagnosed = {"`exoid diagnose`": verdict | {"says": [causes]}}
     for tool, f in (real["tools"] | diagnosed).items():
         errors = (_pooled([f[key]]) for key in ("error", "slow_error"))
         rows.append(_row(tool, *errors, f"{f['seconds']:.2g}", "; ".join(f["says"])))
@@ -114,8 +114,8 @@ tried. IDIM-LS and FIGAROH get the irregular log on a uniform grid. The truth is
 
 {chr(10).join(rows)}
 
-Above 5 Hz these angles hold noise, which every model turns into torque: so the error is told below
-5 Hz too, reversals included, as in [real-data.md](real-data.md). `exoid diagnose` looked there
+Above 5 Hz these angles are noise, which every model turns into torque. So the error below 5 Hz
+is listed too, reversals included, as in [real-data.md](real-data.md). `exoid diagnose` looked there
 alone, and gains there alone; IDIM-LS and FIGAROH filter at 10 Hz. """
 
 
