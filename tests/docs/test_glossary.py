@@ -106,9 +106,10 @@ def texts(source: str) -> Iterator[str]:
     formatted = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
     parts = {id(part) for node in formatted for part in node.values}
     for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if " " in node.value.strip() or id(node) in parts:
-                yield node.value
+        if not (isinstance(node, ast.Constant) and isinstance(node.value, str)):
+            continue
+        if " " in node.value.strip() or id(node) in parts:
+            yield node.value
 
 
 def avoided_in(source: str) -> list[str]:
