@@ -1,0 +1,21 @@
+"""Files and make targets that pages name exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    path for pattern in ("*.md", "docs/**/*.md", "tests/*/README.md") for path in ROOT.glob(pattern)
+)
+IN_CODE = re.compile(r"`((?:pipelines|exoid_cli|tests|docs|datasets)/[\w./-]*)`")
+MADE = re.compile(r"`make ([a-z][a-z-]*)`")
+TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_files_and_targets_that_a_page_names_exist(page):
+    text = page.read_text(encoding="utf-8")
+    assert [path for path in IN_CODE.findall(text) if not (ROOT / path).exists()] == []
+    assert set(MADE.findall(text)) <= TARGETS
