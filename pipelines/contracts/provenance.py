@@ -75,7 +75,10 @@ IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</scr
 def provenance_of(path: Path) -> dict[str, Any]:
     """Return a table's metadata, or the ``provenance`` of a JSON document or an HTML page.
 
-    Raise ContractError if a document has none.
+    Raises
+    ------
+    ContractError
+        The file holds none that can be read.
     """
     if path.suffix not in (".json", ".html"):
         return parquet.header(path)[1]

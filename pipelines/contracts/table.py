@@ -256,8 +256,8 @@ class Contract:
     ) -> Iterator[pa.Table]:
         """Yield the pieces of a table checked, with the contract's types, units and meanings.
 
-        Empty pieces are left out. If columns are ``named``, the others may be missing. Raise
-        ContractError for a column that breaks the contract, or for a table without rows.
+        Empty pieces are left out. If columns are ``named``, the others may be missing. A table that
+        breaks the contract raises ContractError.
         """
         known = self.columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]

@@ -67,8 +67,13 @@ def _poses(joints: int) -> NDArray:
 
 
 def masses(a: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the links' mass matrix (kg·m²) and the motors' acceleration per drive torque, (k, J,
-    J) each: k poses."""
+    """Return the links' mass matrices and the motors' acceleration per drive torque at some poses.
+
+    Returns
+    -------
+    tuple of (k, J, J) arrays
+        kg·m² and 1/(kg·m²), at k poses.
+    """
     poses, joints = _poses(a.joints), a.joints
     mass, mobility = np.empty((2, len(poses), joints, joints))
     state, still = resting_state(np.zeros(joints)), np.zeros(joints)

@@ -450,10 +450,19 @@ class Effect(ABC):
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Torque that the effect adds to what is measured, per unit of each linear parameter, (n,
-        J, p) N·m per unit.
+        """Return the measured torque per unit of each linear parameter.
 
-        ``shape`` holds the nonlinear parameters of this run, in the order of ``self.shape``.
+        Parameters
+        ----------
+        motion : Motion
+            n samples of J joints.
+        shape : (s,) array, optional
+            The nonlinear parameters of this run, in the order of ``self.shape``.
+
+        Returns
+        -------
+        (n, J, p) array
+            N·m per unit.
         """
         columns = np.zeros((*motion.q.shape, len(self.linear)))
         if not self.linear or not self.explains(motion):

@@ -44,8 +44,7 @@ class FourierTrajectory:
         return self.theta0 + q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Lowest and highest angle, velocity and acceleration of each joint over all time, (3, J,
-        2)."""
+        """Return the extremes of angle, velocity and acceleration of each joint, (3, J, 2)."""
         ranges = np.array(
             [[_range(joint) for joint in amplitude] for amplitude in self._amplitudes]
         )

@@ -28,7 +28,10 @@ class SampleWriter:
     def write(self, row: Row, sample: int) -> None:
         """Write a sample of the recording by its number, and note those missed before it.
 
-        Raise DeviceError if the journal cannot be written.
+        Raises
+        ------
+        DeviceError
+            The journal cannot be written.
         """
         missing = range(self._next, min(sample, self._samples))
         if missing:

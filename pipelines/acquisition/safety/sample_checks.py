@@ -75,24 +75,18 @@ class SampleChecks:
             record.leave_out(first, last)
 
     def check_limits(self, samples: Row | Answers) -> None:
-        """Check samples against the limits alone; raise DeviceError beyond one."""
+        """Refuse samples that break a limit."""
         if reason := self._limits.violation(samples):
             raise DeviceError(reason)
 
     def check_at(self, answers: Answers, set_points: Sequence[float]) -> None:
-        """Check answers against the limits, and the angles against set-points, (J,) rad.
-
-        Raise DeviceError beyond a limit.
-        """
+        """Refuse answers that break a limit, or are too far from set-points, (J,) rad."""
         reason = self._limits.violation(answers) or self._limits.straying(answers, set_points)
         if reason:
             raise DeviceError(reason)
 
     def check_held(self, joint: int, reading: Reading, trackers: Sequence[SetPointTracker]) -> None:
-        """Check the answer of a drive that is held while others are awaited.
-
-        Raise DeviceError beyond a limit.
-        """
+        """Refuse an answer of a drive that is held while others are awaited, as for any other."""
         silent = Unanswered("others are awaited")
         of_drives = tuple(reading if j == joint else silent for j in range(len(trackers)))
         answers = Answers(of_drives, np.full((len(CUFFS), 3), np.nan), None)
@@ -106,10 +100,7 @@ class SampleChecks:
     def check(
         self, answers: Answers, trackers: Sequence[SetPointTracker], cycle: int, now: float
     ) -> Row | None:
-        """Check the answers of a cycle; return its sample where it is whole and new.
-
-        Raise DeviceError beyond a limit, or for readings that are implausible.
-        """
+        """Return a cycle's sample where it is whole and new; refuse answers that stop a run."""
         is_new = [
             self._is_new(joint, answer, trackers[joint], cycle, now)
             for joint, answer in enumerate(answers.drives)

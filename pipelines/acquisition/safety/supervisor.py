@@ -179,10 +179,7 @@ class Supervisor:
         return self.checks.check_records(row, records, now)
 
     def has_followed(self, row: Row) -> bool:
-        """Return whether the set-points are at the end of the plan, but for a count.
-
-        Raise DeviceError if too many samples are lost for that.
-        """
+        """Return whether the set-points are at the end of the plan; refuse to be late for long."""
         past = self.progress.cycles_past_end(row)
         if past > LONGEST_RETURN_S * self.rate:
             raise DeviceError(

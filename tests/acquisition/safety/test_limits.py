@@ -381,6 +381,7 @@ def shows(device, sample):
         (lambda count: count + 900, "its sample counter leapt from"),
     ],
 )
+@pytest.mark.usefixtures("any_rate")
 def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows_it(
     stopped, shipped, counter, words
 ):
