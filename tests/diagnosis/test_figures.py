@@ -173,7 +173,7 @@ def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_pr
 
 def test_no_set_is_weighed_where_acquisition_is_at_fault(diagnosed):
     *_, sets = drawing.DRAWN_BY["decision"](*diagnosed("spoilt")).axes
-    assert [text.get_text() for text in sets.texts] == ["not asked: acquisition is at fault"]
+    assert [text.get_text() for text in sets.texts] == ["not searched: acquisition is at fault"]
 
 
 def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
