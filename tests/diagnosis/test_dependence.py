@@ -117,7 +117,7 @@ def test_a_law_of_the_motion_is_told_as_no_tone_in_step_with_it(runs):
 def test_the_description_names_joint_variable_and_kind_of_run(runs):
     residuals = with_law(runs, np.random.default_rng(2), LAWS["angle"], kinds=("with_human",))
     text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR))
-    assert "left at the knee depends on the knee's angle" in text
+    assert "remaining error at the knee depends on the knee's angle" in text
     assert "mostly with the human" in text
 
 

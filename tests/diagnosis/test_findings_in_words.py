@@ -64,10 +64,10 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE, has_periods=True):
     )
 
 
-@pytest.mark.parametrize(("has_periods", "said"), [(True, "repeats"), (False, "goes")])
-def test_without_periods_nothing_is_said_to_repeat(has_periods, said):
+@pytest.mark.parametrize(("has_periods", "how"), [(True, "repeats with"), (False, "depends on")])
+def test_without_periods_nothing_is_said_to_repeat(has_periods, how):
     (found,) = findings(diagnosed({(ANGLE,): 0.95, (): 0.05}, has_periods=has_periods))
-    assert found["path"][1]["words"] == f"something that {said} with the motion"
+    assert found["path"][1]["words"] == f"something that {how} the motion"
 
 
 @pytest.mark.parametrize(
