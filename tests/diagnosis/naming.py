@@ -31,7 +31,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     log_odds = [len(some) * (np.log(PROBABILITY) - np.log1p(-PROBABILITY)) for some in sets]
     weighed = Posterior(selected.posterior.elements, tuple(sets), np.array(log_odds))
     answer = Answer(named, 1.0 - PROBABILITY, 0.0)
-    found = tuple(findings(weighed, answer))
+    reported = tuple(findings(weighed, answer))
     compared = {element.variant: 0.0 for element in elements}  # the ties that were asked for stay
     given = replace(
         selected,
@@ -39,7 +39,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         posterior=weighed,
         charged=compared,
         answer=answer,
-        findings=found,
+        findings=reported,
         dropped=frozenset(),
     )
     return _diagnosis(d.data, d.prepared, judged_fit(given, d.prepared, d.before))

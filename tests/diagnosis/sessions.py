@@ -30,13 +30,13 @@ def recordings(effect=None, joint=None, seed=1, seconds=40.0, trained=RICH, **va
     """Return four recordings of a leg with an effect hidden in it; the training runs follow
     ``trained``."""
     hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
-    made = []
+    tables = []
     for number, (run, purpose) in enumerate(RUNS):
         plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
-        made.append(
+        tables.append(
             Table(*record(plant, trained if purpose == "train" else RICH, seconds, purpose))
         )
-    return made
+    return tables
 
 
 def banded(motions):

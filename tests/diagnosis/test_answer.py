@@ -57,7 +57,7 @@ def test_a_likely_cause_is_named_and_a_rival_that_is_not_far_behind_is_tied():
     ]
 
 
-def test_a_third_cause_beside_the_named_one_is_no_tie():
+def test_a_third_cause_next_to_the_named_one_is_no_tie():
     posterior = weighed(_2=0.5, _02=0.4, _=0.1)
     (named,) = answer_of(posterior).named
     assert named.ties == ()
@@ -93,16 +93,16 @@ def test_an_unlisted_law_is_a_finding_of_its_family_with_the_closest_causes():
     assert finding.causes[0] == ("parallel_spring@knee", pytest.approx(0.3))
 
 
-def test_a_cause_and_an_unlisted_remainder_are_told_together():
+def test_a_cause_and_an_unlisted_remainder_are_reported_together():
     posterior = weighed(_25=0.9, _2=0.1)
     answer = answer_of(posterior)
-    told = findings(posterior, answer)
+    reported = findings(posterior, answer)
     assert [one.element.label for one in answer.named] == ["quadratic_drag@hip"]
-    assert {(one.level, one.family) for one in told} == {("cause", "speed"), ("family", "time")}
-    assert next(one for one in told if one.family == "time").repeats is False
+    assert {(one.level, one.family) for one in reported} == {("cause", "speed"), ("family", "time")}
+    assert next(one for one in reported if one.family == "time").repeats is False
 
 
-def test_a_law_of_the_same_family_as_the_named_cause_is_told_beside_it():
+def test_a_law_of_the_same_family_as_the_named_cause_is_reported_with_it():
     posterior = weighed(_04=0.8, _0=0.2)
     cause, rest = sorted(findings(posterior, answer_of(posterior)), key=lambda one: one.level)
     assert (cause.level, cause.causes[0][0]) == ("cause", "parallel_spring@knee")
@@ -117,14 +117,14 @@ def test_what_may_stand_in_the_place_of_a_named_cause_is_no_second_finding():
     assert finding.level == "cause"
 
 
-def test_a_rest_of_which_only_the_joint_is_known_is_told_beside_the_named_cause():
+def test_a_rest_of_which_only_the_joint_is_known_is_reported_with_the_named_cause():
     posterior = weighed(_02=0.35, _05=0.35, _0=0.3)
-    told = findings(posterior, answer_of(posterior))
-    assert [(one.level, one.joint) for one in told] == [("cause", "knee"), ("joint", "hip")]
-    assert told[1].probability == pytest.approx(0.7)
+    reported = findings(posterior, answer_of(posterior))
+    assert [(one.level, one.joint) for one in reported] == [("cause", "knee"), ("joint", "hip")]
+    assert reported[1].probability == pytest.approx(0.7)
 
 
-def test_where_families_are_in_doubt_the_joint_is_told_and_else_whether_it_repeats():
+def test_where_families_are_in_doubt_the_joint_is_reported_and_else_whether_it_repeats():
     joint = weighed(_2=0.3, _3=0.05, _5=0.4, _=0.25)
     (finding,) = findings(joint, answer_of(joint))
     assert (finding.level, finding.joint) == ("joint", "hip")
@@ -176,15 +176,17 @@ def test_where_all_that_was_named_harms_nothing_may_be_missing():
 
 
 @pytest.mark.parametrize("harm", [-0.5, -1.0, -1.3, -2.0, -6.0])
-def test_what_is_named_and_the_findings_tell_the_same_probabilities_after_validation(harm):
+def test_what_is_named_and_the_findings_have_the_same_probabilities_after_validation(harm):
     """Two causes that harm a little each are as doubtful as the path to them."""
     selected = after(
         weighed(_02=0.9, _=0.1), {"parallel_spring@knee": harm, "quadratic_drag@hip": harm}
     )
     assert bool(selected.answer.named) == (selected.answer.nothing < 0.5)
-    told = [one for one in selected.findings if one.level == "cause"]
-    assert [one.probability for one in told] == [one.probability for one in selected.answer.named]
-    for one in told:
+    reported = [one for one in selected.findings if one.level == "cause"]
+    assert [one.probability for one in reported] == [
+        one.probability for one in selected.answer.named
+    ]
+    for one in reported:
         likely = [p for _, _, p in one.path]
         assert all(below <= above + 1e-12 for above, below in pairwise(likely))
 

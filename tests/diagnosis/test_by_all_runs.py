@@ -18,28 +18,30 @@ POOR = replace(RICH, a=0.3 * RICH.a, b=0.3 * RICH.b)
 
 
 @pytest.fixture(scope="module")
-def found():
+def diagnosis():
     return diagnose(session("quadratic_drag", "hip", seed=7, trained=POOR, drag=6.0))
 
 
-def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(found):
-    said = verdict(found)
-    assert said["sought_on"] == "all"
-    assert ("quadratic_drag", "hip") in labels(said["causes"][0])
-    assert any("the training runs alone name no cause" in caveat for caveat in said["caveats"])
+def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(diagnosis):
+    outcome = verdict(diagnosis)
+    assert outcome["sought_on"] == "all"
+    assert ("quadratic_drag", "hip") in labels(outcome["causes"][0])
+    assert any("the training runs alone name no cause" in caveat for caveat in outcome["caveats"])
 
 
-def test_the_residual_is_split_by_the_runs_that_were_searched(found):
+def test_the_residual_is_split_by_the_runs_that_were_searched(diagnosis):
     """In the slow training runs all of it is noise."""
-    alone = residual_shares(found.prepared.runs, found.prepared.residuals, found.prepared.noise)[0]
-    told = verdict(found)["router"]["hip"]
-    assert told["repeats"] > 0.04 > alone.as_json()["repeats"]
+    alone = residual_shares(
+        diagnosis.prepared.runs, diagnosis.prepared.residuals, diagnosis.prepared.noise
+    )[0]
+    shares = verdict(diagnosis)["router"]["hip"]
+    assert shares["repeats"] > 0.04 > alone.as_json()["repeats"]
 
 
-def test_its_amplitudes_are_fitted_to_the_training_runs_alone(found):
-    refine = Refinement(found.prepared.runs, found.baseline, found.prepared.weights)
-    by_training = refine(found.after.fit.causes)
-    np.testing.assert_allclose(found.after.fit.values, by_training.values, rtol=1e-3, atol=1e-6)
+def test_its_amplitudes_are_fitted_to_the_training_runs_alone(diagnosis):
+    refine = Refinement(diagnosis.prepared.runs, diagnosis.baseline, diagnosis.prepared.weights)
+    by_training = refine(diagnosis.after.fit.causes)
+    np.testing.assert_allclose(diagnosis.after.fit.values, by_training.values, rtol=1e-3, atol=1e-6)
 
 
 def test_where_nothing_is_missing_all_runs_show_nothing_either():
@@ -47,26 +49,30 @@ def test_where_nothing_is_missing_all_runs_show_nothing_either():
     searched."""
     searched = diagnose(session(seed=7, trained=POOR))
     assert searched.before.leaves_more_than_noise
-    said = verdict(searched)
-    assert (said["status"], said["sought_on"]) == ("nothing_missing", "train")
-    assert not any("sought on all runs" in caveat for caveat in said["caveats"])
+    outcome = verdict(searched)
+    assert (outcome["status"], outcome["sought_on"]) == ("nothing_missing", "train")
+    assert not any("sought on all runs" in caveat for caveat in outcome["caveats"])
 
 
 def test_a_payload_that_only_a_validation_run_carries_is_missing_and_not_named():
     """No training run tells its mass: fitted to these it explains nothing."""
     runs = session(seed=7)
     loaded = session("payload_change", "knee", seed=7, mass_moment=0.5, time=0.0)
-    said = verdict(diagnose([*runs[:3], loaded[3]]))
-    assert (said["status"], said["causes"], said["sought_on"]) == ("unknown_cause", [], "all")
+    outcome = verdict(diagnose([*runs[:3], loaded[3]]))
+    assert (outcome["status"], outcome["causes"], outcome["sought_on"]) == (
+        "unknown_cause",
+        [],
+        "all",
+    )
     refused = "it lowers the error on the validation runs too little, or raises it."
     assert (
         f"would explain all runs together, but fitted to the training runs alone, {refused}"
-        in said["summary"]
+        in outcome["summary"]
     )
-    differs = [caveat for caveat in said["caveats"] if "no training run shows" in caveat]
+    differs = [caveat for caveat in outcome["caveats"] if "no training run shows" in caveat]
     assert any(caveat.startswith("the knee's torque error is 1.3") for caveat in differs)
 
 
 def test_what_the_training_runs_show_is_sought_on_them():
-    said = verdict(diagnose(session("torque_gain", "hip", seed=3, gain=1.08)))
-    assert (said["status"], said["sought_on"]) == ("explained", "train")
+    outcome = verdict(diagnose(session("torque_gain", "hip", seed=3, gain=1.08)))
+    assert (outcome["status"], outcome["sought_on"]) == ("explained", "train")

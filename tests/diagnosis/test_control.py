@@ -49,39 +49,39 @@ def true_loop():
 
 
 def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
-    told, true = control(sprung), true_loop()
+    loop, true = control(sprung), true_loop()
     settled = true.time >= CASE.settled_after_s
     rms = np.sqrt(np.mean(true.error[settled] ** 2, axis=0))
     peak = np.abs(true.run.torque[settled]).max(axis=0)
-    assert (told["run"], told["reason"]) == ("with_human", None)
-    assert list(told["with"]["tracking_rmse_rad"].values()) == pytest.approx(rms.tolist(), rel=0.03)
-    assert list(told["with"]["peak_torque_nm"].values()) == pytest.approx(peak.tolist(), rel=0.03)
-    off = abs(told["without"]["peak_torque_nm"]["knee"] - peak[1])
-    assert off > 3 * abs(told["with"]["peak_torque_nm"]["knee"] - peak[1])
+    assert (loop["run"], loop["reason"]) == ("with_human", None)
+    assert list(loop["with"]["tracking_rmse_rad"].values()) == pytest.approx(rms.tolist(), rel=0.03)
+    assert list(loop["with"]["peak_torque_nm"].values()) == pytest.approx(peak.tolist(), rel=0.03)
+    off = abs(loop["without"]["peak_torque_nm"]["knee"] - peak[1])
+    assert off > 3 * abs(loop["with"]["peak_torque_nm"]["knee"] - peak[1])
 
 
-def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung):
+def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_given(sprung):
     heavy = sprung.after.fit.values.copy()
     heavy[[p.name for p in RigidBody.linear].index("X3")] = 9.0
-    told = control(
+    loop = control(
         replace(sprung, after=replace(sprung.after, fit=replace(sprung.after.fit, values=heavy)))
     )
-    assert told["with"] is None
-    assert told["without"] is not None
-    assert told["reason"].startswith(
+    assert loop["with"] is None
+    assert loop["without"] is not None
+    assert loop["reason"].startswith(
         "with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = "
     )
-    assert told["reason"].endswith("the mass matrix is not positive definite")
+    assert loop["reason"].endswith("the mass matrix is not positive definite")
 
 
 def test_where_no_cause_is_named_there_is_nothing_to_compare(sprung):
-    told = control(missing(sprung, 0.9))
-    assert (told["with"], told["reason"]) == (None, "no cause is named")
-    assert told["without"] is not None
+    loop = control(missing(sprung, 0.9))
+    assert (loop["with"], loop["reason"]) == (None, "no cause is named")
+    assert loop["without"] is not None
 
 
-def test_no_loop_is_simulated_on_what_faulty_recordings_tell(sprung):
+def test_no_loop_is_simulated_of_faulty_recordings(sprung):
     stuck = Fault("run_0.parquet", "hip_torque_nm", "stuck", None)
-    told = control(replace(sprung, data=replace(sprung.data, faults=(stuck,))))
-    assert told["without"] is told["with"] is None
-    assert told["reason"].startswith("acquisition is at fault")
+    loop = control(replace(sprung, data=replace(sprung.data, faults=(stuck,))))
+    assert loop["without"] is loop["with"] is None
+    assert loop["reason"].startswith("acquisition is at fault")

@@ -16,18 +16,18 @@ SETS = {(SPEED, ANGLE): 0.5, (OFFSET, ANGLE): 0.3, (SPEED, HUM): 0.15, (COGGING,
 
 @pytest.fixture
 def drawn():
-    made = figure(diagnosed(SETS), verdict_of(**decision_of()))
-    yield made
-    plt.close(made)
+    drawing = figure(diagnosed(SETS), verdict_of(**decision_of()))
+    yield drawing
+    plt.close(drawing)
 
 
 def test_the_bar_of_a_joint_is_cut_into_its_residuals_shares(drawn):
-    told = decision_of()["router"]["hip"]
+    shares = decision_of()["router"]["hip"]
     widths = [bar.get_width() for bar in drawn.axes[0].patches if bar.get_fill()]
     first, second = widths[: len(widths) // 2], widths[len(widths) // 2 :]
     assert first == pytest.approx(second)
     assert sum(first) == pytest.approx(1.0)
-    wanted = [told[part] for part in ("noise", "wanders", "between_runs", "repeats")]
+    wanted = [shares[part] for part in ("noise", "wanders", "between_runs", "repeats")]
     assert [width for width in first if width] == pytest.approx(wanted)
 
 
@@ -68,7 +68,7 @@ def test_only_unlisted_laws_are_hatched(drawn):
     assert all("law" in words or "tone" in words for words in hatched)
 
 
-def test_labels_lie_beside_one_another(drawn):
+def test_labels_do_not_overlap(drawn):
     drawn.draw_without_rendering()
     for axis in drawn.axes:
         for labels in (axis.get_xticklabels(), axis.get_yticklabels()):
@@ -79,6 +79,6 @@ def test_labels_lie_beside_one_another(drawn):
 def test_where_acquisition_is_at_fault_nothing_is_said_to_explain_it():
     d = diagnosed(SETS)
     d.selected = replace(d.selected, posterior=None)
-    made = figure(d, verdict_of(**decision_of() | {"posterior": None}))
-    assert "acquisition is at fault" in made.axes[2].texts[0].get_text()
-    plt.close(made)
+    drawing = figure(d, verdict_of(**decision_of() | {"posterior": None}))
+    assert "acquisition is at fault" in drawing.axes[2].texts[0].get_text()
+    plt.close(drawing)

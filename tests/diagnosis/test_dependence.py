@@ -75,21 +75,21 @@ def rms(runs, residuals, j=1):
 
 @pytest.mark.parametrize("variable", LAWS)
 def test_the_variable_behind_a_residual_comes_first(runs, variable):
-    found = dependences(runs, with_law(runs, np.random.default_rng(0), LAWS[variable]))
-    first = next(d for d in found if d.joint == "knee")
+    ranked = dependences(runs, with_law(runs, np.random.default_rng(0), LAWS[variable]))
+    first = next(d for d in ranked if d.joint == "knee")
     assert first.variable == variable
     law = np.concatenate([LAWS[variable](run)[run.usable[:, 1]] for run in runs])
     assert 0.5 < first.share < law.var() / (law.var() + 0.4**2) + 0.02
-    assert max(d.share for d in found if d.joint == "hip") < 0.05
+    assert max(d.share for d in ranked if d.joint == "hip") < 0.05
 
 
 def test_coloured_noise_depends_on_nothing(runs):
     for seed in range(5):
-        found = dependences(runs, noise(runs, np.random.default_rng(seed)))
-        assert max(d.share for d in found) < 0.05
+        ranked = dependences(runs, noise(runs, np.random.default_rng(seed)))
+        assert max(d.share for d in ranked) < 0.05
 
 
-def test_a_tone_beside_the_harmonics_is_found_with_its_frequency(runs):
+def test_a_tone_between_the_harmonics_is_found_with_its_frequency(runs):
     residuals = noise(runs, np.random.default_rng(1))
     for phase, (run, residual) in enumerate(zip(runs, residuals, strict=True)):
         residual[:, 0] += np.sin(2 * np.pi * 3.137 * run.time + phase)
@@ -98,20 +98,20 @@ def test_a_tone_beside_the_harmonics_is_found_with_its_frequency(runs):
     assert "3.14 Hz" in first.sentence
 
 
-def test_a_tone_in_step_with_the_motion_and_faster_than_it_is_told_as_such(runs):
+def test_a_tone_in_step_with_the_motion_and_faster_than_it_is_reported_as_such(runs):
     residuals = noise(runs, np.random.default_rng(1))
     for residual, run in zip(residuals, runs, strict=True):
         residual[:, 0] += np.sin(2 * np.pi * 3.3 * run.time)
-    found = dependences(runs, residuals)
-    assert (found[0].joint, found[0].variable) == ("hip", "tone")
-    assert "3.30 Hz above the motion's own band, in step with its period" in found[0].sentence
-    assert "depends on nothing" not in describe(THE_LEG, found, excesses(runs, residuals, FLOOR))
+    ranked = dependences(runs, residuals)
+    assert (ranked[0].joint, ranked[0].variable) == ("hip", "tone")
+    assert "3.30 Hz above the motion's own band, in step with its period" in ranked[0].sentence
+    assert "depends on nothing" not in describe(THE_LEG, ranked, excesses(runs, residuals, FLOOR))
 
 
-def test_a_law_of_the_motion_is_told_as_no_tone_in_step_with_it(runs):
+def test_a_law_of_the_motion_is_reported_as_no_tone_in_step_with_it(runs):
     for law in LAWS.values():
-        found = dependences(runs, with_law(runs, np.random.default_rng(0), law))
-        assert not any("in step with" in d.sentence for d in found)
+        ranked = dependences(runs, with_law(runs, np.random.default_rng(0), law))
+        assert not any("in step with" in d.sentence for d in ranked)
 
 
 def test_the_description_names_joint_variable_and_kind_of_run(runs):

@@ -87,22 +87,22 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     price = 0.5 * np.log(independent) - CRITERIA.cause - CRITERIA.base_rate
     effect = one.smallest * rows_of(own, runs, root)[:, 0]
     basis = np.linalg.qr(rows_of(plain, runs, root))[0]
-    left = effect - basis @ (basis.T @ effect)
-    left /= np.linalg.norm(left)
+    remainder = effect - basis @ (basis.T @ effect)
+    remainder /= np.linalg.norm(remainder)
     rng = np.random.default_rng(3)
-    found = {1.0: 0, 0.3: 0}
+    detected = {1.0: 0, 0.3: 0}
     trials = 400
     for _ in range(trials):
         noise = rows_of([coloured(rng, rms, run.measured[:, :2].shape) for run in runs], runs, root)
-        for factor in found:
+        for factor in detected:
             # What the fit's squared error drops by.
-            gain = 0.5 * (left @ (factor * effect + noise)) ** 2
-            found[factor] += gain > price
+            gain = 0.5 * (remainder @ (factor * effect + noise)) ** 2
+            detected[factor] += gain > price
     # Slow effects meet the noise at its strongest, where the integrated correlation is exact; fast
     # ones fare better, and a likelihood that counts less than its rows do promises less than it
     # holds.
-    assert POWER - 0.07 < found[1.0] / trials
-    assert found[0.3] / trials < 0.1
+    assert POWER - 0.07 < detected[1.0] / trials
+    assert detected[0.3] / trials < 0.1
 
 
 def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
@@ -114,16 +114,16 @@ def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
 
 def test_where_anything_would_show_an_effect_must_be_some_times_what_a_good_rig_has():
     runs = 3 * runs_on(RICH)
-    found = []
+    smallest = []
     for rms in (0.05, 0.025):
         floor = Floor(np.array([rms, rms, np.nan, np.nan]), np.ones(4), from_periods=False)
-        found += [
+        smallest += [
             d
             for d in detectability(runs, baseline_of(runs), floor)
             if d.effect.label == "quadratic_drag@knee"
         ]
-    assert [one.limited_by for one in found] == ["materiality"] * 2
-    loud, quiet = (one.smallest_rms_nm / one.torque_rms_nm for one in found)
+    assert [one.limited_by for one in smallest] == ["materiality"] * 2
+    loud, quiet = (one.smallest_rms_nm / one.torque_rms_nm for one in smallest)
     assert 2.0 * CRITERIA.background_cause < loud < 8.0 * CRITERIA.background_cause
     assert quiet == pytest.approx(loud, rel=1e-3), "half the noise shows none that is smaller"
 

@@ -24,10 +24,10 @@ def faultless():
 
 
 def test_where_nothing_is_hidden_nothing_is_missing(faultless):
-    said = verdict(faultless)
-    assert said["status"] == "nothing_missing"
-    assert said["causes"] == []
-    assert said["data_faults"] == []
+    outcome = verdict(faultless)
+    assert outcome["status"] == "nothing_missing"
+    assert outcome["causes"] == []
+    assert outcome["data_faults"] == []
 
 
 def test_the_floor_is_the_noise_that_was_put_in(faultless):
@@ -69,33 +69,33 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
 def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor(
     effect, joint, values, parameter
 ):
-    found = diagnose(session(effect, joint, seed=3, **values))
-    said = verdict(found)
-    assert said["status"] == "explained"
-    first = said["causes"][0]
+    diagnosis = diagnose(session(effect, joint, seed=3, **values))
+    outcome = verdict(diagnosis)
+    assert outcome["status"] == "explained"
+    first = outcome["causes"][0]
     assert (effect, joint) in labels(first)
     assert first["probability"] > 0.5
     size = next(p for p in first["parameters"] if p["name"] == parameter)
     assert size["value"] == pytest.approx(values[parameter], rel=0.15)
-    np.testing.assert_allclose(found.after.errors.rms, found.floor_rms, rtol=0.08)
+    np.testing.assert_allclose(diagnosis.after.errors.rms, diagnosis.floor_rms, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
-    assert found.unrealizable == []
+    assert diagnosis.unrealizable == []
     # A peak of friction and its level are told apart by how it falls with speed alone; the others
     # stand for themselves.
-    assert ["knee coulomb" in sentence for sentence in found.collinear] == [True] * (
+    assert ["knee coulomb" in sentence for sentence in diagnosis.collinear] == [True] * (
         effect == "stribeck_friction"
     )
 
 
 def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joints_speed():
-    found = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
-    assert found.after.fit.rms[0] > 0.95 * found.before.fit.rms[0], (
+    diagnosis = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
+    assert diagnosis.after.fit.rms[0] > 0.95 * diagnosis.before.fit.rms[0], (
         "it is a twentieth of the error at most"
     )
-    (finding,) = found.selected.findings
+    (finding,) = diagnosis.selected.findings
     (speed,) = (p for level, value, p in finding.path if (level, value) == ("family", "speed"))
     assert (finding.joint, finding.family) == ("hip", "speed") and speed > 0.9
-    assert "quadratic_drag@hip" in list(found.selected.posterior.marginals)[:3]
+    assert "quadratic_drag@hip" in list(diagnosis.selected.posterior.marginals)[:3]
 
 
 @pytest.mark.parametrize(
@@ -124,19 +124,19 @@ def test_a_torque_that_no_cause_explains_is_called_unknown():
         extra = np.zeros_like(m.torque)
         extra[:, 1] = 6.0 * np.sin(9.0 * m.q[:, 0]) * m.dq[:, 0]
         odd.append(replace(m, torque=m.torque + extra))
-    said = verdict(diagnose(odd))
-    assert said["status"] in ("unknown_cause", "partly_explained")
-    assert said["unexplained"]["knee"] > 0.2
+    outcome = verdict(diagnose(odd))
+    assert outcome["status"] in ("unknown_cause", "partly_explained")
+    assert outcome["unexplained"]["knee"] > 0.2
 
 
 def test_a_fault_of_acquisition_is_named_before_any_physics():
     motions = session(seed=8)
     flipped = [replace(m, torque=m.torque * [1.0, -1.0]) for m in motions]
-    said = verdict(diagnose(flipped))
-    assert said["data_faults"]
-    assert said["causes"] == []
-    assert said["acquisition_at_fault"]
-    assert said["summary"].startswith("Acquisition, not physics")
+    outcome = verdict(diagnose(flipped))
+    assert outcome["data_faults"]
+    assert outcome["causes"] == []
+    assert outcome["acquisition_at_fault"]
+    assert outcome["summary"].startswith("Acquisition, not physics")
 
 
 def test_the_tables_keep_their_contracts(faultless):

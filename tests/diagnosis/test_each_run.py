@@ -40,37 +40,37 @@ def zeroed(motion, offset):
 
 
 @pytest.fixture(scope="module")
-def found():
+def diagnosis():
     return diagnose([zeroed(m, HIDDEN[m.file]) for m in session(seconds=30.0)])
 
 
 @pytest.fixture(scope="module")
-def anew(found):
-    return verdict(found)
+def outcome(diagnosis):
+    return verdict(diagnosis)
 
 
-def test_a_joint_zeroed_anew_at_each_start_is_named_and_nothing_else(anew):
-    assert anew["status"] == "explained"
-    assert [(c["effect"], c["joint"]) for c in anew["causes"]] == [("encoder_offset", "knee")]
-    assert "per-run encoder offset at the knee" in anew["summary"]
-    assert anew["causes"][0]["fitted_on_validate"] == ["offset"]
+def test_a_joint_zeroed_again_at_each_start_is_named_and_nothing_else(outcome):
+    assert outcome["status"] == "explained"
+    assert [(c["effect"], c["joint"]) for c in outcome["causes"]] == [("encoder_offset", "knee")]
+    assert "per-run encoder offset at the knee" in outcome["summary"]
+    assert outcome["causes"][0]["fitted_on_validate"] == ["offset"]
 
 
-def test_figures_call_it_what_the_summary_calls_it(found):
-    assert words_of("encoder_offset@knee", found) == "per-run encoder offset at the knee"
+def test_figures_call_it_what_the_summary_calls_it(diagnosis):
+    assert words_of("encoder_offset@knee", diagnosis) == "per-run encoder offset at the knee"
 
 
-def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(anew):
-    told = {one["file"]: one["values"]["offset"] for one in anew["causes"][0]["each_run"]}
-    assert told == pytest.approx(HIDDEN, abs=0.01)
+def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(outcome):
+    offsets = {one["file"]: one["values"]["offset"] for one in outcome["causes"][0]["each_run"]}
+    assert offsets == pytest.approx(HIDDEN, abs=0.01)
     assert any(
-        "each run has its own offset" in sentence for sentence in anew["causes"][0]["evidence"]
+        "each run has its own offset" in sentence for sentence in outcome["causes"][0]["evidence"]
     )
 
 
-def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others_have_none(anew):
-    (offset,) = anew["causes"][0]["parameters"]
-    intervals = {one["file"]: one["ci95"]["offset"] for one in anew["causes"][0]["each_run"]}
+def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others_have_none(outcome):
+    (offset,) = outcome["causes"][0]["parameters"]
+    intervals = {one["file"]: one["ci95"]["offset"] for one in outcome["causes"][0]["each_run"]}
     assert intervals["run_0.parquet"] == offset["ci95"]
     for file in ("run_0.parquet", "run_2.parquet"):
         low, high = intervals[file]
@@ -87,8 +87,8 @@ def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
         "run_2.parquet": 0.058,
         "run_3.parquet": -0.06,
     }
-    told = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=30.0)]))
-    (cause,) = told["causes"]
+    outcome = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=30.0)]))
+    (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"], cause["fitted_on_validate"]) == (
         "encoder_offset",
         "knee",
@@ -100,19 +100,19 @@ def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
 
 
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
-    told = verdict(diagnose([zeroed(m, 0.06) for m in session(seconds=30.0)]))
-    (cause,) = told["causes"]
+    outcome = verdict(diagnose([zeroed(m, 0.06) for m in session(seconds=30.0)]))
+    (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("encoder_offset", "knee")
     assert cause["fitted_on_validate"] == cause["each_run"] == []
     assert cause["parameters"][0]["value"] == pytest.approx(0.06, abs=0.01)
 
 
 def test_a_leg_that_is_zeroed_once_needs_no_zero_of_its_own_in_any_run():
-    told = verdict(diagnose(session(seconds=30.0)))
-    assert told["status"] == "nothing_missing"
+    outcome = verdict(diagnose(session(seconds=30.0)))
+    assert outcome["status"] == "nothing_missing"
 
 
-def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_its_own():
+def test_what_runs_have_of_a_cause_of_some_of_them_is_reported_of_those_alone_each_its_own():
     pushed = session(
         "voluntary_torque", "knee", seconds=20.0, amplitude=4.0, frequency=0.37, phase=1.0
     )
@@ -123,22 +123,22 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_i
         Candidate(TorqueDrift(joint="hip"), ((),) * 3),
     ]
     train, validate = (runs[0], runs[2], runs[3]), (runs[1],)
-    made = fit(pushes, train, baseline, np.array([1.0, 1.0, 1.0, 1.0]))
-    flat = Uncertainty(np.eye(len(made.values)), 2.0, (), np.eye(len(made.values)))
-    told = values_of_each_run(made, baseline, flat, train, validate)
-    assert [one["file"] for one in told["voluntary_torque@knee"]] == [
+    fitted = fit(pushes, train, baseline, np.array([1.0, 1.0, 1.0, 1.0]))
+    flat = Uncertainty(np.eye(len(fitted.values)), 2.0, (), np.eye(len(fitted.values)))
+    values = values_of_each_run(fitted, baseline, flat, train, validate)
+    assert [one["file"] for one in values["voluntary_torque@knee"]] == [
         "run_2.parquet",
         "run_3.parquet",
     ]
-    assert [one["file"] for one in told["torque_drift@hip"]] == [
+    assert [one["file"] for one in values["torque_drift@hip"]] == [
         f"run_{k}.parquet" for k in (0, 2, 3, 1)
     ]
     # A run alone, all else held, tells the same of itself as the fit of all does.
     for run in train:
-        for term in settled(made, run, baseline):
+        for term in settled(fitted, run, baseline):
             names = [p.name for p in term.effect.parameters]
             alone = dict(zip(names, term.effect.physical(term.values), strict=True))
-            for one in (one for one in told[term.effect.label] if one["file"] == run.motion.file):
+            for one in (one for one in values[term.effect.label] if one["file"] == run.motion.file):
                 for name, value in one["values"].items():
                     assert value == pytest.approx(alone[name], abs=0.01)
                     low, high = one["ci95"][name]
@@ -159,10 +159,10 @@ def test_intervals_of_offsets_of_one_run_hold_the_truth_as_often_as_they_say():
     covered = []
     for seed in range(1, 41):
         hidden = drawn(seed)
-        told = verdict(
+        outcome = verdict(
             diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=20.0, seed=seed)])
         )
-        for cause in told["causes"]:
+        for cause in outcome["causes"]:
             if (cause["effect"], cause["joint"]) == ("encoder_offset", "knee") and cause[
                 "each_run"
             ]:

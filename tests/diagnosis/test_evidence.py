@@ -57,9 +57,9 @@ def test_slow_error_that_repeats_is_systematic_and_fast_error_that_repeats_is_no
     phase = 2 * np.pi * run.time / run.motion.period_s
     for harmonic, systematic in ((5, True), (150, False)):
         repeated = 0.4 * np.sin(harmonic * phase)[:, np.newaxis]
-        found = slow_error([run], [noise(run) + repeated])
-        assert (found.excess[0] > 0.2) == systematic
-        assert (sureness(found)[0] > 3.5) == systematic
+        slow = slow_error([run], [noise(run) + repeated])
+        assert (slow.excess[0] > 0.2) == systematic
+        assert (sureness(slow)[0] > 3.5) == systematic
 
 
 def test_what_moves_fast_has_lines_further_up(run):
@@ -75,7 +75,7 @@ def bursts(run, seed=3):
     return 1.5 * sum(np.exp(-(((run.time - at) / 0.5) ** 2)) for at in starts)
 
 
-def test_a_push_is_felt_where_cuffs_and_drive_scatter_alike_and_only_at_its_joint(worn):
+def test_a_push_is_detected_where_cuffs_and_drive_scatter_alike_and_only_at_its_joint(worn):
     push = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 1.0])
     quiet = noise(worn) * np.array([1.0, 1.0, 0.2, 0.2])
     gains = cuff_coherence([worn], [quiet + push])
@@ -117,5 +117,5 @@ def test_a_wave_that_does_not_come_again_within_the_motion_is_no_cogging(run):
     measured[:, 1] += 5.0 * np.sin(2.0 * np.pi * (angle - angle.min()) / np.ptp(angle))
     runs = [replace(run, measured=measured)]
     least = lowest(ripple, ripple.shape[0], runs)
-    found = Refinement(runs, baseline, np.ones(4))([Candidate(ripple, ((least + 0.5,),))])
-    assert found.causes[0].shapes[0][0] * np.ptp(angle) / (2.0 * np.pi) >= 1.5
+    fitted = Refinement(runs, baseline, np.ones(4))([Candidate(ripple, ((least + 0.5,),))])
+    assert fitted.causes[0].shapes[0][0] * np.ptp(angle) / (2.0 * np.pi) >= 1.5

@@ -74,11 +74,11 @@ def faults_of(session):
 
 def only_fault(session):
     """Return the one fault, which must be the spoiled run's."""
-    found = faults_of(session)
-    assert [fault.file for fault in found] == ["with_human.parquet"], [
-        fault.what for fault in found
+    faults = faults_of(session)
+    assert [fault.file for fault in faults] == ["with_human.parquet"], [
+        fault.what for fault in faults
     ]
-    return found[0]
+    return faults[0]
 
 
 def test_a_sound_session_has_no_fault(session):
@@ -118,10 +118,10 @@ def uneven(frame, seed=3):
     stamps and all."""
     count = np.arange(len(frame))
     taken = count + np.random.default_rng(seed).uniform(0.0, 0.2, len(frame))
-    made = {
+    sessions = {
         name: np.interp(taken, count, frame[name]) for name in frame.columns if name != "sequence"
     }
-    return frame.assign(**made)
+    return frame.assign(**sessions)
 
 
 def test_samples_taken_unevenly_and_stamped_so_spoil_nothing(session):
@@ -131,7 +131,7 @@ def test_samples_taken_unevenly_and_stamped_so_spoil_nothing(session):
     assert "the angles follow the stamps" in fault.what and not fault.spoils
 
 
-def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_suffer_from_it(
+def test_angles_too_coarse_to_show_wrong_stamps_are_too_coarse_to_suffer_from_them(
     session,
 ):
     frame, metadata = session[SPOILED]
@@ -186,14 +186,14 @@ def test_a_rate_that_changes_within_the_run_is_no_wrong_clock(session):
 
 
 @pytest.mark.parametrize(
-    ("share", "told"), [(0.26, False), (1 / (2 * np.pi), True), (np.pi / 180, True)]
+    ("share", "reported"), [(0.26, False), (1 / (2 * np.pi), True), (np.pi / 180, True)]
 )
-def test_a_drive_that_follows_weakly_is_in_no_other_unit(sound, share, told):
+def test_a_drive_that_follows_weakly_is_in_no_other_unit(sound, share, reported):
     frame, metadata = sound[SPOILED]
     weak = frame.assign(hip_angle_rad=frame["hip_reference_rad"] * share)
     session = [(weak, metadata) if number == SPOILED else run for number, run in enumerate(sound)]
-    said = [fault.what for fault in faults_of(session) if fault.channel == "hip_angle_rad"]
-    assert any("in another unit" in what for what in said) == told
+    messages = [fault.what for fault in faults_of(session) if fault.channel == "hip_angle_rad"]
+    assert any("in another unit" in what for what in messages) == reported
 
 
 def test_a_joint_that_rests_on_its_friction_while_its_set_point_goes_is_in_no_other_unit(sound):
@@ -207,7 +207,7 @@ def test_a_joint_that_rests_on_its_friction_while_its_set_point_goes_is_in_no_ot
     )
 
 
-def test_a_counter_that_starts_anew_is_named(sound):
+def test_a_counter_that_starts_again_is_named(sound):
     session = [(frame.copy(), metadata) for frame, metadata in sound]
     session[SPOILED][0].loc[3000:, "sequence"] -= 3000
     fault = only_fault(session)
@@ -232,8 +232,8 @@ def test_a_stuck_encoder_is_named_and_its_samples_excluded(session, joint):
     fault = only_fault(session)
     assert fault.channel == name and "stuck" in fault.what
     assert fault.samples[2000:2601].all() and fault.samples.sum() < 800
-    left = excluding([motion(frame, metadata, "with_human.parquet")], [fault])[0]
-    assert not left.valid[2000:2601].any() and left.valid.sum() > 4500
+    remaining = excluding([motion(frame, metadata, "with_human.parquet")], [fault])[0]
+    assert not remaining.valid[2000:2601].any() and remaining.valid.sum() > 4500
 
 
 def test_a_joint_that_never_moves_in_a_run_repeats_no_old_samples(sound):
@@ -287,7 +287,7 @@ def test_a_torque_that_is_rounded_to_coarse_steps_is_no_fault(session, step):
     assert faults_of(session) == []
 
 
-def test_an_angle_that_repeats_beside_a_torque_in_coarse_steps_is_no_stale_row(session):
+def test_an_angle_that_repeats_with_a_torque_in_coarse_steps_is_no_stale_row(session):
     """In a tenth of the samples the angle is the last one's; the torque is new, but rounded."""
     rounded(session, 4.0)
     frame, _ = session[SPOILED]
@@ -314,7 +314,7 @@ def test_a_reversed_sign_is_named_at_its_channel(session, joint, quantity):
     assert fault.channel == name and "reversed" in fault.what
 
 
-def test_both_torques_reversed_are_told_apart_from_neither(session):
+def test_both_torques_reversed_are_distinguished_from_neither(session):
     session[SPOILED][0][["hip_torque_nm", "knee_torque_nm"]] *= -1.0
     assert "hip_torque_nm and knee_torque_nm is reversed" in only_fault(session).what
 
@@ -360,9 +360,9 @@ def test_one_run_at_four_times_the_scale_of_its_like_is_named_without_any_other_
         for f, m in session
     ]
     session[SPOILED][0][["hip_torque_nm", "knee_torque_nm"]] *= 4.0
-    found = faults_of(session)
-    assert [fault.channel for fault in found] == ["hip_torque_nm", "knee_torque_nm"]
-    assert all("unit" in fault.what and "another run" in fault.what for fault in found)
+    faults = faults_of(session)
+    assert [fault.channel for fault in faults] == ["hip_torque_nm", "knee_torque_nm"]
+    assert all("unit" in fault.what and "another run" in fault.what for fault in faults)
 
 
 def test_cuffs_that_all_say_the_same_all_along_are_named_and_left_out(session):
@@ -409,10 +409,10 @@ def test_what_physics_can_do_to_a_torque_is_no_fault(session, spoil):
     ids=lambda t: f"{t.effect.name}@{t.effect.joint}",
 )
 def test_no_effect_of_the_catalogue_is_taken_for_a_fault(term):
-    made = [
+    session = [
         record(Plant(PlantSettings(), kind, i, (term,)), RICH, 30.0) for i, kind in enumerate(KINDS)
     ]
-    assert [fault.what for fault in faults_of(made)] == []
+    assert [fault.what for fault in faults_of(session)] == []
 
 
 def test_what_nature_allows_is_said_of_the_leg_that_moves(sound):

@@ -32,7 +32,7 @@ def humming(motion):
     return replace(motion, torque=motion.torque + extra)
 
 
-MADE = {
+SESSIONS = {
     "explained": lambda: session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5),
     "one kind, no periods": lambda: [
         replace(m, period_s=None)
@@ -50,14 +50,14 @@ NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@kn
 @pytest.fixture(scope="module")
 def diagnosed():
     """Return a diagnosis by its name in ``MADE``, and what is said of it, each made once."""
-    made = {}
+    results = {}
 
     def of(name):
-        if name not in made:
-            found = diagnose(MADE[name]())
-            found = naming(found, NAMED[name]) if name in NAMED else found
-            made[name] = found, verdict(found)
-        return made[name]
+        if name not in results:
+            diagnosis = diagnose(SESSIONS[name]())
+            diagnosis = naming(diagnosis, NAMED[name]) if name in NAMED else diagnosis
+            results[name] = diagnosis, verdict(diagnosis)
+        return results[name]
 
     return of
 
@@ -68,32 +68,34 @@ def no_figure_stays():
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", SESSIONS)
 def test_the_shares_of_the_error_add_up_to_the_baselines_mean_square(diagnosed, name):
-    _, said = diagnosed(name)
-    for joint, shares in said["error_budget"].items():
-        assert sum(shares.values()) == pytest.approx(said["baseline_rmse_nm"][joint] ** 2, rel=1e-9)
+    _, outcome = diagnosed(name)
+    for joint, shares in outcome["error_budget"].items():
+        assert sum(shares.values()) == pytest.approx(
+            outcome["baseline_rmse_nm"][joint] ** 2, rel=1e-9
+        )
         assert all(share >= 0 for key, share in shares.items() if "@" not in key)
 
 
 def test_a_spring_takes_the_error_at_its_joint_down_to_the_floor(diagnosed):
-    found, said = diagnosed("explained")
-    assert found.causes == ("parallel_spring@knee",)
-    knee = said["error_budget"]["knee"]
+    diagnosis, outcome = diagnosed("explained")
+    assert diagnosis.causes == ("parallel_spring@knee",)
+    knee = outcome["error_budget"]["knee"]
     assert list(knee) == [
         "noise_floor",
         "parallel_spring@knee",
         "repeatable_unexplained",
         "not_repeatable",
     ]
-    assert knee["parallel_spring@knee"] > 0.9 * said["baseline_rmse_nm"]["knee"] ** 2
+    assert knee["parallel_spring@knee"] > 0.9 * outcome["baseline_rmse_nm"]["knee"] ** 2
     assert knee["repeatable_unexplained"] < 0.1 * knee["noise_floor"]
 
 
-def test_a_hum_beside_the_harmonics_is_said_not_to_repeat(diagnosed):
-    _, said = diagnosed("unknown")
-    assert said["status"] == "unknown_cause"
-    knee = said["error_budget"]["knee"]
+def test_a_hum_between_the_harmonics_does_not_repeat(diagnosed):
+    _, outcome = diagnosed("unknown")
+    assert outcome["status"] == "unknown_cause"
+    knee = outcome["error_budget"]["knee"]
     assert knee["not_repeatable"] > 3 * knee["repeatable_unexplained"]
     assert "tone of 7.6" in drawing.DRAWN_BY["verdict"](*diagnosed("unknown")).axes[1].get_xlabel()
 
@@ -118,12 +120,14 @@ def test_what_repeats_is_no_scatter_and_what_wanders_is():
 
 def test_two_causes_that_overlap_share_what_either_would_take():
     # Alone a takes 6 and b takes 5 of 10; together 8.
-    left = {(): 10.0, ("a",): 4.0, ("b",): 5.0, ("a", "b"): 2.0}
-    shares = shares_of_causes(("a", "b"), lambda labels: np.array([left[tuple(sorted(labels))]]))
+    remaining = {(): 10.0, ("a",): 4.0, ("b",): 5.0, ("a", "b"): 2.0}
+    shares = shares_of_causes(
+        ("a", "b"), lambda labels: np.array([remaining[tuple(sorted(labels))]])
+    )
     np.testing.assert_allclose([shares["a"], shares["b"]], [[4.5], [3.5]])
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", SESSIONS)
 def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
     drawing.draw(*diagnosed(name), tmp_path)
     written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}
@@ -134,12 +138,12 @@ def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
 
 @pytest.mark.parametrize("name", ["explained", "unknown", "nothing"])
 def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
-    found, said = diagnosed(name)
-    bars = drawing.DRAWN_BY["verdict"](found, said).axes[0].patches
+    diagnosis, outcome = diagnosed(name)
+    bars = drawing.DRAWN_BY["verdict"](diagnosis, outcome).axes[0].patches
     drawn = [bar.get_width() for bar in bars]
     wanted = [
         100 * s / sum(shares.values())
-        for shares in said["error_budget"].values()
+        for shares in outcome["error_budget"].values()
         for s in shares.values()
     ]
     np.testing.assert_allclose(drawn, wanted)
@@ -149,20 +153,20 @@ def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
 def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_probabilities_of_sets(
     diagnosed, name
 ):
-    found, said = diagnosed(name)
-    shares, _, sets = drawing.DRAWN_BY["decision"](found, said).axes
+    diagnosis, outcome = diagnosed(name)
+    shares, _, sets = drawing.DRAWN_BY["decision"](diagnosis, outcome).axes
     parts = [
-        said["router"][joint][part] or 0.0
-        for joint in found.baseline.joints
+        outcome["router"][joint][part] or 0.0
+        for joint in diagnosis.baseline.joints
         for part in ("noise", "wanders", "between_runs", "unsplit", "repeats")
     ]
     # A hatched bar without a fill marks the person's part.
     drawn = [bar.get_width() for bar in shares.patches if bar.get_fill()]
     np.testing.assert_allclose(drawn, parts)
-    assert sum(drawn) == pytest.approx(len(found.baseline.joints), abs=1e-9), (
+    assert sum(drawn) == pytest.approx(len(diagnosis.baseline.joints), abs=1e-9), (
         "each joint's add up to one"
     )
-    likely = sorted(found.selected.posterior.by_labels.values(), reverse=True)
+    likely = sorted(diagnosis.selected.posterior.by_labels.values(), reverse=True)
     bars = list(dict.fromkeys(bar.get_width() for bar in sets.patches))
     shown = sum(p >= 0.01 for p in likely[:6])
     np.testing.assert_allclose(bars[:shown], likely[:shown])
@@ -183,9 +187,9 @@ def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
 
 
 def test_what_the_residual_goes_with_most_is_drawn_first(diagnosed):
-    found, said = diagnosed("explained")
-    ranking = said["depends_on"]["knee"]
-    drawn = drawing.DRAWN_BY["dependence"](found, said)
+    diagnosis, outcome = diagnosed("explained")
+    ranking = outcome["depends_on"]["knee"]
+    drawn = drawing.DRAWN_BY["dependence"](diagnosis, outcome)
     first = next(axis for axis in drawn.axes if axis.get_ylabel() == "knee residual, N·m")
     assert first.get_xlabel().startswith(f"knee {ranking[0]['variable']}, ")
     assert (
@@ -200,14 +204,16 @@ def test_a_named_cause_leaves_nothing_that_goes_with_its_variable(diagnosed):
 
 
 def test_a_tone_is_folded_onto_its_crest(diagnosed):
-    found, _ = diagnosed("nothing")
+    diagnosis, _ = diagnosed("nothing")
     humming = [
         e + 2.0 * np.cos(2 * np.pi * 3.137 * run.time + phase)[:, np.newaxis]
-        for phase, (run, e) in enumerate(zip(found.validate, found.before.residuals, strict=True))
+        for phase, (run, e) in enumerate(
+            zip(diagnosis.validate, diagnosis.before.residuals, strict=True)
+        )
     ]
     seen = against(
         "tone",
-        replace(found, before=replace(found.before, residuals=humming)),
+        replace(diagnosis, before=replace(diagnosis.before, residuals=humming)),
         "knee",
         ("with_human",),
     )
@@ -217,15 +223,15 @@ def test_a_tone_is_folded_onto_its_crest(diagnosed):
 
 
 def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
-    found, _ = diagnosed("explained")
-    fit = found.after.fit
+    diagnosis, _ = diagnosed("explained")
+    fit = diagnosis.after.fit
     errors = [
-        replay(model_of_run(fit, found.baseline, run), run.motion, 1.0, 1.0).error
-        for run in found.validate
+        replay(model_of_run(fit, diagnosis.baseline, run), run.motion, 1.0, 1.0).error
+        for run in diagnosis.validate
     ]
     pooled = np.concatenate([error.reshape(-1, 2) for error in errors])
     np.testing.assert_allclose(
-        np.sqrt(np.mean(pooled**2, axis=0)), found.simulation_error["extended"], rtol=1e-6
+        np.sqrt(np.mean(pooled**2, axis=0)), diagnosis.simulation_error["extended"], rtol=1e-6
     )
 
 
@@ -233,10 +239,12 @@ def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypa
     def impossible(model, motion, every_s):
         raise InputError("no such leg")
 
-    found, said = diagnosed("explained")
+    diagnosis, outcome = diagnosed("explained")
     monkeypatch.setattr(worst_stretch, "replay", impossible)
-    nowhere = dict.fromkeys(found.baseline.joints)
-    drawn = drawing.DRAWN_BY["simulation"](found, said | {"baseline_simulation_rmse_rad": nowhere})
+    nowhere = dict.fromkeys(diagnosis.baseline.joints)
+    drawn = drawing.DRAWN_BY["simulation"](
+        diagnosis, outcome | {"baseline_simulation_rmse_rad": nowhere}
+    )
     words = [text.get_text() for text in drawn.legends[0].get_texts()]
     assert "rigid body and friction (cannot be simulated)" in words
 

@@ -64,10 +64,10 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE, has_periods=True):
     )
 
 
-@pytest.mark.parametrize(("has_periods", "how"), [(True, "repeats with"), (False, "depends on")])
-def test_without_periods_nothing_is_said_to_repeat(has_periods, how):
-    (found,) = findings(diagnosed({(ANGLE,): 0.95, (): 0.05}, has_periods=has_periods))
-    assert found["path"][1]["words"] == f"something that {how} the motion"
+@pytest.mark.parametrize(("has_periods", "words"), [(True, "repeats with"), (False, "depends on")])
+def test_without_periods_nothing_is_said_to_repeat(has_periods, words):
+    (finding,) = findings(diagnosed({(ANGLE,): 0.95, (): 0.05}, has_periods=has_periods))
+    assert finding["path"][1]["words"] == f"something that {words} the motion"
 
 
 @pytest.mark.parametrize(
@@ -78,29 +78,29 @@ def test_without_periods_nothing_is_said_to_repeat(has_periods, how):
     ],
 )
 def test_a_law_of_the_other_joint_is_of_a_family_of_the_other_joint(law, words):
-    (found,) = findings(diagnosed({(law,): 0.95, (): 0.05}))
-    assert (found["family"], found["words"]) == ("speed", words)
+    (finding,) = findings(diagnosed({(law,): 0.95, (): 0.05}))
+    assert (finding["family"], finding["words"]) == ("speed", words)
 
 
 def levels(finding):
     return [(node["level"], node["value"]) for node in finding["path"]]
 
 
-def test_a_tie_over_two_families_is_told_at_the_joint_and_of_no_family():
-    (found,) = findings(diagnosed({(SPEED,): 0.55, (OFFSET,): 0.42, (): 0.03}))
-    assert levels(found) == [
+def test_a_tie_over_two_families_is_reported_at_the_joint_and_of_no_family():
+    (finding,) = findings(diagnosed({(SPEED,): 0.55, (OFFSET,): 0.42, (): 0.03}))
+    assert levels(finding) == [
         ("missing", True),
         ("repeats", True),
         ("joint", "hip"),
         ("cause", "coulomb_asymmetry@hip"),
     ]
-    assert [one["family"] for one in found["causes"]] == ["speed", "sensor"]
-    assert found["words"] == "Coulomb asymmetry at the hip"
+    assert [one["family"] for one in finding["causes"]] == ["speed", "sensor"]
+    assert finding["words"] == "Coulomb asymmetry at the hip"
 
 
-def test_a_tie_over_two_joints_is_told_of_no_joint():
-    (found,) = findings(diagnosed({(SPEED,): 0.5, (TILT,): 0.47, (): 0.03}))
-    assert [level for level, _ in levels(found)] == ["missing", "repeats", "cause"]
+def test_a_tie_over_two_joints_is_reported_of_no_joint():
+    (finding,) = findings(diagnosed({(SPEED,): 0.5, (TILT,): 0.47, (): 0.03}))
+    assert [level for level, _ in levels(finding)] == ["missing", "repeats", "cause"]
 
 
 @pytest.mark.parametrize(
@@ -113,27 +113,27 @@ def test_a_tie_over_two_joints_is_told_of_no_joint():
     ],
 )
 def test_no_node_of_a_path_is_more_probable_than_the_one_above(sets):
-    for found in findings(diagnosed(sets)):
-        likely = [node["probability"] for node in found["path"]]
+    for finding in findings(diagnosed(sets)):
+        likely = [node["probability"] for node in finding["path"]]
         assert all(below <= above + 1e-12 for above, below in pairwise(likely))
 
 
 def test_an_unlisted_law_is_said_in_words_with_the_closest_listed_cause():
-    (found,) = findings(diagnosed({(ANGLE,): 0.7, (COGGING,): 0.2, (): 0.1}))
-    assert (found["level"], found["words"]) == ("family", "a law of the knee's angle")
-    (unlisted,) = found["laws"]
+    (finding,) = findings(diagnosed({(ANGLE,): 0.7, (COGGING,): 0.2, (): 0.1}))
+    assert (finding["level"], finding["words"]) == ("family", "a law of the knee's angle")
+    (unlisted,) = finding["laws"]
     assert unlisted["words"] == "a law of the knee's angle"
     assert unlisted["probability"] == pytest.approx(0.7)
-    assert [(one["words"], one["dropped"]) for one in found["causes"]] == [
+    assert [(one["words"], one["dropped"]) for one in finding["causes"]] == [
         ("cogging at the knee", False)
     ]
 
 
 def test_a_joint_that_slides_has_a_law_of_its_position_and_a_force():
     slides = Joint("hip"), Joint("knee", "prismatic")
-    (found,) = findings(diagnosed({(ANGLE,): 0.7, (HUM,): 0.2, (): 0.1}, joints=slides))
-    assert found["words"] == "a law of the knee's position"
-    assert found["laws"][0]["words"] == "a law of the knee's position"
+    (finding,) = findings(diagnosed({(ANGLE,): 0.7, (HUM,): 0.2, (): 0.1}, joints=slides))
+    assert finding["words"] == "a law of the knee's position"
+    assert finding["laws"][0]["words"] == "a law of the knee's position"
 
 
 def test_a_cause_that_does_harm_on_the_validation_runs_is_dropped_and_with_it_what_it_explained():
@@ -143,12 +143,12 @@ def test_a_cause_that_does_harm_on_the_validation_runs_is_dropped_and_with_it_wh
     assert findings(d) == []
 
 
-def test_a_law_that_takes_the_place_of_a_dropped_cause_is_a_finding_beside_it():
+def test_a_law_that_takes_the_place_of_a_dropped_cause_is_a_finding_with_it():
     d = diagnosed({(COGGING,): 0.94, (ANGLE,): 0.05, (): 0.01}, {"cogging@knee": -4.0})
     assert d.causes == ()
-    (found,) = findings(d)
-    assert (found["level"], found["words"]) == ("family", "a law of the knee's angle")
-    assert found["causes"][0]["dropped"]
+    (finding,) = findings(d)
+    assert (finding["level"], finding["words"]) == ("family", "a law of the knee's angle")
+    assert finding["causes"][0]["dropped"]
 
 
 def test_where_nothing_is_missing_nothing_is_found():

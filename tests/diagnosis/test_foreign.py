@@ -14,12 +14,12 @@ from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.machines import driven
 
 
-def told(kind, more):
+def verdict_of(kind, more):
     tables = [
         driven(purpose, seed, kind, more, news=0.02)
         for seed, purpose in ((1, "train"), (2, "train"), (3, "validate"))
     ]
-    motions = [motion_from_table(motion_table(made, FilterSettings())) for made in tables]
+    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
     return verdict(diagnose([replace(m, file=f"{i}.parquet") for i, m in enumerate(motions)]))
 
 
@@ -60,16 +60,17 @@ PEAK = "a Stribeck peak of probability 0.50 is named beside a drag of another ex
     "kind",
     ["revolute", pytest.param("prismatic", marks=pytest.mark.xfail(strict=True, reason=PEAK))],
 )
-def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind):
-    said = told(kind, steeper_than_squared)
-    (joint,) = said["unexplained"]
+def test_what_a_cause_of_another_form_leaves_is_reported_with_its_variable(kind):
+    outcome = verdict_of(kind, steeper_than_squared)
+    (joint,) = outcome["unexplained"]
     assert (
-        said["status"] == "explained"
-        and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
+        outcome["status"] == "explained"
+        and outcome["extended_rmse_nm"][joint] > 1.1 * outcome["noise_floor_nm"][joint]
     )
-    assert said["residual"]["depends_on"][0]["variable"] == "speed"
+    assert outcome["residual"]["depends_on"][0]["variable"] == "speed"
     assert (
-        f"of the remaining error at the {joint} depends on the {joint}'s speed" in said["summary"]
+        f"of the remaining error at the {joint} depends on the {joint}'s speed"
+        in outcome["summary"]
     )
 
 
@@ -78,29 +79,29 @@ def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind
 )
 @pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
 def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
-    said = told(kind, gripped_beyond_a_speed)
-    named = {cause["effect"] for cause in said["causes"]}
-    assert named <= {"quadratic_drag"} and said["status"] != "nothing_missing"
-    assert said["residual"]["depends_on"][0]["variable"] == "speed"
+    outcome = verdict_of(kind, gripped_beyond_a_speed)
+    named = {cause["effect"] for cause in outcome["causes"]}
+    assert named <= {"quadratic_drag"} and outcome["status"] != "nothing_missing"
+    assert outcome["residual"]["depends_on"][0]["variable"] == "speed"
 
 
 @pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
 def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
-    said = told(kind, rough_on_one_side)
-    assert [cause["effect"] for cause in said["causes"]] == ["position_dependent_friction"]
-    assert said["status"] == "partly_explained", "its equation has no step"
+    outcome = verdict_of(kind, rough_on_one_side)
+    assert [cause["effect"] for cause in outcome["causes"]] == ["position_dependent_friction"]
+    assert outcome["status"] == "partly_explained", "its equation has no step"
 
 
 def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
     """Of the whole force it is within what a good rig leaves, for most of it is a weight that never
     changes."""
-    said = told("prismatic", held_back)
+    outcome = verdict_of("prismatic", held_back)
     error, floor, force = (
-        said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm")
+        outcome[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm")
     )
     assert np.sqrt(error**2 - floor**2) < 0.015 * force
-    assert said["status"] == "unknown_cause"
-    assert "depends on the force that the carriage passes on" in said["summary"]
+    assert outcome["status"] == "unknown_cause"
+    assert "depends on the force that the carriage passes on" in outcome["summary"]
 
 
 @pytest.mark.parametrize(
@@ -110,22 +111,22 @@ def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
 def test_a_reading_off_by_some_percent_is_a_law_of_the_load_and_half_of_it_is_as_on_a_good_rig(
     share, status, words
 ):
-    said = told("revolute", lambda t, q, dq, ddq, own: off_by_a_little(share, own))
-    assert (said["status"], said["causes"]) == (status, [])
-    assert [finding["words"] for finding in said["findings"]] == words
-    (error,), (torque,) = (said[key].values() for key in ("baseline_rmse_nm", "torque_rms_nm"))
+    outcome = verdict_of("revolute", lambda t, q, dq, ddq, own: off_by_a_little(share, own))
+    assert (outcome["status"], outcome["causes"]) == (status, [])
+    assert [finding["words"] for finding in outcome["findings"]] == words
+    (error,), (torque,) = (outcome[key].values() for key in ("baseline_rmse_nm", "torque_rms_nm"))
     assert error < 0.02 * torque
 
 
 def test_a_lift_of_which_nothing_is_hidden_misses_nothing():
-    said = told("prismatic", lambda t, *motion: np.zeros_like(t))
-    assert said["status"] == "nothing_missing"
+    outcome = verdict_of("prismatic", lambda t, *motion: np.zeros_like(t))
+    assert outcome["status"] == "nothing_missing"
 
 
-def test_a_drift_at_a_lift_is_told_by_its_rate_and_its_weight_stays_its_own():
+def test_a_drift_at_a_lift_is_reported_by_its_rate_and_its_weight_stays_its_own():
     """Where a force that never changes is the weight's, a level beside it could be anything."""
-    said = told("prismatic", lambda t, *motion: 0.02 * t)
-    (cause,) = said["causes"]
+    outcome = verdict_of("prismatic", lambda t, *motion: 0.02 * t)
+    (cause,) = outcome["causes"]
     rate, level = cause["parameters"]
     assert cause["effect"] == "torque_drift" and rate["value"] == pytest.approx(0.4, rel=0.05)
     assert level["value"] == 0.0 and cause["each_run"] == []

@@ -61,15 +61,15 @@ def motion(time, angle, torque, purpose):
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_ripple_of_several_lines_and_friction_that_builds_up_are_both_named(seed):
-    found = diagnose(level_joint(seed))
-    assert {"cogging@joint", "presliding_hysteresis@joint"} <= set(found.causes)
-    assert found.status in ("explained", "partly_explained")
-    assert found.after.errors.rms[0] < 0.6 * found.before.errors.rms[0]
-    (cogging,) = (cause for cause in found.after.fit.causes if cause.label == "cogging@joint")
+    diagnosis = diagnose(level_joint(seed))
+    assert {"cogging@joint", "presliding_hysteresis@joint"} <= set(diagnosis.causes)
+    assert diagnosis.status in ("explained", "partly_explained")
+    assert diagnosis.after.errors.rms[0] < 0.6 * diagnosis.before.errors.rms[0]
+    (cogging,) = (cause for cause in diagnosis.after.fit.causes if cause.label == "cogging@joint")
     assert cogging.shapes[0][0] == pytest.approx(88.3, abs=0.3)
 
 
 def test_without_ripple_none_is_named():
-    found = diagnose(level_joint(1, lines=()))
-    assert "presliding_hysteresis@joint" in found.causes
-    assert "cogging@joint" not in found.causes
+    diagnosis = diagnose(level_joint(1, lines=()))
+    assert "presliding_hysteresis@joint" in diagnosis.causes
+    assert "cogging@joint" not in diagnosis.causes

@@ -22,27 +22,27 @@ from tests.diagnosis.sessions import session
 )
 def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
     motions = session(*label.split("@"), seed=5, **values)
-    found = diagnose(motions, known=[label])
-    said = verdict(found)
-    assert said["status"] == "nothing_missing"
-    assert label in said["caveats"][0]
-    (known,) = said["known"]
+    diagnosis = diagnose(motions, known=[label])
+    outcome = verdict(diagnosis)
+    assert outcome["status"] == "nothing_missing"
+    assert label in outcome["caveats"][0]
+    (known,) = outcome["known"]
     for parameter in known["parameters"]:
         low, high = parameter["ci95"]
         assert low < values[parameter["name"]] < high
-    assert not any(label in tried for tried in candidates(found)["causes"])
-    terms = model_from_parameters(found.parameters, "with_human", motions[0].machine)
+    assert not any(label in tried for tried in candidates(diagnosis)["causes"])
+    terms = model_from_parameters(diagnosis.parameters, "with_human", motions[0].machine)
     assert label in [term.effect.label for term in terms]
 
 
-def test_beside_what_is_known_something_else_is_found_all_the_same():
-    said = verdict(
+def test_something_else_is_found_in_addition_to_what_is_known():
+    outcome = verdict(
         diagnose(session("torque_gain", "hip", seed=3, gain=1.08), known=["rotor_inertia@knee"])
     )
-    assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [
+    assert [(cause["effect"], cause["joint"]) for cause in outcome["causes"]] == [
         ("torque_gain", "hip")
     ]
-    low, high = said["known"][0]["parameters"][0]["ci95"]
+    low, high = outcome["known"][0]["parameters"][0]["ci95"]
     assert low < 0.0 < high  # this leg has none
 
 
@@ -56,7 +56,7 @@ def test_beside_what_is_known_something_else_is_found_all_the_same():
         ("torque_offset@hip", " or "),
     ],
 )
-def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(
+def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_given(
     label, goes_on
 ):
     with pytest.raises(

@@ -14,8 +14,8 @@ from tests.diagnosis.test_summary import LABEL, stuck  # noqa: F401 - a fixture
 
 def test_the_more_of_the_error_a_cause_removes_the_more_likely_it_is_what_it_is_called():
     shares = np.linspace(0.0, 1.0, 21)
-    told = kept_share(shares)
-    assert (np.diff(told) >= 0.0).all() and told[-1] > 0.9 and told[2] < 0.5
+    kept = kept_share(shares)
+    assert (np.diff(kept) >= 0.0).all() and kept[-1] > 0.9 and kept[2] < 0.5
     assert kept_share(0.3, look_alike=(0.0, 0.0)) == 0.5
     assert kept_share(0.3, 0.2, look_alike=(0.0, 0.0)) == 0.7
 

@@ -36,8 +36,8 @@ from tests.diagnosis.naming import naming
 @cache
 def motions(machine, **hidden):
     tables = [machine("train", 1, **hidden), machine("validate", 2, **hidden)]
-    made = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
-    return [replace(m, file=f"{m.purpose}.parquet") for m in made]
+    runs = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    return [replace(m, file=f"{m.purpose}.parquet") for m in runs]
 
 
 def labels(machine):
@@ -49,19 +49,19 @@ def labels(machine):
 
 @pytest.fixture(scope="module")
 def screw():
-    found = diagnose(motions(slide, asymmetry=-80.0))
-    return found, verdict(found)
+    diagnosis = diagnose(motions(slide, asymmetry=-80.0))
+    return diagnosis, verdict(diagnosis)
 
 
 def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
-    found = diagnose(motions(pendulum, spring=0.8))
-    said = verdict(found)
-    (cause,) = said["causes"]
+    diagnosis = diagnose(motions(pendulum, spring=0.8))
+    outcome = verdict(diagnosis)
+    (cause,) = outcome["causes"]
     assert "parallel_spring@arm" in {
         cause_label(one) for one in (cause, *cause["indistinguishable_from"])
     }
-    assert said["status"] == "explained"
-    (spring,) = verdict(naming(found, "parallel_spring@arm"))["causes"]
+    assert outcome["status"] == "explained"
+    (spring,) = verdict(naming(diagnosis, "parallel_spring@arm"))["causes"]
     stiffness, rest = spring["parameters"]
     assert stiffness["value"] == pytest.approx(0.8, rel=0.05)
     assert stiffness["ci95"][0] < 0.8 < stiffness["ci95"][1]
@@ -71,17 +71,17 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
 def test_of_ties_the_one_that_predicts_the_validation_run_is_named():
     """A weak spring and a torque offset explain one training run about alike, and not another
     motion."""
-    found = diagnose(motions(pendulum, spring=0.4))
-    (trained,) = answer_of(found.selected.searched).named
+    diagnosis = diagnose(motions(pendulum, spring=0.4))
+    (trained,) = answer_of(diagnosis.selected.searched).named
     assert {"torque_offset@arm", "parallel_spring@arm"} <= trained.members
-    (named,) = found.named
+    (named,) = diagnosis.named
     assert named.element.label == "parallel_spring@arm"
     assert "torque_offset@arm" not in named.members
-    assert found.selected.dropped == frozenset(), "none of them does harm"
-    assert "torque_offset@arm" in found.selected.doubted
+    assert diagnosis.selected.dropped == frozenset(), "none of them does harm"
+    assert "torque_offset@arm" in diagnosis.selected.doubted
 
 
-def test_too_little_to_validate_on_is_told_with_the_fault_that_leaves_it_out():
+def test_too_little_to_validate_on_is_reported_with_the_fault_that_leaves_it_out():
     train, validate = motions(pendulum)
     torque = validate.torque.copy()
     torque[len(torque) // 10 :] = torque[len(torque) // 10]
@@ -97,15 +97,15 @@ def test_of_what_was_weighed_in_one_variant_it_is_not_said_that_it_was_left_out(
 
 
 def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newtons(screw):
-    found, said = screw
-    (cause,) = said["causes"]
+    diagnosis, outcome = screw
+    (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("viscous_asymmetry", "axis")
     (asymmetry,) = cause["parameters"]
     assert (asymmetry["value"], asymmetry["unit"]) == (pytest.approx(-40.0, rel=0.05), "N·s/m")
-    assert said["units"] == {"axis": {"torque": "N", "angle": "m"}}
-    assert " N, " in said["summary"] and "N·m" not in said["summary"]
-    assert "m/s" in said["scoring"]["mask"]
-    tried = candidates(found)
+    assert outcome["units"] == {"axis": {"torque": "N", "angle": "m"}}
+    assert " N, " in outcome["summary"] and "N·m" not in outcome["summary"]
+    assert "m/s" in outcome["scoring"]["mask"]
+    tried = candidates(diagnosis)
     assert {"rmse_before_axis_n", "rmse_after_axis_n"} <= set(tried.columns)
     taken_up = tried[tried["verdict"] == "absorbed"]["causes"].map(lambda causes: causes[0])
     assert set(taken_up) == {"rotor_inertia@axis", "torque_gain@axis"}
@@ -115,8 +115,8 @@ def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_na
     """A spring is added to the training run alone, beside friction that differs with direction in
     both."""
     train, validate = motions(slide, asymmetry=-80.0)
-    found = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
-    both = naming(found, "viscous_asymmetry@axis", "parallel_spring@axis")
+    diagnosis = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
+    both = naming(diagnosis, "viscous_asymmetry@axis", "parallel_spring@axis")
     assert both.causes == ("viscous_asymmetry@axis",)
     tried = candidates(both)
     spring = tried[tried["causes"].map(lambda causes: list(causes) == ["parallel_spring@axis"])]
@@ -127,15 +127,15 @@ def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_na
     )
 
 
-def test_what_is_rejected_is_told_with_its_probability_and_its_odds_against_nothing(screw):
-    found, said = screw
-    tried = candidates(found)
+def test_what_is_rejected_is_listed_with_its_probability_and_its_odds_against_nothing(screw):
+    diagnosis, outcome = screw
+    tried = candidates(diagnosis)
     rejected = tried[(tried["verdict"] == "rejected") & tried["probability"].notna()]
     assert len(rejected) > 3
-    nothing = said["posterior"]["nothing_missing"]
+    nothing = outcome["posterior"]["nothing_missing"]
     for row in rejected.to_dict("records"):
-        told = re.search(r"its probability is (\S+?)(;|$)", row["reason"])[1]
-        assert float(told) == pytest.approx(row["probability"], rel=0.05)
+        probability = re.search(r"its probability is (\S+?)(;|$)", row["reason"])[1]
+        assert float(probability) == pytest.approx(row["probability"], rel=0.05)
         if row["probability"] > 0.0 and nothing > 0.0:
             assert row["train_score"] == pytest.approx(np.log(row["probability"]) - np.log(nothing))
     (named,) = tried[tried["verdict"] == "named"]["probability"]
@@ -143,26 +143,26 @@ def test_what_is_rejected_is_told_with_its_probability_and_its_odds_against_noth
 
 
 def test_a_springs_load_at_position_zero_is_part_of_the_force_that_holds_a_lift():
-    found = diagnose(motions(lift, spring=220.0))
-    (cause,) = verdict(found)["causes"]
+    diagnosis = diagnose(motions(lift, spring=220.0))
+    (cause,) = verdict(diagnosis)["causes"]
     stiffness, rest = cause["parameters"]
     assert (cause["effect"], rest["name"]) == ("parallel_spring", "rest_angle")
     assert stiffness["ci95"][0] < 220.0 < stiffness["ci95"][1]
     assert (rest["value"], rest["ci95"]) == (0.0, [0.0, 0.0])
-    (held,) = found.parameters[found.parameters["name"] == "X2"].to_dict("records")
+    (held,) = diagnosis.parameters[diagnosis.parameters["name"] == "X2"].to_dict("records")
     assert held["ci95_low"] < 12.0 * 9.81 - 220.0 * 0.02 < held["ci95_high"]
-    assert any("spring balance" in said for said in cause["evidence"])
-    assert not any("on its side" in said for said in cause["evidence"])
+    assert any("spring balance" in sentence for sentence in cause["evidence"])
+    assert not any("on its side" in sentence for sentence in cause["evidence"])
 
 
 def test_a_spring_that_a_lifts_drawings_show_has_its_stiffness_fitted_and_its_rest_taken():
-    found = diagnose(motions(lift, spring=220.0), known=["parallel_spring@carriage"])
-    stiffness, rest = verdict(found)["known"][0]["parameters"]
+    diagnosis = diagnose(motions(lift, spring=220.0), known=["parallel_spring@carriage"])
+    stiffness, rest = verdict(diagnosis)["known"][0]["parameters"]
     assert stiffness["ci95"][0] < 220.0 < stiffness["ci95"][1] and rest["ci95"] == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("machine", [lift, slide, pendulum])
-def test_a_spring_that_is_told_its_rest_pulls_neither_way_there(machine):
+def test_a_spring_with_a_given_rest_pulls_neither_way_there(machine):
     run, *_ = motions(machine)
     (joint,) = run.joints
     spring = ParallelSpring(joint, on=run.machine)
@@ -175,10 +175,10 @@ def test_nobody_is_asked_for_runs_with_a_person_in_a_ball_screw(screw):
 
 
 def test_the_extended_model_simulates_the_screw_further_than_the_baseline(screw):
-    said = screw[1]
+    outcome = screw[1]
     assert (
-        said["extended_simulation_rmse_rad"]["axis"]
-        < 0.5 * said["baseline_simulation_rmse_rad"]["axis"]
+        outcome["extended_simulation_rmse_rad"]["axis"]
+        < 0.5 * outcome["baseline_simulation_rmse_rad"]["axis"]
     )
 
 
@@ -190,12 +190,12 @@ def test_a_pendulum_and_a_screw_are_identified_without_exoid_knowing_their_size(
     assert np.allclose(axis["value"], [90.0, 20.0, 200.0], rtol=0.05)
 
 
-def test_a_pendulum_whose_zero_is_half_a_turn_off_is_told_to_stand_on_its_head():
+def test_a_pendulum_whose_zero_is_half_a_turn_off_is_reported_upside_down():
     hanging = motions(pendulum)
     turned = [replace(m, q=m.q + np.pi) for m in hanging]
-    (told,) = identify(turned).remarks
-    assert told.startswith("exo_alone: X2 = -0.125 kg·m")
-    assert "the zero is half a turn off" in told
+    (remark,) = identify(turned).remarks
+    assert remark.startswith("exo_alone: X2 = -0.125 kg·m")
+    assert "the zero is half a turn off" in remark
     assert identify(hanging).remarks == []
     on_its_head, as_it_should = (verdict(diagnose(runs))["caveats"] for runs in (turned, hanging))
     assert any("the zero is half a turn off" in caveat for caveat in on_its_head)

@@ -163,14 +163,14 @@ def test_slow_noise_counts_for_one_a_coefficient_and_what_it_cannot_follow_in_fu
     cause = np.sin(0.7 * time)
     X = np.column_stack([slow, cause])
 
-    def told(torque):
+    def explained_of(torque):
         return explained(X.T @ X, X.T @ torque, curves, variance, most=20)
 
     wander, noise = slow @ rng.normal(0.0, 0.3, 20), rng.normal(size=4000)
     assert wander @ wander > 2000.0
-    assert told(noise) < 10.0
-    assert 20.0 <= told(wander + noise) < 30.0
-    assert told(cause + wander + noise) == pytest.approx(cause @ cause + 20.0, rel=0.1)
+    assert explained_of(noise) < 10.0
+    assert 20.0 <= explained_of(wander + noise) < 30.0
+    assert explained_of(cause + wander + noise) == pytest.approx(cause @ cause + 20.0, rel=0.1)
 
 
 def test_probabilities_add_up_to_one_and_nothing_wins_where_nothing_is_hidden():

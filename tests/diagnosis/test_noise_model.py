@@ -26,43 +26,43 @@ def density(rms: float, tau: float) -> float:
 
 def acting(series: list[np.ndarray]) -> float:
     """Return the density that the model finds where columns move."""
-    found = np.array(_spectrum_of(series, RATE_HZ, (0.25, 6.0)))[:, np.newaxis]
-    return float(NoiseModel(*found, from_periods=True).at(np.array([ACTING_HZ]))[0, 0])
+    model = np.array(_spectrum_of(series, RATE_HZ, (0.25, 6.0)))[:, np.newaxis]
+    return float(NoiseModel(*model, from_periods=True).at(np.array([ACTING_HZ]))[0, 0])
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.02, 0.06])
 def test_the_density_where_columns_move_is_that_of_the_noise(tau):
     rng = np.random.default_rng(3)
-    found = [acting([coloured(rng, 2400, 0.5, tau) for _ in range(2)]) for _ in range(20)]
-    assert np.mean(found) == pytest.approx(density(0.5, tau), rel=0.2)
-    assert np.std(found) < 0.35 * np.mean(found)
+    densities = [acting([coloured(rng, 2400, 0.5, tau) for _ in range(2)]) for _ in range(20)]
+    assert np.mean(densities) == pytest.approx(density(0.5, tau), rel=0.2)
+    assert np.std(densities) < 0.35 * np.mean(densities)
 
 
 @pytest.mark.parametrize("share", [0.6, 0.33, 0.2])
 def test_above_the_motion_noise_is_known_through_gaps(share):
     """A joint that often stands still is known in short stretches only; it counts all the same."""
-    rng, true, found = np.random.default_rng(1), 0.3**2 / RATE_HZ, []
+    rng, true, densities = np.random.default_rng(1), 0.3**2 / RATE_HZ, []
     for _ in range(20):
         x, at = np.full(2400, np.nan), 0
         while at < len(x):
             length = int(rng.integers(10, 50))
             x[at : at + length] = 0.3 * rng.normal(size=len(x[at : at + length]))
             at += length + int(rng.exponential(30.0 * (1.0 / share - 1.0)))
-        found.append(_spectrum_of([x], RATE_HZ, (4.0, 8.0), np.array([0.2]))[0])
-    assert 0.7 * true < np.median(found) < 1.8 * true
-    assert np.all((np.array(found) > 0.1 * true) & (np.array(found) < 10.0 * true))
+        densities.append(_spectrum_of([x], RATE_HZ, (4.0, 8.0), np.array([0.2]))[0])
+    assert 0.7 * true < np.median(densities) < 1.8 * true
+    assert np.all((np.array(densities) > 0.1 * true) & (np.array(densities) < 10.0 * true))
 
 
 def test_pink_noise_is_known_to_grow_towards_low_frequencies():
     rng = np.random.default_rng(6)
     frequency = np.fft.rfftfreq(4800, 1.0 / RATE_HZ)
-    found = []
+    ratios = []
     for _ in range(20):
         white = np.fft.rfft(rng.normal(size=4800))
         white[1:] *= np.sqrt(1.5 / frequency[1:])
         white[0] = 0.0
-        found.append(acting([np.fft.irfft(white)]))
-    assert np.mean(found) == pytest.approx(1.5 / ACTING_HZ / RATE_HZ, rel=0.2)
+        ratios.append(acting([np.fft.irfft(white)]))
+    assert np.mean(ratios) == pytest.approx(1.5 / ACTING_HZ / RATE_HZ, rel=0.2)
 
 
 def test_a_step_in_one_of_several_periods_is_not_noise():

@@ -19,7 +19,7 @@ def motions():
     return session(seconds=40.0)
 
 
-def test_beside_a_turn_of_either_joint_no_cuff_is_believed(motions):
+def test_near_a_turn_of_either_joint_no_cuff_is_used(motions):
     worn = motions[3]
     steady = away_from_turns(worn)
     turns = [worn.time[np.flatnonzero(np.diff(dq > 0)) + 1] for dq in worn.dq.T]
@@ -30,13 +30,13 @@ def test_beside_a_turn_of_either_joint_no_cuff_is_believed(motions):
     assert steady[distance > TURN_S + 0.01].all()
 
 
-def test_cuffs_tell_the_wearers_torque_better_away_from_turns_than_beside_them(motions):
+def test_cuffs_measure_the_wearers_torque_better_away_from_turns_than_near_them(motions):
     run = observe(motions[3])
     baseline = baseline_of([run])
-    made = fit([], [run], baseline, np.array([1.0, 1.0, 10.0, 10.0]))
-    left = residuals_on(made, [run], baseline)[0][:, 2]
+    fitted = fit([], [run], baseline, np.array([1.0, 1.0, 10.0, 10.0]))
+    residual = residuals_on(fitted, [run], baseline)[0][:, 2]
     steady = run.usable[:, 2]
-    assert np.mean(left[run.valid & ~steady] ** 2) > np.mean(left[steady] ** 2)
+    assert np.mean(residual[run.valid & ~steady] ** 2) > np.mean(residual[steady] ** 2)
 
 
 def in_turns(motion, every=4):
@@ -47,7 +47,7 @@ def in_turns(motion, every=4):
     return replace(motion, forces=forces)
 
 
-def test_sensors_that_are_read_in_turns_tell_the_same_torque(motions):
+def test_sensors_that_are_read_in_turns_measure_the_same_torque(motions):
     whole, thin = observe(motions[3]), observe(in_turns(motions[3]))
     assert thin.has_cuffs
     both = thin.usable[:, 2:]
@@ -56,7 +56,7 @@ def test_sensors_that_are_read_in_turns_tell_the_same_torque(motions):
     assert np.sqrt(np.mean(apart**2)) < 0.05 * whole.measured[:, 2:][both].std()
 
 
-def test_sensors_that_are_read_too_seldom_tell_no_torque(motions):
+def test_sensors_that_are_read_too_seldom_measure_no_torque(motions):
     assert not observe(in_turns(motions[3], every=30)).has_cuffs
 
 
@@ -79,13 +79,13 @@ def test_torque_of_the_model_obeys_it_behind_the_low_pass_but_not_along_a_low_pa
     values = np.linspace(1.0, 3.0, baseline.size)
     model = Model(baseline.terms)
     torque = model.regressor(motion) @ values
-    left = {}
+    residuals = {}
     for name, moved in (("low-pass", motion), ("motion", below(motion, 5.0))):
         run = observe(replace(motion, torque=torque), cutoff_hz=5.0)
         predicted = run.average(model.regressor(moved, cuffs=True) @ values)
-        left[name] = (run.measured - predicted)[run.usable[:, 0], 0]
-    assert np.abs(left["low-pass"]).max() < 1e-9
-    assert np.sqrt(np.mean(left["motion"] ** 2)) > 0.01
+        residuals[name] = (run.measured - predicted)[run.usable[:, 0], 0]
+    assert np.abs(residuals["low-pass"]).max() < 1e-9
+    assert np.sqrt(np.mean(residuals["motion"] ** 2)) > 0.01
 
 
 def test_what_is_bad_is_not_trusted_as_far_as_the_low_pass_carries_it(motions):

@@ -39,9 +39,9 @@ def handed(purpose, seed, instant, mass=HANDED, kind="revolute"):
         arm = 0.3 * mass * (0.3 * ddq + 9.81 * np.sin(q))
         return (t >= instant) * (arm if kind == "revolute" else mass * (0.1 * ddq + 9.81) / 20.0)
 
-    made = driven(purpose, seed, kind, more, SECONDS)
+    run = driven(purpose, seed, kind, more, SECONDS)
     return replace(
-        motion_from_table(motion_table(made, FilterSettings())), file=f"{purpose}_{seed}.parquet"
+        motion_from_table(motion_table(run, FilterSettings())), file=f"{purpose}_{seed}.parquet"
     )
 
 
@@ -95,35 +95,35 @@ def test_intervals_hold_the_instant_as_often_as_they_say_in_noise_that_lasts(run
 def test_what_never_came_and_what_was_always_there_needs_no_coincidence(run):
     draw = np.random.default_rng(1)
     pull = 0.4 * np.sin(run.state[0][:, 0])
-    told = []
+    instants = []
     for instant in (NEVER, ALWAYS) * 100:
         noise = np.zeros_like(run.measured)
         noise[:, 0] = lfilter([0.2], [1.0, -0.7], draw.normal(size=len(run.time)))
         onset = onset_of(run, noise, pull, instant)
         low, high = onset.interval(run, np.zeros(2))
-        told.append(onset.likeliest == instant)
+        instants.append(onset.likeliest == instant)
         assert (
-            not told[-1]
+            not instants[-1]
             or (high if instant == NEVER else low) == onset.instants[-2 if instant == NEVER else 1]
         )
-    assert np.mean(told) >= 0.92
+    assert np.mean(instants) >= 0.92
 
 
 @pytest.mark.parametrize("begun", [3.0, 20.0, 37.0, NEVER])
 def test_an_instant_is_found_from_wherever_the_search_begins(begun):
     """Beside a run in which it is known, so that the amplitude is."""
     runs = observed(handed("train", 5, 17.3), handed("train", 6, 29.1))
-    made, baseline = fitted(runs, (17.3, begun))
-    assert [shape[0] for shape in made.causes[0].shapes] == pytest.approx([17.3, 29.1], abs=0.4)
-    (term,) = settled(made, runs[1], baseline)
+    result, baseline = fitted(runs, (17.3, begun))
+    assert [shape[0] for shape in result.causes[0].shapes] == pytest.approx([17.3, 29.1], abs=0.4)
+    (term,) = settled(result, runs[1], baseline)
     assert term.shape[0] == pytest.approx(29.1, abs=0.4)
 
 
-def test_a_run_to_which_nothing_was_handed_is_told_as_that():
+def test_a_run_to_which_nothing_was_handed_has_no_value():
     runs = observed(handed("train", 5, 17.3), handed("train", 6, SECONDS + 1.0))
-    made, baseline = fitted(runs, (17.3, 12.0))
-    assert made.causes[0].shapes[1][0] == NEVER
-    low, high = uncertainty(made, runs, baseline, np.array([0.05, 0.0])).onsets[0, 0, 1]
+    result, baseline = fitted(runs, (17.3, 12.0))
+    assert result.causes[0].shapes[1][0] == NEVER
+    low, high = uncertainty(result, runs, baseline, np.array([0.05, 0.0])).onsets[0, 0, 1]
     assert low <= high == pytest.approx(SECONDS, abs=0.1)
 
 
@@ -142,15 +142,15 @@ def test_a_load_that_is_handed_over_is_named_with_its_size_and_when_in_every_run
         of_all, rel=0.1
     )
     assert amount["unit"] == ("kg·m" if kind == "revolute" else "kg")
-    told = {one["file"]: one for one in cause["each_run"]}
-    assert {file: one["values"]["time"] for file, one in told.items()} == pytest.approx(
+    values = {one["file"]: one for one in cause["each_run"]}
+    assert {file: one["values"]["time"] for file, one in values.items()} == pytest.approx(
         hidden, abs=0.5
     )
     for file in ("train_1.parquet", "train_2.parquet"):
-        low, high = told[file]["ci95"]["time"]
+        low, high = values[file]["ci95"]["time"]
         assert low <= hidden[file] <= high and high - low < 2.0
     of_first = next(p for p in cause["parameters"] if p["name"] == "time")
-    assert of_first["ci95"] == told["train_1.parquet"]["ci95"]["time"]
+    assert of_first["ci95"] == values["train_1.parquet"]["ci95"]["time"]
 
 
 @pytest.mark.slow

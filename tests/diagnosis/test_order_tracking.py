@@ -27,8 +27,8 @@ FOUR = {34.9: 0.4, 88.3: 1.0, 200.0: 0.5, 351.0: 0.3}
 
 
 def noise(rng, count, colour="correlated", rms_nm=0.6):
-    made = lfilter([1.0], COLOURS[colour], rng.standard_normal(count + 1000))[1000:]
-    return rms_nm * made / made.std()
+    coloured = lfilter([1.0], COLOURS[colour], rng.standard_normal(count + 1000))[1000:]
+    return rms_nm * coloured / coloured.std()
 
 
 def traces(
@@ -42,7 +42,7 @@ def traces(
     motion=RICH,
 ):
     """Return a joint's residual in some runs: noise, a ripple of lines, a hum of any phases."""
-    made = []
+    joints = []
     for _ in range(runs):
         time = np.arange(0.0, seconds, 0.005)
         q, dq, _ = motion.at(time)
@@ -53,22 +53,22 @@ def traces(
         for hz, amplitude in (hum or {}).items():
             residual += amplitude * np.sin(2.0 * np.pi * hz * time + rng.uniform(0.0, 6.28))
         usable = np.abs(speed) > 0.04
-        made.append(Trace(time, angle, speed, residual, usable, 200.0, motion.period_s))
-    return made
+        joints.append(Trace(time, angle, speed, residual, usable, 200.0, motion.period_s))
+    return joints
 
 
-def found(*joints):
+def lines_of_kinds(*joints):
     return [[(line.kind, line.cycles) for line in joint.lines] for joint in lines_of(joints)]
 
 
 def test_four_lines_of_a_gear_are_found_though_block_averages_lose_most_of_the_fast_ones():
     fast = replace(RICH, omega=3.0 * RICH.omega)
-    made = traces(np.random.default_rng(1), ripple=FOUR, motion=fast)
+    runs = traces(np.random.default_rng(1), ripple=FOUR, motion=fast)
     blocks = BlockAverage.lasting(0.025, 200.0)
-    wave = np.sin(351.0 * made[0].angle)
+    wave = np.sin(351.0 * runs[0].angle)
     passed = blocks.mean(wave, blocks.starts(np.zeros(len(wave), dtype=int)))
     assert np.mean(passed**2) < 0.35 * np.mean(wave**2)
-    (joint,) = lines_of([made])
+    (joint,) = lines_of([runs])
     assert {line.kind for line in joint.lines} == {Kind.ANGLE}
     lines = sorted(joint.lines, key=lambda line: line.cycles)
     assert [line.cycles for line in lines] == pytest.approx(list(FOUR), abs=0.5)
@@ -92,7 +92,7 @@ def test_a_hum_is_no_ripple(hz):
 def test_a_ripple_is_no_hum_and_both_together_are_both():
     rng = np.random.default_rng(3)
     ripple, hum = {120.4: 0.4}, {23.0: 0.2}
-    alone, both = found(traces(rng, ripple=ripple), traces(rng, ripple=ripple, hum=hum))
+    alone, both = lines_of_kinds(traces(rng, ripple=ripple), traces(rng, ripple=ripple, hum=hum))
     assert [kind for kind, _ in alone] == [Kind.ANGLE]
     assert sorted(kind for kind, _ in both) == [Kind.ANGLE, Kind.TIME]
     assert dict(both)[Kind.ANGLE] == pytest.approx(120.4, abs=0.5)
@@ -106,7 +106,7 @@ def test_noise_of_any_colour_shows_a_line_in_fewer_than_one_session_in_a_hundred
         colour = list(COLOURS)[number % len(COLOURS)]
         seconds, runs = (20.0, 40.0)[number % 2], (1, 2, 4)[number % 3]
         joints = [traces(rng, joint, runs, seconds, colour) for joint in (0, 1)]
-        alarms[colour] += any(found(*joints))
+        alarms[colour] += any(lines_of_kinds(*joints))
     assert FALSE_ALARMS <= 0.01
     assert alarms.total() <= 0.01 * sessions, alarms
 
@@ -122,11 +122,11 @@ def test_noise_of_any_colour_shows_a_line_in_fewer_than_one_session_in_a_hundred
     ids=["bent spring", "end stop", "friction", "a wave and a half"],
 )
 def test_a_smooth_law_of_angle_or_speed_is_no_line(law):
-    made = [
+    joint = [
         Trace(t.time, t.angle, t.speed, t.residual + law(t.angle, t.speed), t.usable, 200.0, 10.0)
         for t in traces(np.random.default_rng(5), runs=2)
     ]
-    assert found(made) == [[]]
+    assert lines_of_kinds(joint) == [[]]
 
 
 def test_a_line_above_half_the_sampling_rate_is_seen_where_the_joint_is_slow():
@@ -136,7 +136,7 @@ def test_a_line_above_half_the_sampling_rate_is_seen_where_the_joint_is_slow():
     angle, speed = 1.5 * np.sin(1.6 * time), 2.4 * np.cos(1.6 * time)
     residual = noise(rng, len(time)) + 0.5 * np.sin(350.0 * angle)
     trace = Trace(time, angle, speed, residual, np.abs(speed) > 0.04, 200.0)
-    ((line,),) = found([trace])
+    ((line,),) = lines_of_kinds([trace])
     assert line[1] == pytest.approx(350.0, abs=0.2)
 
 
@@ -145,7 +145,7 @@ def test_a_joint_that_stands_still_has_no_lines():
     nowhere = np.zeros_like(still.angle)
     unusable = np.zeros(len(nowhere), dtype=bool)
     trace = Trace(still.time, nowhere, nowhere, still.residual, unusable, 200.0)
-    assert found([trace]) == [[]]
+    assert lines_of_kinds([trace]) == [[]]
 
 
 def test_gaps_and_samples_that_cannot_be_used_are_left_out():
@@ -155,7 +155,7 @@ def test_gaps_and_samples_that_cannot_be_used_are_left_out():
     residual[5000:5200], usable = np.nan, trace.usable.copy()
     usable[5000:5200] = False
     parts = (x[kept] for x in (trace.time, trace.angle, trace.speed, residual, usable))
-    ((line,),) = found([Trace(*parts, 200.0)])
+    ((line,),) = lines_of_kinds([Trace(*parts, 200.0)])
     assert line == (Kind.ANGLE, pytest.approx(88.3, abs=0.5))
 
 

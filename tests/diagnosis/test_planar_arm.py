@@ -23,8 +23,8 @@ from tests.diagnosis.planar_arm import TRUTH, planar_arm
 
 def motions(**hidden):
     tables = [planar_arm("train", 1, **hidden), planar_arm("validate", 2, **hidden)]
-    made = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
-    return [replace(m, file=f"{m.purpose}.parquet") for m in made]
+    runs = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    return [replace(m, file=f"{m.purpose}.parquet") for m in runs]
 
 
 @pytest.fixture(scope="module")
@@ -33,27 +33,27 @@ def arm():
 
 
 @pytest.fixture(scope="module")
-def found(arm):
+def identified(arm):
     return identify(arm)
 
 
-def test_its_three_inertial_parameters_and_its_friction_are_recovered(found):
-    table = found.parameters
+def test_its_three_inertial_parameters_and_its_friction_are_recovered(identified):
+    table = identified.parameters
     assert list(table["name"]) == ["X1", "X2", "X3", "coulomb", "viscous", "coulomb", "viscous"]
     assert np.allclose(table["value"][:3], TRUTH[:3], rtol=0.01)
     # The drive holds each torque for 4 ms, which at reversals looks like friction of another size.
     assert np.allclose(table["value"][3:], TRUTH[3:], rtol=0.08)
-    assert (found.collinear, found.unrealizable, found.remarks) == ([], [], [])
+    assert (identified.collinear, identified.unrealizable, identified.remarks) == ([], [], [])
 
 
-def test_it_moves_as_it_was_recorded(arm, found):
-    assert replay(found.model_of(arm[1]), arm[1]).rmse.max() < 0.01
+def test_it_moves_as_it_was_recorded(arm, identified):
+    assert replay(identified.model_of(arm[1]), arm[1]).rmse.max() < 0.01
 
 
 def test_nothing_is_missing_of_it_and_a_spring_at_its_elbow_is_named_with_its_size(arm):
     assert diagnose(arm).status == "nothing_missing"
-    said = verdict(diagnose(motions(spring=6.0)))
-    (cause,) = said["causes"]
+    outcome = verdict(diagnose(motions(spring=6.0)))
+    (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("parallel_spring", "elbow")
     stiffness, rest = cause["parameters"]
     assert stiffness["value"] == pytest.approx(6.0, rel=0.03)

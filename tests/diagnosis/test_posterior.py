@@ -97,7 +97,7 @@ def test_causes_of_pure_noise_hardly_lower_the_true_causes_probability(seed):
     assert crowded.marginals["spring@hip"] > alone.marginals["spring@hip"] - 0.1
 
 
-def test_a_cause_that_was_refined_beside_others_counts_once_on_its_own():
+def test_a_cause_that_was_refined_with_others_counts_once_on_its_own():
     """Its shape in the set is there for the set: many such sets make it no likelier that it is
     there alone."""
     evidence = problem(strength=0.08)

@@ -43,10 +43,10 @@ def test_the_step_is_found_below_noise_that_came_after_it(step):
         np.linspace(0.0, 91.0, 8000)
     )
     residual = rounding(torque, step) + rng.normal(0.0, 0.45, len(torque))
-    found = coarse_step(
+    estimate = coarse_step(
         [torque[:4000], torque[4000:]], [residual[:4000], residual[4000:]], float(np.std(torque))
     )
-    assert found == pytest.approx(step, rel=0.02)
+    assert estimate == pytest.approx(step, rel=0.02)
 
 
 def test_a_residual_that_is_always_zero_has_no_step():
@@ -73,19 +73,19 @@ def test_samples_that_do_not_count_have_no_say():
 
 
 def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
-    found = diagnose(reported_in_steps(4.0, seed=11))
-    said, first = verdict(found), candidates(found).iloc[0]
-    assert said["status"] == "unknown_cause"
+    diagnosis = diagnose(reported_in_steps(4.0, seed=11))
+    outcome, first = verdict(diagnosis), candidates(diagnosis).iloc[0]
+    assert outcome["status"] == "unknown_cause"
     assert (first["causes"], first["verdict"]) == ([LABEL], "unlisted")
-    (finding,) = said["findings"]
+    (finding,) = outcome["findings"]
     assert (finding["joint"], finding["family"]) == ("hip", "sensor")
     assert finding["laws"][0]["words"] == "a torque of the hip that is reported in coarse steps"
-    assert said["posterior"]["laws"][LABEL] > 0.95
+    assert outcome["posterior"]["laws"][LABEL] > 0.95
 
 
 def test_steps_that_the_noise_covers_are_nothing():
     """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding
     adds."""
-    said = verdict(diagnose(reported_in_steps(1.5, seed=11, noise=3.0)))
-    assert said["status"] == "nothing_missing"
-    assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05
+    outcome = verdict(diagnose(reported_in_steps(1.5, seed=11, noise=3.0)))
+    assert outcome["status"] == "nothing_missing"
+    assert outcome["posterior"]["laws"].get(LABEL, 0.0) < 0.05

@@ -84,19 +84,19 @@ def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
     ("seed", "travel", "joints"),
     [(900_001, 0.001, JOINTS), (900_002, 0.002, JOINTS), (900_003, 0.004, ("hip",))],
 )
-def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, travel, joints):
-    found = diagnosed(tmp_path, seed, travel)
-    told = {one.joint: one for one in found.reversals}
-    assert set(told) == set(joints)
-    for one in told.values():
+def test_bristles_of_milliradians_are_reported_with_their_travel(tmp_path, seed, travel, joints):
+    diagnosis = diagnosed(tmp_path, seed, travel)
+    reversals = {one.joint: one for one in diagnosis.reversals}
+    assert set(reversals) == set(joints)
+    for one in reversals.values():
         assert one.travel == pytest.approx(travel, rel=0.3)
         assert one.over_travel < one.otherwise <= one.at_once
         assert one.over_travel < 0.7 * one.at_once
-    said = verdict(found)
-    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [
+    outcome = verdict(diagnosis)
+    assert [(one["joint"], one["unit"]) for one in outcome["reversals"]] == [
         (joint, "rad") for joint in joints
     ]
-    assert sum("changes sign over about" in caveat for caveat in said["caveats"]) == len(joints)
+    assert sum("changes sign over about" in caveat for caveat in outcome["caveats"]) == len(joints)
 
 
 @pytest.fixture(scope="module", params=range(900_001, 900_005))
@@ -110,10 +110,10 @@ def test_a_faultless_joint_that_sticks_where_it_turns_round_is_given_no_travel(f
 
 @pytest.mark.parametrize("late", [0.045, 0.055])
 def test_friction_that_alone_is_late_is_given_no_travel(faultless, late):
-    made, baseline = faultless.after.fit, faultless.baseline
+    fitted, baseline = faultless.after.fit, faultless.baseline
 
     def moved(run):
-        motion, model = run.motion, model_of_run(made, baseline, run)
+        motion, model = run.motion, model_of_run(fitted, baseline, run)
         side = np.sign(motion.dq)
         then = np.column_stack([np.interp(motion.time - late, motion.time, one) for one in side.T])
         friction = zip(model.linear_parameters, model.linear_values, strict=True)
@@ -123,7 +123,7 @@ def test_friction_that_alone_is_late_is_given_no_travel(faultless, late):
     train, validate = (
         [moved(run) for run in some] for some in (faultless.train, faultless.validate)
     )
-    assert built_up(made, baseline, train, validate) == []
+    assert built_up(fitted, baseline, train, validate) == []
 
 
 @pytest.fixture(scope="module")
@@ -131,11 +131,11 @@ def bristles(tmp_path_factory):
     return diagnosed(tmp_path_factory.mktemp("bristles"), 900_001, 0.001)
 
 
-def test_of_a_joint_whose_play_is_named_nothing_more_is_told(bristles):
+def test_of_a_joint_whose_play_is_named_nothing_more_is_reported(bristles):
     runs, baseline = bristles.train, bristles.baseline
     play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
-    made = fit((play,), runs, baseline, bristles.prepared.weights)
-    assert [one.joint for one in built_up(made, baseline, bristles.train, bristles.validate)] == [
+    fitted = fit((play,), runs, baseline, bristles.prepared.weights)
+    assert [one.joint for one in built_up(fitted, baseline, bristles.train, bristles.validate)] == [
         "knee"
     ]
 
@@ -143,11 +143,11 @@ def test_of_a_joint_whose_play_is_named_nothing_more_is_told(bristles):
 def slower(motion):
     """Return a motion that was filtered to where transmissions follow their loads."""
     block = BlockAverage.lasting(0.1, motion.sample_rate_hz)
-    told = {**motion.metadata, "regression_filter": block.as_metadata(motion.sample_rate_hz)}
-    return replace(below(motion, CUTOFF_HZ), metadata=told)
+    metadata = {**motion.metadata, "regression_filter": block.as_metadata(motion.sample_rate_hz)}
+    return replace(below(motion, CUTOFF_HZ), metadata=metadata)
 
 
-def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_tells_none(bristles):
+def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_shows_none(bristles):
     slow = [
         [replace(run, motion=slower(run.motion)) for run in some]
         for some in (bristles.train, bristles.validate)
@@ -155,7 +155,7 @@ def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_tells_none
     assert built_up(bristles.after.fit, bristles.baseline, *slow) == []
 
 
-def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_and_is_not_told(
+def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_and_is_not_reported(
     tmp_path,
 ):
     assert diagnosed(tmp_path, 900_001, 0.002, counts=2**13).reversals == ()

@@ -42,7 +42,7 @@ def test_a_joint_that_never_moves_is_named(motions, work):
         work([standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions])
 
 
-def test_who_moved_a_joint_that_seems_to_stand_is_told_to_look_at_its_units(motions):
+def test_where_a_moved_joint_seems_to_stand_the_message_asks_to_check_its_units(motions):
     standing = [standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions]
     with pytest.raises(
         InputError, match=r"its encoder, and the units of angle and time in the rig file$"
@@ -54,7 +54,7 @@ def test_who_moved_a_joint_that_seems_to_stand_is_told_to_look_at_its_units(moti
         diagnose([imported(m) for m in standing])
 
 
-def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
+def test_a_constant_angle_is_reported_as_constant(motions):
     with pytest.raises(InputError) as refused:
         diagnose([imported(standing_knee(m, -0.5)) for m in motions])
     assert (
@@ -65,7 +65,7 @@ def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
 
 
 @pytest.mark.parametrize("value", [0.0, -3.2])
-def test_a_torque_that_is_one_number_all_along_is_told_as_that(motions, value):
+def test_a_constant_torque_is_reported_as_constant(motions, value):
     with pytest.raises(InputError) as refused:
         diagnose(
             [imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions]

@@ -26,15 +26,15 @@ def recorded(machine, purpose, seed, **hidden):
 
 
 def motions(machine, spoil=lambda frame: frame, **hidden):
-    made = []
+    runs = []
     for number, purpose in enumerate(("train", "validate")):
         table = recorded(machine, purpose, number + 1, **hidden)
-        made.append(
+        runs.append(
             motion_from_table(
                 motion_table(replace(table, frame=spoil(table.frame)), FilterSettings())
             )
         )
-    return on_one_scale([replace(m, file=f"{m.purpose}.parquet") for m in made])
+    return on_one_scale([replace(m, file=f"{m.purpose}.parquet") for m in runs])
 
 
 def reversed_in(endings):
@@ -62,9 +62,9 @@ def late_by(samples):
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("endings", [EFFORT, PLACE], ids=["torque", "angle"])
 def test_a_reversed_sign_is_named_in_each_run_of_a_machine_of_one_joint(machine, endings):
-    found = find_faults(motions(machine, reversed_in(endings)))
-    assert [fault.file for fault in found] == ["train.parquet", "validate.parquet"]
-    for fault in found:
+    faults = find_faults(motions(machine, reversed_in(endings)))
+    assert [fault.file for fault in faults] == ["train.parquet", "validate.parquet"]
+    for fault in faults:
         assert fault.spoils and fault.channel.endswith(EFFORT)
         assert (
             f"the sign of {fault.channel} is reversed" in fault.what
@@ -80,7 +80,7 @@ def test_a_reversed_sign_in_one_run_of_two_is_named_there_alone():
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_a_machine_wired_as_it_should_be_is_never_told_to_be_reversed(machine):
+def test_a_machine_wired_as_it_should_be_is_never_reported_as_reversed(machine):
     assert find_faults(motions(machine)) == []
 
 
@@ -98,8 +98,8 @@ def test_a_torque_that_comes_late_is_no_reversed_sign(machine):
 
 
 def test_no_physics_is_blamed_for_a_reversed_sign():
-    said = verdict(diagnose(motions(slide, reversed_in(EFFORT), asymmetry=-80.0)))
-    assert said["acquisition_at_fault"] and said["causes"] == []
-    assert said["summary"].startswith(
+    outcome = verdict(diagnose(motions(slide, reversed_in(EFFORT), asymmetry=-80.0)))
+    assert outcome["acquisition_at_fault"] and outcome["causes"] == []
+    assert outcome["summary"].startswith(
         "Acquisition, not physics: train.parquet, axis_force_n: the sign of axis_force_n"
     )

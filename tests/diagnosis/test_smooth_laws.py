@@ -54,18 +54,18 @@ def test_a_part_is_of_order_one_at_the_joint_where_it_is_larger(prepared):
 def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
     """A band from the pelvis to the shank that is slack in a part of its range: no spring of either
     joint."""
-    said = verdict(diagnose(banded(session(seed=5))))
-    assert said["status"] == "unknown_cause"
-    (finding,) = said["findings"]
+    outcome = verdict(diagnose(banded(session(seed=5))))
+    assert outcome["status"] == "unknown_cause"
+    (finding,) = outcome["findings"]
     assert (finding["joint"], finding["family"]) == (None, "angle")
     assert finding["laws"][0]["words"] == "an elastic torque across both joints"
-    assert Verdict.model_validate(said).findings[0].laws[0].joint is None
-    assert said["posterior"]["laws"][LABEL] > 0.9
+    assert Verdict.model_validate(outcome).findings[0].laws[0].joint is None
+    assert outcome["posterior"]["laws"][LABEL] > 0.9
 
 
 def test_a_spring_of_one_joint_is_none():
-    said = verdict(
+    outcome = verdict(
         diagnose(session("parallel_spring", "knee", seed=5, stiffness=10.0, rest_angle=-0.9))
     )
-    assert said["causes"][0]["effect"] == "parallel_spring"
-    assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05
+    assert outcome["causes"][0]["effect"] == "parallel_spring"
+    assert outcome["posterior"]["laws"].get(LABEL, 0.0) < 0.05

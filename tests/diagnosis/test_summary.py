@@ -48,8 +48,8 @@ def stuck():
         frame = table.frame.copy()
         if number == 1:
             frame.loc[1600:2600, "hip_angle_rad"] = frame.loc[1600, "hip_angle_rad"]
-        made = motion_from_table(motion_table(Table(frame, table.metadata), FilterSettings()))
-        motions.append(replace(made, file=f"run_{number}.parquet"))
+        motion = motion_from_table(motion_table(Table(frame, table.metadata), FilterSettings()))
+        motions.append(replace(motion, file=f"run_{number}.parquet"))
     return naming(diagnose(motions), LABEL)
 
 
@@ -61,8 +61,8 @@ def errors(rms):
 def with_errors(d, floor, baseline, extended):
     """Return the diagnosis with another noise floor and other errors, N·m at hip and knee each."""
     before, after = (
-        replace(made, errors=errors(rms))
-        for made, rms in ((d.before, baseline), (d.after, extended))
+        replace(validated, errors=errors(rms))
+        for validated, rms in ((d.before, baseline), (d.after, extended))
     )
     wide = np.append(floor, [np.nan, np.nan])
     return replace(
@@ -77,47 +77,47 @@ def without_gain(d, times):
     return replace(d, without={LABEL: less})
 
 
-def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
-    told = verdict(stuck)
-    said = told["summary"]
-    assert said.startswith("Missing from the simulation: parallel spring at the knee")
+def test_a_fault_that_was_masked_is_reported_with_the_cause(stuck):
+    outcome = verdict(stuck)
+    summary = outcome["summary"]
+    assert summary.startswith("Missing from the simulation: parallel spring at the knee")
     assert (
         "Faults of acquisition were found as well: run_1.parquet, hip_angle_rad: the hip's angle is"
-        " stuck" in said
+        " stuck" in summary
     )
-    assert said.startswith(told["finding"])
-    assert "acquisition" not in told["finding"]
+    assert summary.startswith(outcome["finding"])
+    assert "acquisition" not in outcome["finding"]
 
 
-def test_faults_that_the_summary_does_not_tell_are_counted_in_words(stuck):
+def test_faults_that_the_summary_leaves_out_are_counted_in_words(stuck):
     data = [replace(stuck.data, faults=stuck.data.faults[:1] * number) for number in (1, 2, 3)]
-    said = [verdict(replace(stuck, data=one))["summary"] for one in data]
-    assert "data_faults" not in said[0]
-    assert said[1].endswith("(and 1 more fault, in data_faults of verdict.json).")
-    assert said[2].endswith("(and 2 more faults, in data_faults of verdict.json).")
+    summaries = [verdict(replace(stuck, data=one))["summary"] for one in data]
+    assert "data_faults" not in summaries[0]
+    assert summaries[1].endswith("(and 1 more fault, in data_faults of verdict.json).")
+    assert summaries[2].endswith("(and 2 more faults, in data_faults of verdict.json).")
 
 
 def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck):
-    said = finding_in_words(
+    finding = finding_in_words(
         with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.56, 0.305]), [SPRING], None
     )
     assert (
-        said
+        finding
         == "Missing from the simulation: parallel spring at the knee (probability 0.97). With it"
         " the knee's torque error falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m,"
         " which is noise; the hip's is then 0.56 N·m, 1.12 times its floor."
     )
 
 
-def test_the_gain_is_told_where_it_is_made_and_not_where_the_error_is_largest(stuck):
-    said = finding_in_words(
+def test_the_gain_is_given_where_it_is_largest_and_not_where_the_error_is_largest(stuck):
+    finding = finding_in_words(
         with_errors(stuck, [0.3, 0.3], [0.9, 0.4], [0.9, 0.305]), [SPRING], None
     )
     assert (
         "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m,"
-        " which is noise; " in said
+        " which is noise; " in finding
     )
-    assert said.endswith("the hip's is then 0.90 N·m, 3.00 times its floor.")
+    assert finding.endswith("the hip's is then 0.90 N·m, 3.00 times its floor.")
 
 
 def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
@@ -126,16 +126,16 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     estimate = ", so the noise floor is estimated from the band above the motion."
     assert f"No validation run holds two periods{estimate}" in verdict(short)["summary"]
     prepared = stuck.prepared
-    untold = replace(prepared, noise=replace(prepared.noise, from_periods=False))
-    weighed = replace(stuck, prepared=untold)
+    without_periods = replace(prepared, noise=replace(prepared.noise, from_periods=False))
+    weighed = replace(stuck, prepared=without_periods)
     assert "No training run holds two periods" in verdict(weighed)["summary"]
-    neither = replace(short, prepared=untold)
+    neither = replace(short, prepared=without_periods)
     assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
     runs = tuple(without_a_period(run) for run in stuck.train)
-    untold = replace(untold, runs=runs)
+    without_periods = replace(without_periods, runs=runs)
     before = replace(stuck.before, runs=[without_a_period(run) for run in stuck.validate])
-    told = verdict(replace(short, prepared=untold, before=before))["summary"]
-    assert f"No recording names a period{estimate}" in told
+    summary = verdict(replace(short, prepared=without_periods, before=before))["summary"]
+    assert f"No recording names a period{estimate}" in summary
 
 
 def without_a_period(run):
@@ -147,51 +147,53 @@ def nothing_missing(d, share, from_periods):
     out."""
     floor = share * d.torque_rms
     noise = Floor(np.append(floor, [np.nan, np.nan]), d.floor.independent_share, from_periods)
-    made = replace(d.before, errors=errors(floor))
-    return replace(missing(d, 0.1), floor=noise, before=made, after=made)
+    validated = replace(d.before, errors=errors(floor))
+    return replace(missing(d, 0.1), floor=noise, before=validated, after=validated)
 
 
 def test_an_estimated_floor_that_is_most_of_the_torque_is_said_to_hide_what_may_be_missing(stuck):
-    told = verdict(nothing_missing(stuck, 0.87, from_periods=False))
-    assert told["status"] == "nothing_missing"
-    assert "but the floor itself is 87% of the torque and may hide effects." in told["finding"]
+    outcome = verdict(nothing_missing(stuck, 0.87, from_periods=False))
+    assert outcome["status"] == "nothing_missing"
+    assert "but the floor itself is 87% of the torque and may hide effects." in outcome["finding"]
     assert any(
         "the noise floor of the hip is estimated as 87% of its torque" in caveat
-        for caveat in told["caveats"]
+        for caveat in outcome["caveats"]
     )
 
 
 @pytest.mark.parametrize(("share", "from_periods"), [(0.05, False), (0.87, True)])
 def test_a_floor_that_is_measured_or_a_small_share_is_taken_as_it_is(stuck, share, from_periods):
-    told = verdict(nothing_missing(stuck, share, from_periods))
-    assert told["finding"].startswith("Nothing is missing that these data could show")
-    assert "floor itself" not in told["finding"]
-    assert not any("noise floor" in caveat for caveat in told["caveats"])
+    outcome = verdict(nothing_missing(stuck, share, from_periods))
+    assert outcome["finding"].startswith("Nothing is missing that these data could show")
+    assert "floor itself" not in outcome["finding"]
+    assert not any("noise floor" in caveat for caveat in outcome["caveats"])
 
 
-@pytest.mark.parametrize(("times", "told"), [(1.35, False), (1.5, True)])
-def test_where_nothing_is_likely_to_be_missing_most_of_an_error_that_is_not_noise_is_told(
-    stuck, times, told
+@pytest.mark.parametrize(("times", "reported"), [(1.35, False), (1.5, True)])
+def test_where_nothing_is_likely_to_be_missing_most_of_an_error_that_is_not_noise_is_reported(
+    stuck, times, reported
 ):
     silent = nothing_missing(stuck, 0.05, from_periods=True)
     after = replace(silent.after, errors=errors(silent.floor_rms * [times, 1.0]))
-    said = verdict(replace(silent, before=after, after=after))
-    assert said["status"] == "nothing_missing"
-    assert ("Most of that error is not noise" in said["finding"]) == told
-    assert (said["residual"] is not None) == told
+    outcome = verdict(replace(silent, before=after, after=after))
+    assert outcome["status"] == "nothing_missing"
+    assert ("Most of that error is not noise" in outcome["finding"]) == reported
+    assert (outcome["residual"] is not None) == reported
 
 
-@pytest.mark.parametrize(("p", "told"), [(0.3, True), (0.04, False)])
-def test_what_comes_closest_is_said_where_nothing_is_likely_to_be_missing(stuck, p, told):
+@pytest.mark.parametrize(("p", "reported"), [(0.3, True), (0.04, False)])
+def test_what_comes_closest_is_said_where_nothing_is_likely_to_be_missing(stuck, p, reported):
     silent = nothing_missing(stuck, 0.05, from_periods=True)
     elements = stuck.selected.posterior.elements
     offset = next(i for i, element in enumerate(elements) if element.label == "torque_offset@knee")
     weighed = Posterior(elements, ((), (offset,)), np.log([1.0 - p, p]))
-    said = verdict(replace(silent, selected=replace(silent.selected, posterior=weighed)))["finding"]
-    assert said.endswith("Torque offset at the knee (0.30) comes closest.") == told
+    finding = verdict(replace(silent, selected=replace(silent.selected, posterior=weighed)))[
+        "finding"
+    ]
+    assert finding.endswith("Torque offset at the knee (0.30) comes closest.") == reported
 
 
-def test_the_torque_that_an_error_is_of_is_told_on_the_samples_of_the_error(stuck):
+def test_the_torque_that_an_error_is_of_is_given_on_the_samples_of_the_error(stuck):
     squares = [run.measured[scored(run), :2] ** 2 for run in stuck.validate]
     measured = np.sqrt(np.concatenate(squares).mean(axis=0))
     assert list(verdict(stuck)["torque_rms_nm"].values()) == pytest.approx(measured.tolist())
@@ -209,71 +211,81 @@ def odds_in_words(d, rival):
     selected = replace(
         d.selected, posterior=weighed, answer=replace(d.selected.answer, named=(named,))
     )
-    told = cause_evidence(replace(d, selected=selected), named)
-    return [one for one in told if "less likely" in one]
+    sentences = cause_evidence(replace(d, selected=selected), named)
+    return [one for one in sentences if "less likely" in one]
 
 
 @pytest.mark.parametrize(
-    ("rival", "said"),
+    ("rival", "times"),
     [(0.024390, "40 times"), (0.2, "4 times"), (1e-4, "over 1000 times"), (0.6, "no"), (0.0, None)],
 )
-def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_not_told_by_a_figure(
-    stuck, rival, said
+def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_without_a_figure(
+    stuck, rival, times
 ):
-    told = odds_in_words(stuck, rival)
-    wanted = f"the next listed cause in its place, torque offset at the knee, is {said} less likely"
-    assert told == ([wanted] if said else [])
+    sentences = odds_in_words(stuck, rival)
+    wanted = (
+        f"the next listed cause in its place, torque offset at the knee, is {times} less likely"
+    )
+    assert sentences == ([wanted] if times else [])
 
 
 def test_a_gain_is_what_the_cause_takes_of_the_error_that_the_others_leave(stuck):
-    told = verdict(stuck)
-    gain = told["causes"][0]["gain"]
-    taken, left = gain["rmse_reduction_nm"], told["extended_rmse_nm"][gain["joint"]]
-    said = (
-        f"it removes {taken:.2f} of {left + taken:.2f} N·m of torque error at the {gain['joint']}"
+    outcome = verdict(stuck)
+    gain = outcome["causes"][0]["gain"]
+    taken, remaining = gain["rmse_reduction_nm"], outcome["extended_rmse_nm"][gain["joint"]]
+    sentence = (
+        f"it removes {taken:.2f} of {remaining + taken:.2f} N·m of torque error at the"
+        f" {gain['joint']}"
     )
-    assert told["causes"][0]["evidence"][0] == f"{said} on the validation runs"
+    assert outcome["causes"][0]["evidence"][0] == f"{sentence} on the validation runs"
     two = replace(stuck.selected.answer, named=stuck.named * 2)
-    beside = cause_evidence(
+    of_two = cause_evidence(
         replace(stuck, selected=replace(stuck.selected, answer=two)), stuck.named[0]
     )[0]
-    assert beside == f"{said} that the other causes leave on the validation runs"
+    assert of_two == f"{sentence} that the other causes leave on the validation runs"
 
 
 def test_two_causes_are_they_and_a_rest_at_the_worst_joint_is_not_noise(stuck):
     d = with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.5, 1.5])
-    said = finding_in_words(d, [SPRING, STRIBECK], None)
-    assert "; and Stribeck friction at the hip (probability 0.97). With them the knee's" in said
-    assert said.endswith("to 1.50 N·m, still 5.00 times the floor.")
+    finding = finding_in_words(d, [SPRING, STRIBECK], None)
+    assert "; and Stribeck friction at the hip (probability 0.97). With them the knee's" in finding
+    assert finding.endswith("to 1.50 N·m, still 5.00 times the floor.")
 
 
-def test_a_gain_that_may_be_chance_is_told_as_that(stuck):
+def test_a_gain_that_may_be_chance_is_reported_so(stuck):
     assert "may be chance" not in verdict(stuck)["summary"]
-    told = verdict(without_gain(stuck, 1.0))
-    assert "whose gain may be chance. With it" in told["summary"]
+    outcome = verdict(without_gain(stuck, 1.0))
+    assert "whose gain may be chance. With it" in outcome["summary"]
     assert (
-        "that gain may be chance: its 95 % interval includes zero" in told["causes"][0]["evidence"]
+        "that gain may be chance: its 95 % interval includes zero"
+        in outcome["causes"][0]["evidence"]
     )
 
 
 def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
-    told = verdict(without_gain(stuck, 0.9))
-    assert told["causes"][0]["gain"]["ci95"][1] < 0.0
-    assert "which raises the error on the validation runs. With it" in told["summary"]
-    assert "that is no gain: its 95 % interval lies below zero" in told["causes"][0]["evidence"]
-    assert told["causes"][0]["evidence"][0].startswith("it removes nothing of ")
-    assert not any("chance" in said for said in (told["summary"], *told["causes"][0]["evidence"]))
+    outcome = verdict(without_gain(stuck, 0.9))
+    assert outcome["causes"][0]["gain"]["ci95"][1] < 0.0
+    assert "which raises the error on the validation runs. With it" in outcome["summary"]
+    assert "that is no gain: its 95 % interval lies below zero" in outcome["causes"][0]["evidence"]
+    assert outcome["causes"][0]["evidence"][0].startswith("it removes nothing of ")
+    assert not any(
+        "chance" in sentence for sentence in (outcome["summary"], *outcome["causes"][0]["evidence"])
+    )
 
 
-@pytest.mark.parametrize(("knee", "said"), [(1.9, False), (2.5, True)])
-def test_a_cause_that_does_not_help_its_own_joint_is_said_not_to(stuck, knee, said):
-    told = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [0.5, knee]), [SPRING], None)
-    assert ("At the knee, where a cause is named, the error does not fall." in told) == said
+@pytest.mark.parametrize(("knee", "reported"), [(1.9, False), (2.5, True)])
+def test_a_cause_that_does_not_help_its_own_joint_is_said_not_to(stuck, knee, reported):
+    finding = finding_in_words(
+        with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [0.5, knee]), [SPRING], None
+    )
+    assert ("At the knee, where a cause is named, the error does not fall." in finding) == reported
 
 
 def test_an_error_that_grows_is_not_said_to_fall(stuck):
-    told = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [1.5, 2.5]), [SPRING], None)
-    assert "error rises from 2.40 N·m" in told and "falls" not in told
+    finding = finding_in_words(
+        with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [1.5, 2.5]), [SPRING], None
+    )
+    assert "error rises from 2.40 N·m" in finding and "falls" not in finding
 
 
 def test_of_tied_causes_the_first_is_what_was_fitted(stuck):
@@ -292,55 +304,56 @@ def test_ties_are_one_answer_with_one_probability():
 
 
 @pytest.mark.parametrize(
-    ("names", "length", "said"),
+    ("names", "length", "reported"),
     [
         (("shoulder", "elbow"), None, True),
         (("shoulder", "elbow"), 0.3, False),
         (("hip", "knee"), None, False),
     ],
 )
-def test_an_arm_whose_length_nobody_told_is_said_to_have_an_exoskeletons(names, length, said):
+def test_an_arm_without_a_given_length_has_an_exoskeletons(names, length, reported):
     geometry = Geometry() if length is None else Geometry(thigh_length_m=length)
     machine = machine_of([Joint(name) for name in names], geometry)
     run = SimpleNamespace(motion=SimpleNamespace(geometry=geometry))
-    found = SimpleNamespace(baseline=SimpleNamespace(machine=machine), train=[run])
-    told = _default_length(found)
-    assert bool(told) == said
+    diagnosis = SimpleNamespace(baseline=SimpleNamespace(machine=machine), train=[run])
+    caveats_now = _default_length(diagnosis)
+    assert bool(caveats_now) == reported
     assert (
-        not said or "0.38952 m is assumed, an exoskeleton's: set geometry.thigh_length_m" in told[0]
+        not reported
+        or "0.38952 m is assumed, an exoskeleton's: set geometry.thigh_length_m" in caveats_now[0]
     )
 
 
-def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
+def test_a_shape_that_ended_where_its_search_ends_is_reported_with_its_value():
     effect = PassiveJointTorque(joint="knee")
     least, greatest = reach(effect.shape[0])
     assert least < effect.shape[0].typical[0] and greatest > effect.shape[0].typical[1]
 
-    def told(onset):
+    def caveats_of(onset):
         fit = SimpleNamespace(causes=(Candidate(effect, ((onset, 0.1),)),))
         return _at_ends(SimpleNamespace(after=SimpleNamespace(fit=fit)))
 
-    assert told(0.2) == []
-    (caveat,) = told(least)
+    assert caveats_of(0.2) == []
+    (caveat,) = caveats_of(least)
     assert (
         f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad"
         in caveat
     )
 
 
-@pytest.mark.parametrize(("times", "is_told"), [(1.0, False), (1e6, True)])
-def test_a_size_that_may_be_zero_is_said_not_to_be_determined(stuck, times, is_told):
+@pytest.mark.parametrize(("times", "reported"), [(1.0, False), (1e6, True)])
+def test_a_size_that_may_be_zero_is_said_not_to_be_determined(stuck, times, reported):
     wide = replace(stuck.uncertainty, covariance=times * stuck.uncertainty.covariance)
-    told = [
+    caveats_now = [
         caveat
         for caveat in caveats(replace(stuck, uncertainty=wide))
         if "do not determine" in caveat
     ]
-    said = (
+    sentence = (
         "the training runs do not determine the size of parallel spring at the knee: its 95 %"
         " interval includes zero"
     )
-    assert told == [said] * is_told
+    assert caveats_now == [sentence] * reported
 
 
 @pytest.mark.parametrize(
@@ -352,7 +365,7 @@ def test_an_error_that_ends_as_noise_is_explained_however_little_there_was(stuck
 
 
 @pytest.mark.parametrize(("unlisted", "status"), [(0.4, "explained"), (0.6, "partly_explained")])
-def test_beside_a_likely_unlisted_law_named_causes_explain_a_part(stuck, unlisted, status):
+def test_with_a_likely_unlisted_law_named_causes_explain_a_part(stuck, unlisted, status):
     """Even where they leave little: what is left need not show in the validation runs' error."""
     answer = replace(stuck.selected.answer, unlisted=unlisted)
     d = with_errors(

@@ -27,7 +27,7 @@ def misread(motion, offset, rate=0.0):
     return replace(motion, torque=motion.torque + more[:, np.newaxis] * np.array([0.0, 1.0]))
 
 
-def found(offsets, rate=0.0, seed=1):
+def verdict_of(offsets, rate=0.0, seed=1):
     return verdict(
         diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)])
     )
@@ -35,7 +35,7 @@ def found(offsets, rate=0.0, seed=1):
 
 @pytest.fixture(scope="module")
 def tared():
-    return found(HIDDEN)
+    return verdict_of(HIDDEN)
 
 
 def test_a_sensor_tared_at_each_start_is_named_and_only_a_drift_that_hardly_grows_ties(
@@ -66,12 +66,12 @@ def test_each_run_s_own_offset_is_recovered_and_its_interval_holds_it(tared):
 
 
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
-    told = found(EVERY)
-    (cause,) = told["causes"]
+    outcome = verdict_of(EVERY)
+    (cause,) = outcome["causes"]
     # While the joint always moves, friction that differs with direction is the same torque.
     names = {cause["effect"], *(tie["effect"] for tie in cause["indistinguishable_from"])}
     assert {"torque_offset", "coulomb_asymmetry"} <= names
-    assert cause["each_run"] == [] and "per-run" not in told["summary"]
+    assert cause["each_run"] == [] and "per-run" not in outcome["summary"]
 
 
 @pytest.mark.parametrize(
@@ -80,8 +80,8 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     ids=["tared", "settled"],
 )
 def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
-    told = found(levels, rate=0.03)
-    (cause,) = told["causes"]
+    outcome = verdict_of(levels, rate=0.03)
+    (cause,) = outcome["causes"]
     assert cause_label(cause) == "torque_drift@knee"
     assert "torque_offset" not in [tie["effect"] for tie in cause["indistinguishable_from"]]
     rate = next(p for p in cause["parameters"] if p["name"] == "rate")
@@ -92,8 +92,8 @@ def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     "seed", [2, *(pytest.param(more, marks=pytest.mark.slow) for more in range(3, 20))]
 )
 def test_of_a_sensor_that_is_right_nothing_is_named(seed):
-    told = found(dict.fromkeys(HIDDEN, 0.0), seed=seed)
-    assert told["status"] == "nothing_missing" and told["causes"] == []
+    outcome = verdict_of(dict.fromkeys(HIDDEN, 0.0), seed=seed)
+    assert outcome["status"] == "nothing_missing" and outcome["causes"] == []
 
 
 def two_runs(spoil, offsets):
@@ -102,9 +102,9 @@ def two_runs(spoil, offsets):
     return verdict(diagnose([spoil(m, offset) for m, offset in zip(runs, offsets, strict=True)]))
 
 
-def set_at_each_start(told):
+def set_at_each_start(outcome):
     """Return the caveats that one training run cannot show a zero of each run's own."""
-    return [caveat for caveat in told["caveats"] if "set at each start" in caveat]
+    return [caveat for caveat in outcome["caveats"] if "set at each start" in caveat]
 
 
 @pytest.mark.parametrize(
@@ -121,27 +121,27 @@ def set_at_each_start(told):
 def test_of_two_runs_whose_zeros_differ_each_has_its_own_though_one_training_run_cannot_show_it(
     spoil, offsets, names
 ):
-    told = two_runs(spoil, offsets)
-    (cause,) = told["causes"]
-    assert told["sought_on"] == "all"
+    outcome = two_runs(spoil, offsets)
+    (cause,) = outcome["causes"]
+    assert outcome["sought_on"] == "all"
     assert {one["effect"] for one in (cause, *cause["indistinguishable_from"])} == names
     (own,) = cause["fitted_on_validate"]
     values = [one["values"][own] for one in cause["each_run"]]
     assert values == pytest.approx(offsets, abs=0.08 if spoil is misread else 0.01)
-    assert set_at_each_start(told) == []
-    assert any(caveat.startswith("causes were sought on all runs") for caveat in told["caveats"])
+    assert set_at_each_start(outcome) == []
+    assert any(caveat.startswith("causes were sought on all runs") for caveat in outcome["caveats"])
 
 
 def test_of_two_runs_one_offset_in_both_is_one():
-    told = two_runs(misread, (1.0, 1.0))
-    (cause,) = told["causes"]
+    outcome = two_runs(misread, (1.0, 1.0))
+    (cause,) = outcome["causes"]
     # While the joint always moves, friction that differs with direction is the same torque.
     names = {cause["effect"], *(tie["effect"] for tie in cause["indistinguishable_from"])}
     assert {"torque_offset", "coulomb_asymmetry"} <= names
-    assert cause["each_run"] == [] and set_at_each_start(told) == []
+    assert cause["each_run"] == [] and set_at_each_start(outcome) == []
 
 
 def test_where_one_training_run_shows_something_unlisted_it_is_said_what_it_cannot_show():
-    told = verdict(diagnose(banded(session(seed=5)[2:])))
-    assert (told["status"], told["causes"]) == ("unknown_cause", [])
-    assert len(set_at_each_start(told)) == 1
+    outcome = verdict(diagnose(banded(session(seed=5)[2:])))
+    assert (outcome["status"], outcome["causes"]) == ("unknown_cause", [])
+    assert len(set_at_each_start(outcome)) == 1

@@ -94,8 +94,8 @@ def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds():
     ).prepared
     baseline, runs = prepared.baseline, prepared.runs
     spring = Candidate(JointElasticity("hip"), ((180.0, 0.0),) * len(runs))
-    made = Refinement(runs, baseline, prepared.weights)([spring])
+    fitted = Refinement(runs, baseline, prepared.weights)([spring])
     for run in runs:
         columns = baseline.layout.bodies_in(run.motion.run)
-        swung, found = made.loads[columns].sum(axis=0), made.values[columns].sum(axis=0)
-        assert np.linalg.norm(found - swung) < 0.15 * np.linalg.norm(found)
+        swung, refitted = fitted.loads[columns].sum(axis=0), fitted.values[columns].sum(axis=0)
+        assert np.linalg.norm(refitted - swung) < 0.15 * np.linalg.norm(refitted)

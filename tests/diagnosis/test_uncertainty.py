@@ -24,9 +24,9 @@ def error_of_stiffness(seconds: float, imperfect: float) -> float:
     baseline = baseline_of(runs)
     effect = ParallelSpring("knee", on=baseline.machine)
     weights = np.append(NOISE**-2.0, np.zeros(runs[0].measured.shape[1] - 2))
-    made = fit([Candidate(effect, ((),) * len(runs))], runs, baseline, weights)
-    known = uncertainty(made, runs, baseline, np.full(len(weights), imperfect))
-    place = made.columns_of(0).places(0)[0]
+    fitted = fit([Candidate(effect, ((),) * len(runs))], runs, baseline, weights)
+    known = uncertainty(fitted, runs, baseline, np.full(len(weights), imperfect))
+    place = fitted.columns_of(0).places(0)[0]
     return float(np.sqrt(known.covariance[place, place]))
 
 
