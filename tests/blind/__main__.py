@@ -53,11 +53,9 @@ def main(
     ] = False,
     fixed: Annotated[bool, typer.Option("--fixed", help="The fixed set that CI examines.")] = False,
     write: Annotated[
-        bool, typer.Option("--write", help="With --fixed: diagnose anew, record how it came out.")
+        bool, typer.Option("--write", help="With --fixed: diagnose again and record the result.")
     ] = False,
-    again: Annotated[
-        bool, typer.Option(help="Diagnose anew, on the sessions that are there.")
-    ] = False,
+    again: Annotated[bool, typer.Option(help="Diagnose existing sessions again.")] = False,
     simulate_only: Annotated[bool, typer.Option(help="Make the sessions and stop.")] = False,
 ) -> None:
     """Examine ``exoid diagnose`` on simulated sessions whose truth it cannot see."""

@@ -125,7 +125,7 @@ def mjcf(leg: Leg, wearer: Leg | None = None, payload: Payload | None = None) ->
     """Return the model: hinges turn about -y, so that with z up and the leg hanging, forward (x) is
     positive.
 
-    A wearer who is not one with the machine hangs beside it as a second leg.
+    A wearer who is not one with the machine hangs next to it as a second leg.
     """
     inside = ["", ""]
     if payload:

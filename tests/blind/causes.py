@@ -50,7 +50,7 @@ class Cause:
     slow: bool = False
     """Does it change over a whole run?"""
     fast: bool = False
-    """Is it too fast for block averages, and told sample by sample?"""
+    """Is it too fast for block averages, and given sample by sample?"""
     follows_temperature: bool = False
     """Is it read off the recorded temperature?"""
     families: tuple[str, ...] = ()
@@ -97,7 +97,7 @@ def form(
     def register(draw: Callable) -> Callable:
         within = draw.__code__.co_argcount > 2
 
-        def made(rng: Generator, joint: int | None, reach: Reach = BOUNDS) -> Cause:
+        def cause_of(rng: Generator, joint: int | None, reach: Reach = BOUNDS) -> Cause:
             drawn = draw(rng, joint, reach) if within else draw(rng, joint)
             kind = OF_CATALOGUE[effect]
             return Cause(
@@ -110,12 +110,12 @@ def form(
                 **drawn,
             )
 
-        made.own = own
-        made.form = draw.__name__
-        made.worlds = worlds
-        made.plain = plain
-        made.warm = warm
-        FORMS.setdefault(effect, []).append(made)
+        cause_of.own = own
+        cause_of.form = draw.__name__
+        cause_of.worlds = worlds
+        cause_of.plain = plain
+        cause_of.warm = warm
+        FORMS.setdefault(effect, []).append(cause_of)
         return draw
 
     return register

@@ -13,7 +13,7 @@ OfTorqueAndSpeed = Callable[[NDArray, NDArray], NDArray]
 
 @dataclass
 class Channel:
-    """Errors of the measured torque, of hip and knee; arrays (2,) unless told otherwise."""
+    """Errors of the measured torque, of hip and knee; arrays (2,) unless stated otherwise."""
 
     gain: NDArray = field(default_factory=lambda: np.ones(2))
     bend: NDArray = field(default_factory=lambda: np.zeros(2))
@@ -48,7 +48,7 @@ class Channel:
 
     @property
     def needs_angle(self) -> bool:
-        """Does anything in it go with the motors' angles?"""
+        """Whether any part depends on the motors' angles."""
         return any(self.ripple) or any(self.of_speed)
 
 

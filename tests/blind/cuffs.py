@@ -1,4 +1,4 @@
-"""What the cuffs' force sensors feel."""
+"""Forces at the cuffs' sensors."""
 
 import numpy as np
 from numpy.random import Generator

@@ -27,7 +27,7 @@ torques."""
 
 @njit()
 def is_dry(kind):
-    """Tell whether a kind of hidden torque is dry friction."""
+    """Return whether a kind of hidden torque is dry friction."""
     return kind <= LAST_DRY or kind >= FIRST_DRY_AGAIN
 
 

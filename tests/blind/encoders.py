@@ -1,4 +1,4 @@
-"""What encoders tell of an angle: an offset, and errors once, twice and three times a turn."""
+"""Readings of encoders: an offset, and errors once, twice and three times a turn."""
 
 from math import cos, sin
 
@@ -9,29 +9,29 @@ WAVES = 3
 
 @njit()
 def reading(offset, wobble, theta):
-    """Return the angle told; ``wobble`` (6,) has amplitude and phase of each wave."""
-    told = theta + offset + wobble[0] * sin(theta + wobble[1])
+    """Return the reading of an angle; ``wobble`` (6,) has amplitude and phase of each wave."""
+    angle = theta + offset + wobble[0] * sin(theta + wobble[1])
     for k in range(1, WAVES):
         if wobble[2 * k] != 0.0:
-            told += wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
-    return told
+            angle += wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
+    return angle
 
 
 @njit()
 def slope(wobble, theta):
-    """Return by what factor a speed is told."""
-    told = 1.0
+    """Return the factor of a measured speed."""
+    factor = 1.0
     for k in range(WAVES):
         if wobble[2 * k] != 0.0:
-            told += (k + 1) * wobble[2 * k] * cos((k + 1) * theta + wobble[2 * k + 1])
-    return told
+            factor += (k + 1) * wobble[2 * k] * cos((k + 1) * theta + wobble[2 * k + 1])
+    return factor
 
 
 @njit()
 def curvature(wobble, theta):
     """Return how that factor changes with the angle, 1/rad."""
-    told = 0.0
+    factor = 0.0
     for k in range(WAVES):
         if wobble[2 * k] != 0.0:
-            told -= (k + 1) ** 2 * wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
-    return told
+            factor -= (k + 1) ** 2 * wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
+    return factor

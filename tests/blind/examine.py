@@ -59,7 +59,7 @@ SIMULATOR = (
     "worlds",
 )
 """What decides how a session looks: when one of these files changes, sessions are simulated
-anew."""
+again."""
 ONE_THREAD = {
     name: "1"
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")

@@ -1,6 +1,6 @@
 """To which kinds of law each effect belongs, and whether it repeats with the motion.
 
-A diagnosis that cannot tell which cause it is may still tell of what kind: the first family of an
+A diagnosis that cannot name the cause may still name its kind: the first family of an
 effect is its own, the others are as good an answer.
 """
 

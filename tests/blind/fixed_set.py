@@ -55,17 +55,17 @@ def fixed_set() -> list[Case]:
 def outcomes(cases: Iterable[Case], scores: Iterable[Score]) -> list[Outcome]:
     """Return how the cases came out, in their order; scores come in any."""
     by_seed = {s.seed: s for s in scores}
-    found = [(c, by_seed[c.seed]) for c in cases]
+    pairs = [(c, by_seed[c.seed]) for c in cases]
     return [
         Outcome(c.seed, c.label, s.status, label(s.named[0]) if s.named else None, s.right)
-        for c, s in found
+        for c, s in pairs
     ]
 
 
-def write(found: Sequence[Outcome], path: Path = RECORD) -> None:
+def write(outcomes_now: Sequence[Outcome], path: Path = RECORD) -> None:
     """Record how the set came out, a case a line."""
-    lines = ",\n".join(f"  {json.dumps(asdict(outcome))}" for outcome in found)
-    path.write_text(f'{{"right": {sum(o.right for o in found)}, "cases": [\n{lines}\n]}}\n')
+    lines = ",\n".join(f"  {json.dumps(asdict(outcome))}" for outcome in outcomes_now)
+    path.write_text(f'{{"right": {sum(o.right for o in outcomes_now)}, "cases": [\n{lines}\n]}}\n')
 
 
 def read(path: Path = RECORD) -> list[Outcome]:
@@ -73,7 +73,7 @@ def read(path: Path = RECORD) -> list[Outcome]:
     return [Outcome(**row) for row in json.loads(path.read_text())["cases"]]
 
 
-def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[str]:
+def complaints(recorded: Sequence[Outcome], present: Sequence[Outcome]) -> list[str]:
     """Say what is not as recorded, a line each; nothing where all is well.
 
     Rounding differs between machines, and where two causes or a threshold are close it decides. So
@@ -82,13 +82,11 @@ def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[st
     has become right, which belongs into the record lest it be lost again unnoticed. Once recorded,
     a machine whose rounding makes it wrong is within what is allowed.
     """
-    if [(o.seed, o.hidden) for o in recorded] != [(o.seed, o.hidden) for o in found]:
-        return [
-            f"{RECORD.name} tells of other cases than the fixed set has: rewrite it by `{REWRITE}`"
-        ]
+    if [(o.seed, o.hidden) for o in recorded] != [(o.seed, o.hidden) for o in present]:
+        return [f"{RECORD.name} has other cases than the fixed set: rewrite it by `{REWRITE}`"]
     changes = [
         (was, now)
-        for was, now in zip(recorded, found, strict=True)
+        for was, now in zip(recorded, present, strict=True)
         if _essence(was) != _essence(now)
     ]
     better = [_change(*c) for c in changes if c[1].right and not c[0].right]
@@ -97,18 +95,18 @@ def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[st
         for c in changes
         if c[0].right and not c[1].right and c[1].hidden in SILENT_IS_RIGHT
     ]
-    other = [said for said in (_change(*c) for c in changes) if said not in better]
-    were, are = (sum(o.right for o in which) for which in (recorded, found))
-    said = [
+    other = [words for words in (_change(*c) for c in changes) if words not in better]
+    were, are = (sum(o.right for o in which) for which in (recorded, present))
+    words = [
         f"{change}: better than recorded; rewrite {RECORD.name} by `{REWRITE}`" for change in better
     ]
-    said += [f"{change}: a false alarm" for change in alarms]
+    words += [f"{change}: a false alarm" for change in alarms]
     if len(other) > MOST_DIFFERENT or are < were - MOST_LOST:
-        said += [
+        words += [
             f"{change}; {len(other)} cases differ, {are} are right and {were} were"
             for change in other
         ]
-    return said
+    return words
 
 
 def _essence(outcome: Outcome) -> tuple[bool, str | None]:

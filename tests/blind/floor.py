@@ -69,6 +69,6 @@ def _squares(rig: Rig, runs: Sequence[Recorded], cutoff_hz: float) -> NDArray:
 
 
 def _scored(r: Recorded) -> NDArray:
-    """Tell in which blocks every joint moves that ever does, (m,) bool."""
-    found = r.moving()
-    return found[:, found.any(axis=0)].all(axis=1)
+    """Return the blocks in which every joint moves that ever does, (m,) bool."""
+    moving = r.moving()
+    return moving[:, moving.any(axis=0)].all(axis=1)

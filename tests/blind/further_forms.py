@@ -375,7 +375,7 @@ def one_rough_patch(rng, joint, reach=BOUNDS):
     return dict(install=hidden_torque(dry.POSITION_PATCH, joint, *shape), start=3.0, shape=shape)
 
 
-# --- What goes with the temperature
+# --- Effects of the temperature
 
 
 def _share_of_cold(run: Run, joint: int):
@@ -622,8 +622,8 @@ def _leak(rng, joint, bend, lag_s, parameters):
         plan.channel.cross_bend[joint] += bend
         plan.channel.cross_lag_s[joint] += lag_s
 
-    told = (lambda s: {"coupling": sign * s}) if parameters else (lambda s: {})
-    return dict(install=install, start=0.1, shape=(sign, bend, lag_s), parameters=told)
+    parameters_of = (lambda s: {"coupling": sign * s}) if parameters else (lambda s: {})
+    return dict(install=install, start=0.1, shape=(sign, bend, lag_s), parameters=parameters_of)
 
 
 @new("torque_cross_talk", own=True)

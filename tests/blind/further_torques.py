@@ -25,7 +25,7 @@ STOP_POWER, STOP_HARDENING = 68, 69
 SLIDING_MASS, OTHER_SPEED_SQUARED, CREEP_SPRING = 70, 71, 72
 TABLE_RATE_HZ = 50.0
 DEPTH = 0.1
-"""rad beyond a contact at which its stiffness is told."""
+"""rad beyond a contact at which its stiffness is given."""
 
 
 @njit()
@@ -165,7 +165,7 @@ def _unlisted(kind, p, m, dt, j, q, v, a):
         x = q[j] - p[1]
         m[0] += dt / p[2] * (x - m[0])
         return p[0] * (x - p[3] * m[0])
-    # A lump of one kilogram's moment that slides along the segment as it swings, and is felt by its
+    # A lump of one kilogram's moment that slides along the segment as it swings, and acts on its
     # weight and its inertia; the acceleration through a lag of 5 ms, as it is that of the last
     # step.
     absolute = q[0] if j == 0 else q[0] + q[1]

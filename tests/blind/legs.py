@@ -1,4 +1,4 @@
-"""A closed-form leg as a plan has it: what it needs, and what its cuffs feel.
+"""A closed-form leg as a plan has it: the torque it needs, and the forces at its cuffs.
 
 The worlds without MuJoCo share it.
 """
@@ -53,7 +53,7 @@ def links_of(rig: Rig, plan: Plan, run: Run) -> Links:
 
 
 class Reported(NamedTuple):
-    """A motion as the encoders tell it, (n, 2) each, and that of the links behind the motors."""
+    """A motion as the encoders read it, (n, 2) each, and that of the links behind the motors."""
 
     angle: np.ndarray
     speed: np.ndarray
@@ -97,8 +97,7 @@ def cuff_forces(
     t: NDArray,
     noise: Generator,
 ) -> NDArray:
-    """Return what four sensors feel (n, 4, 3) N, ``across`` (n, 2) being known where the cuffs give
-    way."""
+    """Return forces at four sensors (n, 4, 3) N; ``across`` (n, 2) is known for soft cuffs."""
     if across is not None:
         return pad_forces(rig, np.zeros_like(across), across, noise)
     base, sway, frequency = plan.tilt

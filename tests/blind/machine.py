@@ -12,7 +12,7 @@ from tests.blind.body import Leg, Segment
 SPEED_CUTOFF_HZ = 40.0
 DRIVE_RATE_HZ = 1000.0
 KNEE_ROTOR = 0.04
-"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be
+"""kg·m², with an effect behind a soft transmission only; one with an effect elsewhere is to be
 hidden."""
 SOFT_DAMPING = 150.0
 """Most damping per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
@@ -38,9 +38,9 @@ class Machine:
     ripple_time: NDArray
     """Its correlation time, s."""
     ripple_cycles: NDArray
-    """Cycles per turn of the part of it that goes with the motor's angle."""
+    """Cycles per turn of the part of it that depends on the motor's angle."""
     ripple_share: NDArray
-    """Of the ripple's power, what goes with the motor's angle."""
+    """Share of the ripple's power that depends on the motor's angle."""
     cuff_distance: tuple[float, float]
     cuff_zero: NDArray
     """(4, 3) N."""

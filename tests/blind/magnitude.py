@@ -29,7 +29,7 @@ def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
     the cause acts."""
     j = HIP if cause.joint is None else cause.joint
     acting = [r for r in runs if cause.acts_in(r.run.kind)]
-    # What is faster than blocks is told sample by sample.
+    # Torque faster than blocks is given sample by sample.
     rows = [(r.moving_samples() if cause.fast else r.moving())[:, j] for r in acting]
     shown = [(lambda x: x) if cause.fast else r.blocks for r in acting]
     several = list(zip(acting, rows, shown, strict=True))
@@ -54,20 +54,20 @@ def size_for(
     size, low, high = cause.start, cause.smallest, cause.largest
     for _ in range(PASSES):
         try:
-            found = magnitude(cause, pilot(size))
+            reached = magnitude(cause, pilot(size))
         except FloatingPointError:  # unstable or stuck: far too large
-            found = np.inf
-        if abs(found / wanted - 1.0) < CLOSE:
+            reached = np.inf
+        if abs(reached / wanted - 1.0) < CLOSE:
             break
-        low, high = (size, high) if found < wanted else (low, size)
+        low, high = (size, high) if reached < wanted else (low, size)
         if high <= low * (1.0 + CLOSE):
             break
-        new = size * float(np.clip(wanted / found, 1 / FARTHEST, FARTHEST))
+        new = size * float(np.clip(wanted / reached, 1 / FARTHEST, FARTHEST))
         new = float(np.clip(new, cause.smallest, cause.largest))
         # What is far from proportional is bisected.
         size = new if low <= new <= high else float(np.sqrt(low * high))
     least = LEAST_AT_LARGEST if size >= OF_LARGEST * cause.largest else ACTS * wanted
-    if must_act and found < least:
+    if must_act and reached < least:
         raise FloatingPointError(f"{cause.label} does not act on this motion")
     return size
 
@@ -80,10 +80,10 @@ def small_size_for(
     size = cause.start
     for _ in range(3):
         try:
-            found = magnitude(cause, pilot(size))
+            reached = magnitude(cause, pilot(size))
         except FloatingPointError:
-            found = np.inf
-        if np.isfinite(found) and found > 0:
-            return float(min(size * wanted / found, cause.largest))
+            reached = np.inf
+        if np.isfinite(reached) and reached > 0:
+            return float(min(size * wanted / reached, cause.largest))
         size *= 0.2
     raise FloatingPointError(f"{cause.label} has no size")

@@ -70,8 +70,7 @@ def voltage_sag(rng, joint):
 
 @unlisted("time", repeats=False)
 def cable_drag(rng, joint):
-    """A cable bundle that settles ever anew: a drag that wanders within seconds, other in each
-    run."""
+    """A cable bundle that keeps settling: a drag that wanders within seconds, new in each run."""
     smoothing = rng.uniform(0.5, 1.5)
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -176,7 +175,7 @@ def creeping_spring(rng, joint, reach=BOUNDS):
 
 @unlisted("load", "sensor")
 def torque_steps(rng, joint):
-    """A torque told in coarse steps, and none near zero."""
+    """A torque reported in coarse steps, and none near zero."""
     dead = rng.uniform(0.0, 0.8)
 
     def install(plan: Plan, size: float, run: Run) -> None:

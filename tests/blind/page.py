@@ -110,12 +110,12 @@ def _section(
     table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]
 ) -> str:
     """Return a table of each chosen examination under one heading; nothing where none has rows."""
-    made = [(number, table(e.scores)) for number, e in enumerate(every, 1) if e in chosen]
-    made = [(number, page) for number, page in made if page.rows]
-    if not made:
+    numbered = [(number, table(e.scores)) for number, e in enumerate(every, 1) if e in chosen]
+    numbered = [(number, page) for number, page in numbered if page.rows]
+    if not numbered:
         return ""
-    lines = [f"## {made[0][1].title}", "", *([remark, ""] if remark else [])]
-    for number, page in made:
+    lines = [f"## {numbered[0][1].title}", "", *([remark, ""] if remark else [])]
+    for number, page in numbered:
         lines += [f"Examination {number}:", "", markdown(page)]
     return "\n".join(lines)
 
@@ -132,14 +132,14 @@ def _what_was_run(examinations: Sequence[Examination]) -> str:
                 f"{min(seeds)} to {max(seeds)}",
             )
         )
-    made = Page("What was run", ("", "command", "cases", "seeds"), rows)
-    found = {use for e in examinations for use in uses(s.seed for s in e.scores)}
-    return f"{titled(made)}\n{_provenance(found)}\n"
+    section = Page("What was run", ("", "command", "cases", "seeds"), rows)
+    uses_of_seeds = {use for e in examinations for use in uses(s.seed for s in e.scores)}
+    return f"{titled(section)}\n{_provenance(uses_of_seeds)}\n"
 
 
-def _provenance(found: set[str]) -> str:
+def _provenance(uses_of_seeds: set[str]) -> str:
     tuning, reporting = RANGES["tuning"], RANGES["reporting"]
-    if found == {"reporting"}:
+    if uses_of_seeds == {"reporting"}:
         return (
             f"Seeds from {reporting.start} to {reporting.stop - 1} are for reporting: the "
             f"diagnosis was never tuned on them, only on seeds from {tuning.start} to "

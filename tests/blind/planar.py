@@ -35,7 +35,7 @@ DT = 0.25e-3
 STEPS_PER_MS = 4
 DRIVE_RATES_HZ = (500.0, 1000.0, 2000.0, 4000.0)
 KNEE_ROTOR = 0.04
-"""kg·m², felt behind a soft transmission only."""
+"""kg·m², with an effect behind a soft transmission only."""
 SOFT_DAMPING = 120.0
 """Most velocity gain per motor inertia, 1/s, with which drives behind a soft transmission do not
 hunt."""
@@ -78,7 +78,7 @@ class PlanarMachine:
     ripple_white: NDArray
     """Of the ripple's power, what is white."""
     ripple_lines: NDArray
-    """(2, 3) of its power, what goes with multiples of the motor's angle."""
+    """(2, 3) shares of its power that depend on multiples of the motor's angle."""
     ripple_cycles: NDArray
     """(2, 3) cycles per turn of these; more than the catalogue's cogging has."""
     ripple_phase: NDArray
@@ -132,7 +132,7 @@ def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
     drive_counts = np.where(counts < COARSE, counts * 2.0 ** rng.integers(4, 7, 2), counts)
     fine = CHATTER_NM / (2 * np.pi / drive_counts * 2 * np.pi * cutoff)
     late = 1.5 / rate + lag + 1.0 / (2 * np.pi * cutoff)
-    quick = 0.45 * _felt(leg) / late
+    quick = 0.45 * _inertias(leg) / late
     velocity_gain = np.minimum(np.minimum(rng.uniform([25.0, 10.0], [80.0, 30.0]), fine), quick)
     lines = np.where(rng.random((2, 3)) < 0.35, rng.uniform(0.01, 0.1, (2, 3)), 0.0)
     ripple = np.exp(rng.uniform(np.log(0.1), np.log(1.5), 2))
@@ -171,14 +171,14 @@ def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
     )
 
 
-def _felt(leg: Leg) -> NDArray:
+def _inertias(leg: Leg) -> NDArray:
     """Return the least inertia that each motor feels while the other joint is free, (2,) kg·m²."""
     c, M, bias = two_link.coefficients(leg), np.empty((2, 2)), np.empty(2)
-    felt = []
+    inertias = []
     for knee in np.linspace(-1.6, -0.2, 8):
         two_link.mass_and_bias(c, 0.0, 0.0, 0.0, knee, 0.0, 0.0, M, bias)
-        felt.append(np.linalg.det(M) / np.array([M[1, 1], M[0, 0]]))
-    return np.min(felt, axis=0)
+        inertias.append(np.linalg.det(M) / np.array([M[1, 1], M[0, 0]]))
+    return np.min(inertias, axis=0)
 
 
 class Drives(NamedTuple):
@@ -381,11 +381,11 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
 
 @njit()
 def _latch(out, k, j, d, theta, omega, acceleration):
-    """Log a motor's angle as its encoder tells it, and what speed and acceleration that is."""
-    told = reading(d.offset[j], d.wobble[j], theta)
+    """Log a motor's angle as its encoder reads it, and what speed and acceleration that is."""
+    angle = reading(d.offset[j], d.wobble[j], theta)
     count = d.recorded_count[j]
-    out.angle[k, j] = told
-    out.reading[k, j] = count * np.round(told / count) if count > 0.0 else told
+    out.angle[k, j] = angle
+    out.reading[k, j] = count * np.round(angle / count) if count > 0.0 else angle
     factor = slope(d.wobble[j], theta)
     out.speed[k, j] = omega * factor
     bend = curvature(d.wobble[j], theta)

@@ -163,7 +163,7 @@ def _reported(log: loop.Log, time: NDArray, plan: Plan, conditions: Conditions) 
 
 
 def _ripple(machine: Machine, angle: NDArray, noise: Generator, conditions: Conditions) -> NDArray:
-    """Error of the measured torque: coloured noise, and in some machines a part that goes with the
+    """Error of the measured torque: coloured noise, and in some machines a part that depends on the
     motor's angle."""
     n = len(angle)
     out = np.empty((n, 2))
@@ -182,7 +182,7 @@ def _ripple(machine: Machine, angle: NDArray, noise: Generator, conditions: Cond
 def _cuff_forces(
     rig: Rig, plan: Plan, log: loop.Log, noise: Generator, conditions: Conditions = PLAIN
 ) -> NDArray:
-    """Return what four sensors feel (n, 4, 3) N."""
+    """Return the forces at four sensors (n, 4, 3) N."""
     along, across = np.zeros_like(log.cuff), log.cuff
     if plan.cuffs is None:
         along, across = _firmly_strapped(rig, plan, log, conditions)

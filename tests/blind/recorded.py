@@ -15,7 +15,7 @@ from tests.blind.units import Units
 
 REVERSAL_SPEED, REVERSAL_PADDING_S = 0.04, 0.08
 BLOCK_S = 0.025
-"""Length of a block average, near enough, in which sizes and noise floors are told."""
+"""Length of a block average, near enough, in which sizes and noise floors are given."""
 EDGE_S = 0.5
 
 
@@ -97,12 +97,11 @@ class Recorded:
         return x[: n * block].reshape(n, block, *x.shape[1:]).mean(axis=1)
 
     def moving(self) -> NDArray:
-        """Tell for each block and joint whether it is away from reversals and from the run's ends,
-        (m, 2) bool."""
+        """Return which blocks are away from a joint's reversals and the run's ends, (m, 2) bool."""
         return self.blocks(self.moving_samples().astype(float)) == 1.0
 
     def moving_samples(self) -> NDArray:
-        """Tell the same for each sample and joint, (n, 2) bool."""
+        """Return the same for each sample and joint, (n, 2) bool."""
         away = self.away_from_reversals()
         edge = round(EDGE_S / self.sample_s)
         away[:edge] = away[-edge:] = False

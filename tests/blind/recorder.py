@@ -27,8 +27,8 @@ def stamped(columns: Columns, r: Recorded, conditions: Conditions, rng: Generato
     if r.temperature is not None:
         step = rng.choice([0.01, 0.1, 0.5])
         for j, joint in enumerate(("hip", "knee")):
-            told = r.temperature[:, j] + rng.normal(0.0, TEMPERATURE_NOISE_C, n)
-            kept[f"{joint}_temperature_c"] = step * np.round(told / step)
+            measured = r.temperature[:, j] + rng.normal(0.0, TEMPERATURE_NOISE_C, n)
+            kept[f"{joint}_temperature_c"] = step * np.round(measured / step)
     return kept
 
 
@@ -56,14 +56,16 @@ def with_gaps(columns: Columns, count: int, rng: Generator) -> tuple[Columns, Ga
     return {name: values[~lost] for name, values in columns.items()}, gaps
 
 
-def header(told: dict[str, Any], conditions: Conditions, period_s: float | None) -> dict[str, Any]:
+def header(
+    metadata: dict[str, Any], conditions: Conditions, period_s: float | None
+) -> dict[str, Any]:
     """Return what a file says, less what this recorder does not."""
-    told = {"sample_rate_hz": conditions.rate_hz} | told
+    metadata = {"sample_rate_hz": conditions.rate_hz} | metadata
     if not conditions.has_controller:
-        told.pop("controller", None)
+        metadata.pop("controller", None)
     if not conditions.has_cuffs:
-        geometry = {k: v for k, v in told["geometry"].items() if "cuff" not in k}
-        told["geometry"] = geometry
+        geometry = {k: v for k, v in metadata["geometry"].items() if "cuff" not in k}
+        metadata["geometry"] = geometry
     if conditions.says_period and period_s is not None:
-        told["period_s"] = period_s
-    return told
+        metadata["period_s"] = period_s
+    return metadata

@@ -28,7 +28,7 @@ def figure(curve: Sequence[Bin]) -> Figure:
         2, 1, figsize=(4.2, 5.2), sharex=True, height_ratios=(4, 1)
     )
     axis.plot([0, 1], [0, 1], color=GREY, lw=1, label="as said")
-    said = [b.mean for b in curve]
+    stated = [b.mean for b in curve]
     was = [b.happened.value for b in curve]
     low, high = zip(*(b.happened.interval for b in curve), strict=True) if curve else ((), ())
     # Rounding may put an interval's end a hair inside its point; a bar cannot be shorter than
@@ -36,7 +36,7 @@ def figure(curve: Sequence[Bin]) -> Figure:
     below = [max(0.0, w - end) for w, end in zip(was, low, strict=True)]
     above = [max(0.0, end - w) for w, end in zip(was, high, strict=True)]
     axis.errorbar(
-        said,
+        stated,
         was,
         yerr=[below, above],
         fmt="o",

@@ -71,8 +71,8 @@ def write(folder: Path, examination: Examination) -> None:
     record = {"command": examination.command, "scores": [asdict(s) for s in scores]}
     (folder / "report.json").write_text(json.dumps(record, indent=1))
     seeds = f"seeds {scores[0].seed} to {scores[-1].seed}"
-    said = f"`{examination.command}`: {len(scores)} cases, {seeds}."
-    lines = ["# Blind examination", "", said, "Rates with Wilson's 95 % interval.", ""]
+    heading = f"`{examination.command}`: {len(scores)} cases, {seeds}."
+    lines = ["# Blind examination", "", heading, "Rates with Wilson's 95 % interval.", ""]
     (folder / "report.md").write_text(
         "\n".join([*lines, *(titled(page) for page in pages(scores))])
     )

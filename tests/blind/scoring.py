@@ -37,8 +37,8 @@ class Score:
     named: tuple[Named, ...]
     right: bool
     unseen: bool = False
-    """Was all that is not named too small to be seen? Of a single effect silence is then right,
-    of a pair it is counted beside."""
+    """Whether all that is not named was too small to be seen. Of a single effect silence is then
+    right, of a pair it is counted separately."""
     probabilities: tuple[tuple[float, bool], ...] = ()
     """Of each named cause, and whether it was there (or tied with what was)."""
     rmse_over_floor: Mapping[str, float] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Score:
     """Is a finding of an acceptable family, at the right joint, at least as likely as not? None
     where nothing is hidden, or the verdict has no findings."""
     log_probability: float | None = None
-    """Natural logarithm of the probability given to the truth; None where the verdict tells
+    """Natural logarithm of the probability given to the truth; None where the verdict has
     none."""
 
     @property
@@ -109,8 +109,8 @@ def score(
         own_form=all(h["own_form"] for h in truth["hidden"]),
         magnitude=truth["hidden"][0]["magnitude"] if len(hidden) == 1 else None,
         visibility=max(
-            left / truth["noise_floor_nm"][joint]
-            for joint, left in truth["left_by_baseline_nm"].items()
+            residual / truth["noise_floor_nm"][joint]
+            for joint, residual in truth["left_by_baseline_nm"].items()
         ),
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
@@ -135,8 +135,7 @@ def score(
 
 
 def _is_called_unlisted(verdict: Mapping[str, Any], kin: set[Named]) -> bool:
-    """Tell whether something was found missing and no listed cause called likely, but for its
-    kin."""
+    """Return whether something is missing and no listed cause is likely, except for its kin."""
     if verdict["status"] not in ("unknown_cause", "partly_explained", "explained"):
         return False
     likely = [c for c in verdict["causes"] if float(c["probability"]) >= LIKELY]
@@ -144,7 +143,7 @@ def _is_called_unlisted(verdict: Mapping[str, Any], kin: set[Named]) -> bool:
 
 
 def _is_a_declared_gap(fault: Mapping[str, Any], truth: Mapping[str, Any]) -> bool:
-    """Tell whether a data fault is what the file's own metadata says: samples that it lost."""
+    """Return whether a data fault is in the file's own metadata: samples that it lost."""
     words = ("gap", "missing", "dropped", "lost")
     declared = fault["file"] in truth.get("with_gaps", ())
     return declared and any(word in fault["what"].lower() for word in words)
@@ -153,11 +152,11 @@ def _is_a_declared_gap(fault: Mapping[str, Any], truth: Mapping[str, Any]) -> bo
 def _family_is_right(
     hidden: Sequence[Mapping[str, Any]], findings: Sequence[Mapping[str, Any]] | None
 ) -> bool | None:
-    """Tell whether each hidden effect has a likely finding of its kind of law at its joint."""
-    told = [h for h in hidden if h.get("families")]
-    if findings is None or not told:
+    """Return whether each hidden effect has a likely finding of its kind of law at its joint."""
+    with_family = [h for h in hidden if h.get("families")]
+    if findings is None or not with_family:
         return None
-    return all(any(_is_of_family(finding, h) for finding in findings) for h in told)
+    return all(any(_is_of_family(finding, h) for finding in findings) for h in with_family)
 
 
 def _is_of_family(finding: Mapping[str, Any], hidden: Mapping[str, Any]) -> bool:
@@ -183,34 +182,35 @@ def _log_probability(truth: Mapping[str, Any], posterior: Mapping[str, Any] | No
 def _probability_of(hidden: Mapping[str, Any], posterior: Mapping[str, Any]) -> float:
     causes, joint = posterior.get("causes", {}), hidden["joint"]
     names = [hidden["effect"], *hidden["kin"]]
-    told = [causes.get(name if joint is None else f"{name}@{joint}", 0.0) for name in names]
+    probabilities = [
+        causes.get(name if joint is None else f"{name}@{joint}", 0.0) for name in names
+    ]
     if hidden["effect"].startswith("outside:"):
-        told.append(posterior.get("unlisted", 0.0))
-    return max(told)
+        probabilities.append(posterior.get("unlisted", 0.0))
+    return max(probabilities)
 
 
 def names_of(cause: Mapping[str, Any]) -> set[Named]:
-    """Return what a named cause says: itself, and what it honestly cannot be told from."""
+    """Return the labels of a named cause: its own, and those of its ties."""
     ties = cause.get("indistinguishable_from", [])
     return {(cause["effect"], cause["joint"])} | {(tie["effect"], tie["joint"]) for tie in ties}
 
 
 def fault_is_named(
-    fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str
+    fault: Mapping[str, Any], faults: Iterable[Mapping[str, Any]], message: str
 ) -> bool:
-    """Tell whether a data fault was said, in the verdict or in the line with which the command
-    refused the files.
+    """Return whether the verdict, or the command's refusal of the files, names a data fault.
 
     Right are a file that has the fault and a word for what it is; where one channel has it, that
     channel or joint.
     """
-    sentences = [f"{f['file']} {f['channel']} {f['what']}" for f in found] + [message]
+    sentences = [f"{f['file']} {f['channel']} {f['what']}" for f in faults] + [message]
     joint = (fault["channel"] or "").split("_")[0]
     return any(
-        any(file in said for file in fault["files"])
-        and any(word in said.lower() for word in WORDS[fault["fault"]])
-        and (joint not in JOINTS or joint in said)
-        for said in sentences
+        any(file in sentence for file in fault["files"])
+        and any(word in sentence.lower() for word in WORDS[fault["fault"]])
+        and (joint not in JOINTS or joint in sentence)
+        for sentence in sentences
     )
 
 
@@ -223,12 +223,12 @@ def _unseen(
     causes: Iterable[Mapping[str, Any]],
     smallest: Mapping[Named, float] | None,
 ) -> bool:
-    """Tell whether all that is hidden and not named is too small to be seen; False where all is
+    """Return whether all that is hidden and not named is too small to be seen; False where all is
     named."""
     if smallest is None or truth["case"]["category"] not in ("single", "pair"):
         return False
-    told = {name for cause in causes for name in names_of(cause)}
-    missed = [h for h in truth["hidden"] if (h["effect"], h["joint"]) not in told]
+    named = {name for cause in causes for name in names_of(cause)}
+    missed = [h for h in truth["hidden"] if (h["effect"], h["joint"]) not in named]
     small = [h["rms_nm"] < smallest.get((h["effect"], h["joint"]), 0.0) for h in missed]
     return bool(missed) and all(small)
 

@@ -89,7 +89,7 @@ def simulate(case: Case) -> Session:
     """Draw a rig, a person and what is hidden, and simulate all runs; the case's seed decides
     everything.
 
-    A leg that what is hidden makes unstable or stuck is drawn anew: no lab would record it.
+    A leg that a hidden effect makes unstable or stuck is drawn again: no lab would record it.
     """
     for attempt in range(ATTEMPTS):
         try:
@@ -160,9 +160,9 @@ class _Draw:
         """Refuse a rig whose small effects add up to something that ought to be named."""
         if self.case.plain:
             return
-        left = left_by_the_baseline(self.rig, runs)
+        residual = left_by_the_baseline(self.rig, runs)
         torque = np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in runs], axis=0))
-        if np.any(left > np.maximum(OF_FLOOR * ripple_floor(runs), OF_TORQUE * torque)):
+        if np.any(residual > np.maximum(OF_FLOOR * ripple_floor(runs), OF_TORQUE * torque)):
             raise FloatingPointError("what a good rig gets a little wrong is large")
 
     def _trajectories(self) -> dict[str, Trajectory]:
@@ -312,8 +312,8 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
     fault = _spoil(session, tables, names, rng) if session.case.fault else None
     for i, (r, columns, name) in enumerate(zip(session.runs, tables, names, strict=True)):
         table = pa.table({key: pa.array(values) for key, values in columns.items()})
-        told = _header(session, r, label) | ({"gaps": gaps[i]} if i in gaps else {})
-        header = json.dumps(told).encode()
+        metadata = _header(session, r, label) | ({"gaps": gaps[i]} if i in gaps else {})
+        header = json.dumps(metadata).encode()
         pq.write_table(table.replace_schema_metadata({b"exoid": header}), recordings / name)
     truth.parent.mkdir(parents=True, exist_ok=True)
     # Last and whole: a truth that is there means that the session is complete.
@@ -323,7 +323,7 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
 
 
 def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
-    told = session.mechanism.header(session.rig, r)
+    known = session.mechanism.header(session.rig, r)
     if session.trajectories:
         about = {
             "contract": "recording/1",
@@ -332,7 +332,7 @@ def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
             "session": label,
         }
         period = session.trajectories[r.run.purpose].period_s
-        return about | recorder.header(told, session.conditions, period)
+        return about | recorder.header(known, session.conditions, period)
     return {
         "contract": "recording/1",
         "run": r.run.kind,
@@ -340,7 +340,7 @@ def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
         "sample_rate_hz": 200.0,
         "period_s": PERIOD_S,
         "session": label,
-        **told,
+        **known,
     }
 
 

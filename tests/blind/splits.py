@@ -42,7 +42,7 @@ def fold_of(effect: str, form: str, folds: int = FOLDS) -> int | None:
 
 
 def may_be_learned_from(truth: Mapping[str, Any], fold: int, folds: int = FOLDS) -> bool:
-    """Tell whether a session, by its truth file, may be shown to what is judged on a fold."""
+    """Return whether a session, by its truth file, may be shown to what is judged on a fold."""
     hidden = [(h["effect"], h["form"], h.get("held_back", False)) for h in truth["hidden"]]
     kept = forms_by_fold(folds)[fold]
     return not any(held_back or (effect, form) in kept for effect, form, held_back in hidden)

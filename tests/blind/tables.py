@@ -106,11 +106,11 @@ def by_kinds(scores: Sequence[Score]) -> Page:
 
 def pairs(scores: Sequence[Score]) -> Page:
     """Count pairs by how many of the two were named."""
-    found = of(scores, "pair")
-    rights = ((s, min(2, sum(was for _, was in s.probabilities))) for s in found)
+    scores_of_pairs = of(scores, "pair")
+    rights = ((s, min(2, sum(was for _, was in s.probabilities))) for s in scores_of_pairs)
     counts = Counter("both" if s.right else "one" if n else "none" for s, n in rights)
-    rows = [(n, str(Rate(counts[n], len(found)))) for n in ("both", "one", "none")]
-    return Page("Pairs", ("named", "share"), rows if found else [])
+    rows = [(n, str(Rate(counts[n], len(scores_of_pairs)))) for n in ("both", "one", "none")]
+    return Page("Pairs", ("named", "share"), rows if scores_of_pairs else [])
 
 
 def alarms(scores: Sequence[Score]) -> Page:
@@ -130,10 +130,10 @@ def outside(scores: Sequence[Score]) -> Page:
 
 def families(scores: Sequence[Score]) -> Page:
     """Count right families of laws, of what nobody listed by kind, of the catalogue by effect."""
-    told = [s for s in of(scores, "single", "outside") if s.family_right is not None]
+    judged = [s for s in of(scores, "single", "outside") if s.family_right is not None]
     rows = []
-    for name in sorted({_kind_of(s) for s in told}):
-        chosen = [s.family_right for s in told if _kind_of(s) == name]
+    for name in sorted({_kind_of(s) for s in judged}):
+        chosen = [s.family_right for s in judged if _kind_of(s) == name]
         rows.append((name, str(Rate.of(chosen))))
     return Page("Families of laws", ("hidden", "right"), rows)
 
@@ -169,7 +169,7 @@ def kinds_of_miss(scores: Sequence[Score]) -> Page:
     rows = []
     for name, _ in Counter(sorted(hidden(s) for s in wrong)).most_common():
         answers = Counter(answer(s) for s in wrong if hidden(s) == name)
-        rows.append((name, ", ".join(f"{said} {n}" for said, n in answers.most_common())))
+        rows.append((name, ", ".join(f"{words} {n}" for words, n in answers.most_common())))
     return Page("Every wrong answer", ("hidden", "answers"), rows)
 
 
@@ -217,9 +217,9 @@ def probabilities(scores: Sequence[Score]) -> Page:
 
 def coverage(scores: Sequence[Score]) -> Page:
     """Show how often the parameters' intervals hold the truth."""
-    found = [c for s in scores for c in s.covered]
-    names = sorted({c[:2] for c in found})
-    rows = [(f"{e}: {p}", str(Rate.of(c[2] for c in found if c[:2] == (e, p)))) for e, p in names]
+    covered = [c for s in scores for c in s.covered]
+    names = sorted({c[:2] for c in covered})
+    rows = [(f"{e}: {p}", str(Rate.of(c[2] for c in covered if c[:2] == (e, p)))) for e, p in names]
     return Page(
         "Coverage of the parameters' 95 % intervals", ("parameter", "holds the truth"), rows
     )

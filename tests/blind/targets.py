@@ -47,7 +47,7 @@ class Measure:
 
 
 def measures(scores: Sequence[Score]) -> list[Measure]:
-    """Return what is asked of the diagnosis, and what else tells how far to believe it."""
+    """Return the targets of the diagnosis, and further measures of its reliability."""
     singles, outside = of(scores, "single"), of(scores, "outside")
     forecasts = [f for s in scores for f in s.probabilities]
     physical = [s for s in scores if s.category != "fault"]
@@ -128,9 +128,9 @@ def family(scores: Iterable[Score]) -> list[bool]:
 
 
 def log_probability(scores: Iterable[Score]) -> float | None:
-    """Return the mean logarithm of what was given to the truth; None where no verdict told it."""
-    told = [s.log_probability for s in scores if s.log_probability is not None]
-    return sum(told) / len(told) if told else None
+    """Return the mean log probability of the truth; None where no verdict has it."""
+    known = [s.log_probability for s in scores if s.log_probability is not None]
+    return sum(known) / len(known) if known else None
 
 
 def _worst_world(scores: Sequence[Score], low: float) -> Measure:
@@ -153,7 +153,7 @@ def _alarmed(scores: Sequence[Score]) -> list[Score]:
 
 
 def _is_there(score: Score) -> bool:
-    """Tell whether causes are named, and each is among a session's imperfections."""
+    """Return whether causes are named, and each is among a session's imperfections."""
     return bool(score.named) and set(score.named) <= set(score.truth)
 
 

@@ -13,7 +13,7 @@ ANGLE = np.column_stack([0.6 + 0.4 * np.sin(2.0 * T), -0.9 + 0.3 * np.cos(2.0 * 
 HIP, KNEE = 0, 1
 
 
-def told(**values):
+def metadata_of(**values):
     channel = Channel()
     for name, value in values.items():
         member = getattr(channel, name)
@@ -42,13 +42,13 @@ def test_a_sound_channel_changes_nothing():
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )
 def test_an_error_is_what_it_is_called_and_leaves_the_other_joint_alone(values, hip):
-    out = told(**values)
+    out = metadata_of(**values)
     assert_allclose(out[:, HIP], hip, atol=1e-9)
     assert_allclose(out[:, KNEE], TORQUE[:, KNEE], atol=1e-12)
 
 
 def test_a_delay_and_two_lags_make_a_slow_torque_late_by_their_sum():
-    out = told(delay_s=0.01, lag_s=0.02, second_lag_s=0.005)[500:, HIP]
+    out = metadata_of(delay_s=0.01, lag_s=0.02, second_lag_s=0.005)[500:, HIP]
     late = [
         np.mean((np.interp(T[500:] - s, T, TORQUE[:, HIP]) - out) ** 2)
         for s in (0.025, 0.035, 0.045)
@@ -57,15 +57,15 @@ def test_a_delay_and_two_lags_make_a_slow_torque_late_by_their_sum():
 
 
 def test_a_held_torque_stays_and_a_coarse_one_has_steps():
-    held = told(hold_s=0.02)[:, HIP].reshape(-1, 20)
+    held = metadata_of(hold_s=0.02)[:, HIP].reshape(-1, 20)
     assert np.all(held == held[:, :1])
-    steps = told(quantum=0.5)[:, HIP] / 0.5
+    steps = metadata_of(quantum=0.5)[:, HIP] / 0.5
     assert_allclose(steps, np.round(steps), atol=1e-9)
-    blank = told(dead_band=1.0)[:, HIP]
+    blank = metadata_of(dead_band=1.0)[:, HIP]
     assert np.all(blank[np.abs(TORQUE[:, HIP]) < 0.99] == 0.0)
 
 
 def test_a_leak_that_lags_follows_the_other_joint_later():
-    out = told(cross=np.array([0.0, 0.3]), cross_lag_s=0.05)[:, HIP] - TORQUE[:, HIP]
+    out = metadata_of(cross=np.array([0.0, 0.3]), cross_lag_s=0.05)[:, HIP] - TORQUE[:, HIP]
     slow = 0.3 * np.interp(T - 0.05, T, TORQUE[:, KNEE])
     assert np.std(out[500:] - slow[500:]) < 0.1 * np.std(slow)

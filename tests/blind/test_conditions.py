@@ -31,8 +31,8 @@ def share(drawn, holds):
 
 @pytest.mark.parametrize("rate", c.RATES_HZ)
 def test_sample_rates_occur_as_often_as_stated(drawn, rate):
-    found = share(drawn, lambda one: one.rate_hz == rate)
-    assert found == pytest.approx(c.RATES_HZ[rate], abs=NEAR)
+    observed = share(drawn, lambda one: one.rate_hz == rate)
+    assert observed == pytest.approx(c.RATES_HZ[rate], abs=NEAR)
 
 
 def test_a_quarter_of_the_sessions_says_no_period_and_half_of_those_have_none(drawn):
@@ -82,13 +82,13 @@ def test_what_was_lost_is_what_the_file_says():
 
 
 def test_a_file_leaves_out_what_its_recorder_has_not():
-    told = {"controller": {}, "geometry": {"thigh_length_m": 0.4, "thigh_cuff_distance_m": 0.2}}
+    metadata = {"controller": {}, "geometry": {"thigh_length_m": 0.4, "thigh_cuff_distance_m": 0.2}}
     bare = Conditions(rate_hz=100.0, has_controller=False, has_cuffs=False, says_period=False)
-    assert recorder.header(dict(told), bare, 10.0) == {
+    assert recorder.header(dict(metadata), bare, 10.0) == {
         "sample_rate_hz": 100.0,
         "geometry": {"thigh_length_m": 0.4},
     }
-    assert recorder.header(dict(told), Conditions(), 10.0)["period_s"] == 10.0
+    assert recorder.header(dict(metadata), Conditions(), 10.0)["period_s"] == 10.0
 
 
 def test_motors_are_warmer_in_later_runs():

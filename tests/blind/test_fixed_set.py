@@ -21,13 +21,13 @@ from tests.blind.fixed_set import Outcome, complaints, outcomes, read
 from tests.blind.plan import HIP, KNEE
 from tests.blind.seeds import uses
 
-FOUND = [
+OUTCOMES = [
     Outcome(seed, "backlash@knee", "explained", "backlash@knee", True)
     for seed in range(900_000, 900_005)
 ]
 MISSED = Outcome(900_005, "cogging@hip", "nothing_missing", None, False)
 SILENT = Outcome(900_006, "none", "nothing_missing", None, True)
-RECORDED = [*FOUND, MISSED, SILENT]
+RECORDED = [*OUTCOMES, MISSED, SILENT]
 
 
 def changed(*which, **values):
@@ -59,7 +59,7 @@ def test_a_record_reads_as_it_was_written(tmp_path):
 
 def test_what_came_out_as_recorded_gives_no_complaint():
     assert not complaints(RECORDED, RECORDED)
-    # A status beside an unchanged answer is no matter of right and wrong.
+    # The status of an unchanged answer is no matter of right and wrong.
     assert not complaints(RECORDED, changed(0, status="partly_explained"))
 
 
@@ -72,24 +72,23 @@ def test_rounding_may_lose_one_right_answer_and_change_two():
 
 @pytest.mark.parametrize("lost", [(), (0,)], ids=["alone", "beside one that was lost"])
 def test_a_case_that_has_become_right_wants_to_be_recorded(lost):
-    found = changed(*lost, first="cogging@hip", right=False)
-    found[5] = replace(MISSED, status="explained", first="cogging@hip", right=True)
-    assert complaints(RECORDED, found) == [
+    now = changed(*lost, first="cogging@hip", right=False)
+    now[5] = replace(MISSED, status="explained", first="cogging@hip", right=True)
+    assert complaints(RECORDED, now) == [
         "900005 cogging@hip: nothing_missing (wrong) -> cogging@hip (right): better than recorded; "
         "rewrite fixed_set.json by `make blind-fixed`"
     ]
 
 
 def test_a_new_false_alarm_is_never_roundings():
-    found = changed(6, status="explained", first="cogging@hip", right=False)
-    assert complaints(RECORDED, found) == [
+    now = changed(6, status="explained", first="cogging@hip", right=False)
+    assert complaints(RECORDED, now) == [
         "900006 none: nothing_missing (right) -> cogging@hip (wrong): a false alarm"
     ]
-    assert not complaints(found, found)
+    assert not complaints(now, now)
 
 
 def test_a_record_of_other_cases_is_of_no_use():
     assert complaints(RECORDED[1:], RECORDED) == [
-        "fixed_set.json tells of other cases than the fixed set has: "
-        "rewrite it by `make blind-fixed`"
+        "fixed_set.json has other cases than the fixed set: rewrite it by `make blind-fixed`"
     ]

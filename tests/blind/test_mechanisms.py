@@ -93,7 +93,7 @@ def test_a_faultless_machine_obeys_its_equation_to_within_its_noise(faultless):
     assert np.linalg.lstsq(acting, m.torque, rcond=None)[0] == pytest.approx(1.0, abs=0.05)
 
 
-def test_the_truth_tells_the_rig_in_the_units_of_the_recording(faultless):
+def test_the_truth_has_the_rig_in_the_units_of_the_recording(faultless):
     session, m, truth = faultless
     parts = terms(session, m)
     (X,) = truth["X"].values()
@@ -108,7 +108,7 @@ def test_the_truth_tells_the_rig_in_the_units_of_the_recording(faultless):
     assert list(truth["noise_floor_nm"]) == ["axis"]
 
 
-def test_a_hidden_linear_spring_has_the_stiffness_that_the_truth_tells(tmp_path):
+def test_a_hidden_linear_spring_has_the_stiffness_that_the_truth_states(tmp_path):
     session = simulate(
         Case(
             SPRUNG,
@@ -120,7 +120,7 @@ def test_a_hidden_linear_spring_has_the_stiffness_that_the_truth_tells(tmp_path)
         )
     )
     m, truth = recorded(session, tmp_path)
-    told = truth["hidden"][0]["parameters"]
+    parameters = truth["hidden"][0]["parameters"]
     slope, at_zero = np.polyfit(m.q, m.torque - sum(terms(session, m).values()), 1)
-    assert slope == pytest.approx(told["stiffness"], rel=0.05)
-    assert -at_zero / slope == pytest.approx(told["rest_angle"], rel=0.05)
+    assert slope == pytest.approx(parameters["stiffness"], rel=0.05)
+    assert -at_zero / slope == pytest.approx(parameters["rest_angle"], rel=0.05)

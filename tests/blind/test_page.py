@@ -10,7 +10,7 @@ from tests.blind.report import Examination, read, write
 from tests.blind.scoring import Score
 
 PLAY, COGGING = ("backlash", "knee"), ("cogging", "hip")
-FOUND = Score(
+SCORE = Score(
     seed=540_000,
     category="single",
     truth=(PLAY,),
@@ -28,10 +28,10 @@ FOUND = Score(
     seconds=4.0,
 )
 MISTAKEN = replace(
-    FOUND, seed=540_001, named=(COGGING,), right=False, probabilities=((0.6, False),), covered=()
+    SCORE, seed=540_001, named=(COGGING,), right=False, probabilities=((0.6, False),), covered=()
 )
 SILENT = replace(
-    FOUND,
+    SCORE,
     seed=540_002,
     category="none",
     truth=(),
@@ -43,7 +43,7 @@ SILENT = replace(
     covered=(),
 )
 HALF = replace(
-    FOUND,
+    SCORE,
     seed=540_003,
     category="pair",
     truth=(PLAY, COGGING),
@@ -53,7 +53,7 @@ HALF = replace(
     covered=(),
 )
 STRANGE = replace(
-    FOUND,
+    SCORE,
     seed=540_004,
     category="outside",
     truth=(("outside:tone", "hip"),),
@@ -64,7 +64,7 @@ STRANGE = replace(
     covered=(),
 )
 MIXED = Examination(
-    "python -m tests.blind --seeds reporting", [FOUND, MISTAKEN, SILENT, HALF, STRANGE]
+    "python -m tests.blind --seeds reporting", [SCORE, MISTAKEN, SILENT, HALF, STRANGE]
 )
 STRANGERS = "Outside the catalogue"
 
@@ -78,49 +78,49 @@ def test_a_record_reads_as_it_was_written(tmp_path):
     assert read(tmp_path / "report.json") == MIXED
 
 
-def test_the_page_sets_what_was_measured_beside_what_was_asked_for():
-    said = section(page([MIXED]), "Targets and measurements")
+def test_the_page_sets_what_was_measured_next_to_what_was_asked_for():
+    text = section(page([MIXED]), "Targets and measurements")
     assert (
-        "| single: right cause and joint first | >= 93 % | 50.0 % of 2 (9 to 91) | **no** |" in said
+        "| single: right cause and joint first | >= 93 % | 50.0 % of 2 (9 to 91) | **no** |" in text
     )
-    assert "| false alarms, nothing hidden | <= 1 % | 0.0 % of 1 (0 to 79) | yes |" in said
+    assert "| false alarms, nothing hidden | <= 1 % | 0.0 % of 1 (0 to 79) | yes |" in text
     assert (
         "| outside the catalogue: called unlisted | >= 85 % | 100.0 % of 1 (21 to 100) | yes |"
-        in said
+        in text
     )
-    assert "| data fault named |  | no cases |  |" in said
+    assert "| data fault named |  | no cases |  |" in text
     # (0.1² + 0.6² + 0.1²) / 3
-    assert "| Brier score | <= 0.06 | 0.127 | **no** |" in said
+    assert "| Brier score | <= 0.06 | 0.127 | **no** |" in text
 
 
 def test_the_page_says_that_seeds_were_never_tuned_on_only_where_that_is_so():
     assert "never tuned on" in page([MIXED])
-    tuned = Examination("python -m tests.blind", [*MIXED.scores, replace(FOUND, seed=100_000)])
-    for said in (page([tuned]), page([MIXED, tuned])):
-        assert "never tuned on" not in said
-        assert "**Not a report" in said
+    tuned = Examination("python -m tests.blind", [*MIXED.scores, replace(SCORE, seed=100_000)])
+    for text in (page([tuned]), page([MIXED, tuned])):
+        assert "never tuned on" not in text
+        assert "**Not a report" in text
 
 
 def test_every_wrong_answer_is_listed_by_kind_and_not_by_seed():
     again = replace(MISTAKEN, seed=540_005)
-    said = section(page([replace(MIXED, scores=[*MIXED.scores, again])]), "Every wrong answer")
-    assert "| backlash@knee | cogging@hip 2 |" in said
-    assert "| backlash@knee + cogging@hip | backlash@knee 1 |" in said
-    assert "50000" not in said
+    text = section(page([replace(MIXED, scores=[*MIXED.scores, again])]), "Every wrong answer")
+    assert "| backlash@knee | cogging@hip 2 |" in text
+    assert "| backlash@knee + cogging@hip | backlash@knee 1 |" in text
+    assert "50000" not in text
 
 
 def test_of_a_pair_one_may_be_named():
     assert "| one | 100.0 % of 1 (21 to 100) |" in section(page([MIXED]), "Pairs")
 
 
-def test_singles_are_told_by_the_examination_with_most_of_them_and_all_else_by_each():
+def test_singles_are_reported_by_the_examination_with_most_of_them_and_all_else_by_each():
     full = Examination(
         "python -m tests.blind --full --seeds reporting",
-        [replace(FOUND, seed=k) for k in (1, 2, 3)],
+        [replace(SCORE, seed=k) for k in (1, 2, 3)],
     )
-    said = page([MIXED, full])
+    text = page([MIXED, full])
     by_cause, seconds, outside = (
-        section(said, t) for t in ("By cause and joint", "Seconds a diagnosis", STRANGERS)
+        section(text, t) for t in ("By cause and joint", "Seconds a diagnosis", STRANGERS)
     )
     assert "Examination 2:\n\n|  | right | else |" in by_cause and "Examination 1" not in by_cause
     assert "Examination 1:" in seconds and "Examination 2:" in seconds
@@ -134,10 +134,10 @@ def test_a_page_of_machines_of_one_joint_says_so():
 
 
 def test_only_the_remark_on_probabilities_shows_the_picture():
-    said = page([replace(MIXED, command="python -m tests.blind --out {picture}")], "images/one.png")
-    assert "`python -m tests.blind --out {picture}`" in said
-    assert said.count("images/one.png") == 1 and "(images/one.png)" in section(
-        said, "Reliability of the probabilities"
+    text = page([replace(MIXED, command="python -m tests.blind --out {picture}")], "images/one.png")
+    assert "`python -m tests.blind --out {picture}`" in text
+    assert text.count("images/one.png") == 1 and "(images/one.png)" in section(
+        text, "Reliability of the probabilities"
     )
 
 

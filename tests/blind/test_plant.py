@@ -134,7 +134,7 @@ def test_a_transmission_winds_up_by_torque_over_stiffness(rig, excitation):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 @pytest.mark.parametrize("cuffs", [None, np.array([FIRM_CUFF] * 2)], ids=["one leg", "two legs"])
-def test_cuff_forces_tell_the_torque_that_the_wearer_takes(rig, excitation, cuffs, tilt):
+def test_cuff_forces_measure_the_torque_that_the_wearer_takes(rig, excitation, cuffs, tilt):
     from tests.blind.plant import _cuff_forces
 
     machine = rig.machine
@@ -148,11 +148,11 @@ def test_cuff_forces_tell_the_torque_that_the_wearer_takes(rig, excitation, cuff
     forces = _cuff_forces(quiet, plan, log, np.random.default_rng(0))
     geometry = Geometry(machine.leg.length, machine.leg.gravity, *machine.cuff_distance)
     q = log.link[:, :2]
-    told = cuff_torque(forces[:, 0] + forces[:, 1], forces[:, 2] + forces[:, 3], q, geometry)
+    measured = cuff_torque(forces[:, 0] + forces[:, 1], forces[:, 2] + forces[:, 3], q, geometry)
     taken = Body(rig.person.leg).inverse(
         q + np.array([tilt, 0.0]), log.link[:, 2:4], log.link[:, 4:6]
     )
-    assert np.sqrt(np.mean((told - taken) ** 2)) < (
+    assert np.sqrt(np.mean((measured - taken) ** 2)) < (
         1e-9 if cuffs is None else 0.04 * np.sqrt(np.mean(taken**2))
     )
 

@@ -124,7 +124,7 @@ def test_of_a_pair_both_have_to_be_named():
     assert not score(truth, answer_of(cause("cogging", "hip"))).right
 
 
-def test_what_is_too_small_of_a_pair_is_told_apart_and_not_right():
+def test_what_is_too_small_of_a_pair_is_counted_apart_and_not_right():
     truth, named = truth_of("pair", PLAY, ("cogging", "hip")), answer_of(cause("cogging", "hip"))
     missed = score(truth, named, {PLAY: 1.5})
     assert missed.unseen and not missed.right
@@ -159,26 +159,26 @@ def test_outside_the_catalogue_only_unknown_is_right():
 )
 def test_a_fault_is_named_by_file_joint_and_kind(file, channel, what, right):
     fault = {"fault": "stuck_encoder", "files": ["run_2.parquet"], "channel": "knee_angle_rad"}
-    said = {"file": file, "channel": channel, "what": what}
-    assert score(truth_of("fault", fault=fault), answer_of(faults=[said])).right is right
+    reported = {"file": file, "channel": channel, "what": what}
+    assert score(truth_of("fault", fault=fault), answer_of(faults=[reported])).right is right
 
 
 def test_a_refusal_that_says_the_fault_is_right():
     fault = {"fault": "degrees", "files": ["run_1.parquet"], "channel": "hip_angle_rad"}
     line = "run_1.parquet: column hip_angle_rad: 69.9 at row 3 looks like degrees"
-    found = score(truth_of("fault", fault=fault), answer_of(exit_code=2, message=line))
-    assert found.right
-    assert found.status == "refused"
+    scored = score(truth_of("fault", fault=fault), answer_of(exit_code=2, message=line))
+    assert scored.right
+    assert scored.status == "refused"
 
 
 def test_probabilities_intervals_and_floors_are_kept():
     inside = {"name": "play", "value": 0.031, "unit": "rad", "ci95": [0.029, 0.033]}
     named = cause(*PLAY, parameters=[inside]), cause("cogging", "hip", probability=0.4)
-    found = score(truth_of("single", PLAY), answer_of(*named))
-    assert found.probabilities == ((0.9, True), (0.4, False))
-    assert found.covered == (("backlash", "play", True),)
-    assert found.rmse_over_floor == pytest.approx({"hip": 1.1, "knee": 1.0})
-    assert found.floor_over_truth == pytest.approx({"hip": 1.0, "knee": 0.9})
+    scored = score(truth_of("single", PLAY), answer_of(*named))
+    assert scored.probabilities == ((0.9, True), (0.4, False))
+    assert scored.covered == (("backlash", "play", True),)
+    assert scored.rmse_over_floor == pytest.approx({"hip": 1.1, "knee": 1.0})
+    assert scored.floor_over_truth == pytest.approx({"hip": 1.0, "knee": 0.9})
 
 
 def test_the_report_counts_what_was_scored():
@@ -238,7 +238,7 @@ def finding(family, joint, probability=0.8):
 
 
 @pytest.mark.parametrize(
-    ("told", "right"),
+    ("findings", "right"),
     [
         ([finding("angle", "knee")], True),
         ([finding("time", "hip"), finding("reversal", "knee")], True),
@@ -249,11 +249,11 @@ def finding(family, joint, probability=0.8):
         ([], False),
     ],
 )
-def test_a_family_is_right_at_its_joint_where_it_is_likely(told, right):
+def test_a_family_is_right_at_its_joint_where_it_is_likely(findings, right):
     truth = truth_of("outside", ("outside:friction_by_other_joint", "knee"))
     truth["hidden"][0]["families"] = ["angle", "reversal"]
     answer = answer_of(status="unknown_cause")
-    answer["verdict"]["findings"] = told
+    answer["verdict"]["findings"] = findings
     assert score(truth, answer).family_right is right
 
 
@@ -263,7 +263,7 @@ def test_a_verdict_without_findings_has_no_family():
     assert score(truth, answer_of(status="unknown_cause")).family_right is None
 
 
-def test_an_unlikely_cause_beside_an_unknown_one_is_no_wrong_name():
+def test_an_unlikely_cause_with_an_unknown_one_is_no_wrong_name():
     truth = truth_of("outside", ("outside:tone", "knee"))
     named = [cause("cogging", "knee", probability=p) for p in (0.3, 0.7)]
     assert score(truth, answer_of(named[0], status="partly_explained")).right
@@ -285,8 +285,8 @@ def test_the_truths_probability_is_read_off_the_posterior(category, hidden, prob
     answer = answer_of(cause(*PLAY))
     causes = {"backlash@knee": 0.7, "base_tilt": 0.05}
     answer["verdict"]["posterior"] = {"nothing_missing": 0.2, "unlisted": 0.3, "causes": causes}
-    found = score(truth_of(category, *hidden), answer).log_probability
-    assert found == pytest.approx(math.log(probability))
+    log_probability = score(truth_of(category, *hidden), answer).log_probability
+    assert log_probability == pytest.approx(math.log(probability))
 
 
 def test_a_gap_that_the_file_declares_is_no_false_alarm():

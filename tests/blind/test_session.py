@@ -40,9 +40,9 @@ def faultless(tmp_path_factory):
 def test_exoid_fits_a_faultless_session_to_its_noise(faultless):
     session, paths = faultless
     runs = read_motions(paths)
-    found = identify(runs)
-    left = pa.concat_tables(residuals(runs, found.model_of, "baseline")).to_pandas()
-    scored = left[left["scored"] & (left["purpose"] == "validate")]
+    identified = identify(runs)
+    residual = pa.concat_tables(residuals(runs, identified.model_of, "baseline")).to_pandas()
+    scored = residual[residual["scored"] & (residual["purpose"] == "validate")]
     floor = noise_floor(session.rig, session.of("validate"))
     for joint, noise in zip(("hip", "knee"), floor, strict=True):
         assert np.sqrt(np.mean(scored[f"{joint}_residual_nm"] ** 2)) == pytest.approx(
@@ -124,8 +124,8 @@ def test_recordings_say_nothing_of_the_truth(tmp_path):
     for path in (tmp_path / "recordings").iterdir():
         assert path.name in {f"run_{i}.parquet" for i in (1, 2, 3, 4)}
         schema = pq.read_schema(path)
-        said = " ".join([*schema.names, *(v.decode() for v in schema.metadata.values())])
-        assert not [secret for secret in secrets if secret in said]
+        text = " ".join([*schema.names, *(v.decode() for v in schema.metadata.values())])
+        assert not [secret for secret in secrets if secret in text]
         header = json.loads(schema.metadata[b"exoid"])
         assert set(header) == {
             "contract",
@@ -143,12 +143,12 @@ def test_every_cause_of_the_contract_can_be_hidden(pytestconfig):
     page = (pytestconfig.rootpath / "docs" / "contracts.md").read_text()
     table = page.split("## The causes' names")[1].split("\n## ")[0]
     named = {line.split("`")[1] for line in table.splitlines() if line.startswith("| `")}
-    # No motion tells a rotor's coupling from the shank's and the rotor's inertia: nothing could
+    # No motion separates a rotor's coupling from the shank's and the rotor's inertia: nothing could
     # name it.
     assert set(CAUSES) >= named - {"rotor_coupling"}
 
 
-def test_causes_have_forms_beside_the_catalogues():
+def test_causes_have_forms_other_than_the_catalogues():
     assert all(any(not f.own for f in forms) for forms in FORMS.values())
 
 

@@ -51,8 +51,8 @@ def test_a_table_is_the_motion_to_within_a_count(drawn):
     motion = drawn[0]
     t = np.random.default_rng(SEED).uniform(-LEAD_IN_S, LENGTH_S, 300)
     table = motion.table(LENGTH_S)
-    told = [[tabulated(table, at, j) for j in (0, 1)] for at in t]
-    assert_allclose(told, motion.at(t)[0], atol=5e-5)
+    tabulated_motion = [[tabulated(table, at, j) for j in (0, 1)] for at in t]
+    assert_allclose(tabulated_motion, motion.at(t)[0], atol=5e-5)
 
 
 def test_the_papers_hip_is_one_sine():

@@ -12,7 +12,7 @@ from tests.blind.people import Person
 from tests.blind.plan import HIP, KNEE
 
 BENT = Leg(Segment(4.0, 0.2, 0.05, 0.03), Segment(2.5, 0.18, 0.03, -0.05), 0.41)
-"""A leg whose centres of mass lie beside their axes."""
+"""A leg whose centres of mass lie off their axes."""
 LUMP_KG, LUMP_M = 1.3, 0.27
 
 

@@ -9,15 +9,15 @@ from tests.blind.units import POWERS, Units
 SIZE = 0.1
 
 
-def told_by(effect):
-    """Return the names of the parameters that the forms of a cause tell."""
+def parameters_by(effect):
+    """Return the names of the parameters of a cause's forms."""
     rng = np.random.default_rng(900_000)
-    drawn = [made(rng, joint) for made in FORMS[effect] for joint in joints_of(effect)]
+    drawn = [form(rng, joint) for form in FORMS[effect] for joint in joints_of(effect)]
     return {name for cause in drawn for name in cause.parameters(SIZE)}
 
 
-def test_the_table_has_what_causes_tell_and_nothing_else():
-    assert {(effect, name) for effect in FORMS for name in told_by(effect)} == set(POWERS)
+def test_the_table_has_the_parameters_of_causes_and_nothing_else():
+    assert {(effect, name) for effect in FORMS for name in parameters_by(effect)} == set(POWERS)
 
 
 def test_play_of_a_slide_is_a_length():

@@ -84,10 +84,10 @@ def energy(rig, joints, log, rotors):
 def test_free_swing_keeps_its_energy(world):
     rig, joints, log = free_swing(world, [0.9, -1.1], 1000)
     rotors = joints.inertia if world is two_mass else np.array([rig.machine.hip_rotor, 0.0])
-    told = energy(rig, joints, log, rotors)
+    energies = energy(rig, joints, log, rotors)
     moved = np.ptp(0.5 * rotors @ log.link[:, 2:4].T ** 2) + np.ptp(log.link[:, 0])
     assert moved > 0.5
-    assert np.ptp(told) < 0.01 * np.ptp(log.link[:, 2] ** 2)
+    assert np.ptp(energies) < 0.01 * np.ptp(log.link[:, 2] ** 2)
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -98,10 +98,12 @@ def test_a_rig_with_nothing_hidden_reports_what_mujoco_needs(name):
     motion = random_trajectory(rng(3), 12.0, True, "gait")
     r = world.record(rig, motion, Plan(), run, rng(4), replace(QUIET, duration_s=12.0))
     moving = r.moving()
-    left = np.array([np.sqrt(np.mean(r.blocks(r.effect)[moving[:, j], j] ** 2)) for j in (0, 1)])
+    residual = np.array(
+        [np.sqrt(np.mean(r.blocks(r.effect)[moving[:, j], j] ** 2)) for j in (0, 1)]
+    )
     torque = np.sqrt(np.mean(r.clean_torque**2, axis=0))
     # The gears and the cuffs of two masses give way a little, all the time.
-    assert np.all(left < (0.02 if name == "two_mass" else 0.0005) * torque)
+    assert np.all(residual < (0.02 if name == "two_mass" else 0.0005) * torque)
     if name == "planar":
         q, dq, ddq = (np.ascontiguousarray(r.link[:, 2 * i : 2 * i + 2]) for i in range(3))
         needed = Body(rig.leg(run)).inverse(q, dq, ddq)
@@ -130,11 +132,11 @@ def test_bristles_stick_where_regularised_friction_creeps():
     assert min(slow) > 0.02
 
 
-def test_cuffs_told_by_the_metre_have_the_stiffness_about_their_joints():
+def test_cuffs_given_by_the_metre_have_the_stiffness_about_their_joints():
     levers = np.array([0.25, 0.2, 0.4])
-    told = per_metre(np.array([[9000.0, 10.0, 5.0, 0.01, 0.1, 1.0]] * 2), levers)
-    assert told[:, 0] * levers[:2] ** 2 == pytest.approx(9000.0)
-    assert told[:, 3] / levers[:2] == pytest.approx(0.01)
+    cuffs = per_metre(np.array([[9000.0, 10.0, 5.0, 0.01, 0.1, 1.0]] * 2), levers)
+    assert cuffs[:, 0] * levers[:2] ** 2 == pytest.approx(9000.0)
+    assert cuffs[:, 3] / levers[:2] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(
@@ -178,8 +180,8 @@ def test_recordings_of_every_world_keep_the_contract_and_their_secret(faultless)
         assert table.metadata["sample_rate_hz"] == session.conditions.rate_hz
         assert ("period_s" in table.metadata) == session.conditions.says_period
         schema = pq.read_schema(path)
-        said = " ".join([*schema.names, *(v.decode() for v in schema.metadata.values())])
-        assert not [secret for secret in secrets if secret in said]
+        text = " ".join([*schema.names, *(v.decode() for v in schema.metadata.values())])
+        assert not [secret for secret in secrets if secret in text]
 
 
 def test_every_effect_has_three_forms_and_the_new_worlds_have_forms_of_their_own():

@@ -165,10 +165,10 @@ def _printed() -> dict:
 def _paper(rng: Generator, period: float, duration_s: float, periodic: bool):
     """Return the paper's motion, whose hip is one sine; not as printed but for its phases and its
     pace."""
-    told = _printed()
-    a, b = np.radians(told["a"]), np.radians(told["b"])
-    middle = np.array(told["theta0_rad"])
-    pace = rng.uniform(1.0, 1.35) * told["omega_rad_s"]
+    printed = _printed()
+    a, b = np.radians(printed["a"]), np.radians(printed["b"])
+    middle = np.array(printed["theta0_rad"])
+    pace = rng.uniform(1.0, 1.35) * printed["omega_rad_s"]
     omega = pace * np.tile([1.0, 2.0], (2, 1))
     turn = rng.uniform(-0.4, 0.4, (2, 1))
     a, b = a * np.cos(turn) - b * np.sin(turn), a * np.sin(turn) + b * np.cos(turn)

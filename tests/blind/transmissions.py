@@ -53,15 +53,15 @@ def _soft_plus(x):
 
 
 def per_metre(cuffs: NDArray, levers: NDArray) -> NDArray:
-    """Return cuffs told by angles about their joints, (2, 6) as ``Plan.cuffs``, by the metre of a
-    cuff's way.
+    """Return cuffs by the metre of a cuff's way, from those by angles about their joints, (2, 6) as
+    ``Plan.cuffs``.
 
     Columns: stiffness, damping, hardening, slack, relaxing share, relaxation time.
     """
-    told = cuffs.copy()
-    told[:, :3] /= levers[:2, np.newaxis] ** 2
-    told[:, 3] *= levers[:2]
-    return told
+    result = cuffs.copy()
+    result[:, :3] /= levers[:2, np.newaxis] ** 2
+    result[:, 3] *= levers[:2]
+    return result
 
 
 @njit()

@@ -98,7 +98,7 @@ class TwoMassMachine:
 
     @property
     def ripple_cycles(self) -> NDArray:
-        """No part of this world's ripple goes with angles."""
+        """No part of this world's ripple depends on angles."""
         return np.zeros(2)
 
     def tuned_for_soft(self, joint: int) -> "TwoMassMachine":
@@ -109,9 +109,9 @@ class TwoMassMachine:
 
     def gains(self, leg: Leg) -> tuple[NDArray, NDArray]:
         """Return stiffness and damping (2,) of position control of a leg."""
-        felt = np.diag(_mass(two_link.coefficients(leg), -0.9)) + self.rotors
-        kp = np.clip(felt * self.frequency**2, [250.0, 120.0], [1600.0, 800.0])
-        kd = 2.0 * self.damping_ratio * np.sqrt(kp * felt)
+        inertias = np.diag(_mass(two_link.coefficients(leg), -0.9)) + self.rotors
+        kp = np.clip(inertias * self.frequency**2, [250.0, 120.0], [1600.0, 800.0])
+        kd = 2.0 * self.damping_ratio * np.sqrt(kp * inertias)
         most = np.where(self.softened, SOFT_DAMPING, 2500.0) * self.rotors
         return kp, np.minimum(kd, most)
 
@@ -354,9 +354,9 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
             for j in range(2):
                 out.link_acceleration[k, j] += a[j] / sample_steps
                 out.wound[k, j] += (th[j] - q[j]) / sample_steps
-                told = motor_a[j] * slope(d.wobble[j], th[j])
-                told += curvature(d.wobble[j], th[j]) * om[j] * om[j]
-                out.acceleration[k, j] += told / sample_steps
+                measured = motor_a[j] * slope(d.wobble[j], th[j])
+                measured += curvature(d.wobble[j], th[j]) * om[j] * om[j]
+                out.acceleration[k, j] += measured / sample_steps
             if s % sample_steps == sample_steps // 2:
                 k = s // sample_steps
                 for j in range(2):
@@ -378,11 +378,11 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
 
 @njit()
 def _latch(out, k, j, d, theta, omega):
-    """Log a motor's angle and speed as its encoder tells them."""
-    told = reading(d.offset[j], d.wobble[j], theta)
+    """Log a motor's angle and speed as its encoder reads them."""
+    angle = reading(d.offset[j], d.wobble[j], theta)
     count = d.recorded_count[j]
-    out.angle[k, j] = told
-    out.reading[k, j] = count * np.round(told / count) if count > 0.0 else told
+    out.angle[k, j] = angle
+    out.reading[k, j] = count * np.round(angle / count) if count > 0.0 else angle
     out.speed[k, j] = omega * slope(d.wobble[j], theta)
 
 

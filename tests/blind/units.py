@@ -44,8 +44,8 @@ POWERS: dict[tuple[str, str], tuple[int, int]] = {
     ("encoder_eccentricity", "amplitude_twice"): (0, 1),
     ("torque_cross_talk", "coupling"): (0, 0),
 }
-"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused,
-not taken as it is."""
+"""Powers of torque and of angle of every parameter of a cause; a missing one is refused, not
+taken as it is."""
 
 
 @dataclass(frozen=True)

@@ -333,14 +333,13 @@ def test_a_floor_changes_no_ratio_within_the_sets_that_hold_the_group_or_lack_it
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():
-    """Each of them explains a part; neither is what cannot be told from the named one."""
+    """Each of them explains a part; neither is a tie of the named one."""
     (named,) = answer_of(weighed(_0=0.5, _2=0.2, _45=0.3)).named
     assert [label for label, _ in named.ties] == ["quadratic_drag@hip"]
 
 
 def test_equals_that_a_third_cause_may_join_stay_equals():
-    """What a set says of the named cause beside a third one, it says of the rival beside the third
-    one."""
+    """A set's probability of the named cause with a third one is the rival's with the third one."""
     (named,) = answer_of(weighed(_2=0.3, _02=0.15, _3=0.25, _03=0.2, _=0.1)).named
     assert dict(named.ties) == pytest.approx({"stribeck_friction@hip": 0.45})
 

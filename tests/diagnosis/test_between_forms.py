@@ -1,5 +1,4 @@
-"""A bumper whose exponent lies between those that are tried: what is told of it holds the truth all
-the same."""
+"""A bumper whose exponent lies between those that are tried: its intervals still hold the truth."""
 
 import pytest
 

@@ -55,7 +55,7 @@ def test_where_nothing_is_missing_all_runs_show_nothing_either():
 
 
 def test_a_payload_that_only_a_validation_run_carries_is_missing_and_not_named():
-    """No training run tells its mass: fitted to these it explains nothing."""
+    """No training run shows its mass: fitted to these it explains nothing."""
     runs = session(seed=7)
     loaded = session("payload_change", "knee", seed=7, mass_moment=0.5, time=0.0)
     outcome = verdict(diagnose([*runs[:3], loaded[3]]))

@@ -14,7 +14,7 @@ from tests.diagnosis.sessions import SLOW, recordings, session
 
 
 def labels(cause):
-    """Return a cause and what it is said not to be told from."""
+    """Return a cause and its ties."""
     return {(c["effect"], c["joint"]) for c in (cause, *cause["indistinguishable_from"])}
 
 
@@ -80,7 +80,7 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     np.testing.assert_allclose(diagnosis.after.errors.rms, diagnosis.floor_rms, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
     assert diagnosis.unrealizable == []
-    # A peak of friction and its level are told apart by how it falls with speed alone; the others
+    # A peak of friction and its level are separated by how it falls with speed alone; the others
     # stand for themselves.
     assert ["knee coulomb" in sentence for sentence in diagnosis.collinear] == [True] * (
         effect == "stribeck_friction"

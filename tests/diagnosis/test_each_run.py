@@ -1,4 +1,4 @@
-"""A joint that is zeroed anew at every start: each run has an offset of its own, and the verdict
+"""A joint that is zeroed again at every start: each run has an offset of its own, and the verdict
 finds them all.
 
 The hidden offsets are added to recorded angles, by no code of the effect's.
@@ -32,8 +32,7 @@ HIDDEN = {
 
 
 def zeroed(motion, offset):
-    """Return a motion whose knee was zeroed ``offset`` rad beside its zero: what is commanded is
-    counted from there."""
+    """Return a motion whose knee was zeroed ``offset`` rad off; commands count from there."""
     shift = np.array([0.0, offset])
     angles = {name: getattr(motion, name) + shift for name in ("q", "measured_angle", "reference")}
     return replace(motion, **angles)
@@ -133,7 +132,7 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_reported_of_those_alone_ea
     assert [one["file"] for one in values["torque_drift@hip"]] == [
         f"run_{k}.parquet" for k in (0, 2, 3, 1)
     ]
-    # A run alone, all else held, tells the same of itself as the fit of all does.
+    # A run alone, all else held, has the same values as in the fit of all.
     for run in train:
         for term in settled(fitted, run, baseline):
             names = [p.name for p in term.effect.parameters]
@@ -146,8 +145,8 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_reported_of_those_alone_ea
 
 
 def drawn(seed):
-    """Return offsets of four runs, those of the two training runs to opposite sides: of two that
-    are nearly equal no data tell that they are not one."""
+    """Return offsets of four runs, those of the two training runs to opposite sides: two that
+    are nearly equal look like one."""
     draw = np.random.default_rng(seed)
     signs = draw.choice([-1.0, 1.0], 4)
     signs[2] = -signs[0]

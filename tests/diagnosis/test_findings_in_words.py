@@ -1,4 +1,4 @@
-"""What the verdict says of each finding: its words, its path, and the unlisted laws beside it."""
+"""What the verdict says of each finding: its words, its path, and its unlisted laws."""
 
 from itertools import pairwise
 from types import SimpleNamespace

@@ -53,7 +53,7 @@ def steeper_than_squared(t, q, dq, ddq, own):
     return 0.2 * np.sign(dq) * np.abs(dq) ** 2.6
 
 
-PEAK = "a Stribeck peak of probability 0.50 is named beside a drag of another exponent than ours"
+PEAK = "a Stribeck peak of probability 0.50 is named with a drag of another exponent than ours"
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_what_a_cause_of_another_form_leaves_is_reported_with_its_variable(kind)
 
 
 @pytest.mark.xfail(
-    strict=True, reason="a wide Stribeck peak is named where friction falls away from nought"
+    strict=True, reason="a wide Stribeck peak is named where friction falls away from zero"
 )
 @pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
 def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
@@ -124,7 +124,7 @@ def test_a_lift_of_which_nothing_is_hidden_misses_nothing():
 
 
 def test_a_drift_at_a_lift_is_reported_by_its_rate_and_its_weight_stays_its_own():
-    """Where a force that never changes is the weight's, a level beside it could be anything."""
+    """Where a force that never changes is the weight's, a further level could be anything."""
     outcome = verdict_of("prismatic", lambda t, *motion: 0.02 * t)
     (cause,) = outcome["causes"]
     rate, level = cause["parameters"]

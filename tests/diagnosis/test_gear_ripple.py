@@ -1,5 +1,4 @@
-"""A gear that ripples at several lines beside friction that builds up over a travel: both are
-named."""
+"""A gear with several ripple lines, and friction that builds up over a travel: both are named."""
 
 from dataclasses import replace
 

@@ -112,8 +112,8 @@ def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newton
 
 
 def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_named():
-    """A spring is added to the training run alone, beside friction that differs with direction in
-    both."""
+    """A spring is added to the training run alone, and both have friction that differs with
+    direction."""
     train, validate = motions(slide, asymmetry=-80.0)
     diagnosis = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
     both = naming(diagnosis, "viscous_asymmetry@axis", "parallel_spring@axis")

@@ -111,7 +111,7 @@ def test_what_never_came_and_what_was_always_there_needs_no_coincidence(run):
 
 @pytest.mark.parametrize("begun", [3.0, 20.0, 37.0, NEVER])
 def test_an_instant_is_found_from_wherever_the_search_begins(begun):
-    """Beside a run in which it is known, so that the amplitude is."""
+    """With a run in which it is known, so that the amplitude is."""
     runs = observed(handed("train", 5, 17.3), handed("train", 6, 29.1))
     result, baseline = fitted(runs, (17.3, begun))
     assert [shape[0] for shape in result.causes[0].shapes] == pytest.approx([17.3, 29.1], abs=0.4)

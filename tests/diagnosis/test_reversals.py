@@ -1,5 +1,6 @@
-"""At reversals: friction that builds up over a travel is told from one that sticks, on the plant of
-the blind test."""
+"""At reversals, friction that builds up over a travel is separated from one that sticks.
+
+The plant is that of the blind test."""
 
 from dataclasses import replace
 

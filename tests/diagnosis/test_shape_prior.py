@@ -50,8 +50,8 @@ def test_waves_and_onsets_were_sought_among_many_values_and_an_onset_that_never_
 
 
 def test_a_torque_channel_is_never_early():
-    """What is typically nought or more is refined down to nought, what may have either sign beyond
-    its range."""
+    """A shape that is typically zero or more is refined down to zero, one of either sign beyond its
+    range."""
     assert reach(TimeDelay("knee").shape[0])[0] == 0.0
     low, high = EncoderOffset("knee").shape[0].typical
     assert reach(EncoderOffset("knee").shape[0]) == pytest.approx(

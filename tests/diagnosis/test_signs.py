@@ -1,5 +1,5 @@
-"""A reversed sign at a machine of one joint is told as acquisition; a machine wired as it should be
-never is."""
+"""A reversed sign at a machine of one joint is a fault of acquisition; a machine wired as it should
+be has none."""
 
 from dataclasses import replace
 from functools import cache

@@ -200,8 +200,8 @@ def test_the_torque_that_an_error_is_of_is_given_on_the_samples_of_the_error(stu
 
 
 def odds_in_words(d, rival):
-    """Say how much less likely a torque offset is that has this probability, beside a spring that
-    has the rest."""
+    """Return in words how much less likely a torque offset of this probability is than a spring
+    with the rest."""
     elements = d.selected.posterior.elements
     spring = elements.index(d.named[0].element)
     offset = next(i for i, element in enumerate(elements) if element.label == "torque_offset@knee")

@@ -54,7 +54,7 @@ def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):
     before, after = observe(fast), observe(thin)
     assert_allclose(after.time, before.time, atol=1e-9)
     assert_allclose(after.measured[:, :2], before.measured[:, :2], atol=1e-9)
-    # The cuffs' torque also goes with the angle, which moves 2 ms within an average.
+    # The cuffs' torque also depends on the angle, which moves 2 ms within an average.
     assert_allclose(after.measured[:, 2:], before.measured[:, 2:], atol=1e-4)
     assert_allclose(after.state[0], before.state[0], atol=1e-9)
 

@@ -1,5 +1,5 @@
-"""A load behind a soft or loose transmission swings, and its mass has to be known: that of the fit
-beside it."""
+"""A load behind a soft or loose transmission swings, and its mass has to be known: that of the same
+fit."""
 
 from dataclasses import replace
 

@@ -33,7 +33,7 @@ right before."""
 
 @dataclass(frozen=True)
 class Part:
-    """What was left out, and how well the truth of it is told."""
+    """A part that was left out, and the probability of its truth."""
 
     name: str
     revisions: str

@@ -66,7 +66,7 @@ def current_revision() -> str:
 
 
 def _stored_revision(place: Path) -> str | None:
-    """Return the revision that made a row; None where there is none, or it does not tell."""
+    """Return the revision that made a row; None where there is none, or it has no revision."""
     if not place.exists() or "revision" not in pq.read_schema(place).names:
         return None
     return str(pq.read_table(place, columns=["revision"])["revision"][0].as_py())

@@ -21,7 +21,7 @@ from tests.learn.search import ascend
 from tests.learn.vector import from_vector, names, to_vector
 
 ROUNDS = 2
-"""Times that the sets which matter are sought anew, under the criteria learned so far."""
+"""Times that the sets which matter are sought again, under the criteria learned so far."""
 
 
 def learn(
@@ -93,9 +93,9 @@ def _reduced(job: tuple[dict[str, Any], Criteria, set[int]]) -> Session | None:
 
 def sets_of(sessions: Sequence[Session]) -> Sets:
     """Return what the prior's fit needs of sessions."""
-    told = padded([session.features for session in sessions], 0.0)
+    features = padded([session.features for session in sessions], 0.0)
     right = padded([session.right.astype(float) for session in sessions], 0.0)
-    return Sets(told, right, _weights(sessions))
+    return Sets(features, right, _weights(sessions))
 
 
 def _weights(sessions: Sequence[Session]) -> NDArray:
@@ -112,8 +112,8 @@ def ascended(weigh: LogEvidence, sets: Sets, criteria: Criteria) -> tuple[Criter
     began, places = time.monotonic(), names()
 
     def score(vector: NDArray) -> tuple[float, NDArray]:
-        found, value = sets.fit(weigh(from_vector(vector, criteria)), prior)
-        return value, found
+        prior_weights, value = sets.fit(weigh(from_vector(vector, criteria)), prior)
+        return value, prior_weights
 
     def report(place: int, value: float) -> None:
         print(f"{time.monotonic() - began:6.0f} s {places[place]:24s} {value:.4f}", flush=True)

@@ -90,7 +90,7 @@ def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
         return float(PENALTY * criteria @ criteria - fitted)
 
     # A cause that removes more is never more likely to be a look-alike: the slope is not negative.
-    found = minimize(
+    minimum = minimize(
         loss, np.array(CRITERIA.look_alike), method="L-BFGS-B", bounds=[(None, None), (0.0, None)]
     )
     worth = {
@@ -98,10 +98,10 @@ def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
         for name, criteria in (
             ("without", None),
             ("now", CRITERIA.look_alike),
-            ("learned", found.x),
+            ("learned", minimum.x),
         )
     }
-    return {"causes": len(p), "look_alike": [float(x) for x in found.x], **worth}
+    return {"causes": len(p), "look_alike": [float(x) for x in minimum.x], **worth}
 
 
 def _worth(probability: NDArray, right: NDArray) -> dict[str, float | None]:

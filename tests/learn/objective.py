@@ -72,14 +72,14 @@ def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
     )
 
 
-def _kept(found: Posterior, right: Right) -> list[Set]:
+def _kept(weighed: Posterior, right: Right) -> list[Set]:
     """Return the most probable sets, and the most probable right ones."""
 
     def labels(chosen: Set) -> frozenset[str]:
-        return frozenset(found.elements[i].label for i in chosen)
+        return frozenset(weighed.elements[i].label for i in chosen)
 
-    true = [chosen for chosen in found.sets if right(labels(chosen))][: SETS // 4]
-    return list(dict.fromkeys((*found.sets[:SETS], *true, ())))
+    true = [chosen for chosen in weighed.sets if right(labels(chosen))][: SETS // 4]
+    return list(dict.fromkeys((*weighed.sets[:SETS], *true, ())))
 
 
 def _compact(
@@ -114,8 +114,8 @@ def _compact(
     chosen = tuple(tuple(number[i] for i in s) for s in sets)
     true = np.array([right(frozenset(own[i].label for i in s)) for s in chosen])
     of_elements = [features(e, evidence.auxiliary) for e in own]
-    told = np.array([of_set([of_elements[i] for i in s]) for s in chosen])
-    return small, chosen, true, told
+    set_features = np.array([of_set([of_elements[i] for i in s]) for s in chosen])
+    return small, chosen, true, set_features
 
 
 def log_evidence(session: Session, criteria: Criteria) -> NDArray:

@@ -13,7 +13,7 @@ from pipelines.diagnosis.selection.prior import FEATURES
 FLOOR = 1e-4
 """Probability that a truth has at least: one hopeless session must not decide."""
 SPREAD = 3.0
-"""Standard deviation of the weights about those at the start: keeps one that nothing tells of."""
+"""Standard deviation of the weights about those at the start: keeps one without evidence."""
 POSITIVE = ("coherence",)
 """Weights that are not negative: evidence for a cause never makes it less likely."""
 
@@ -57,5 +57,5 @@ class Sets:
             if name in HELD
         }
         bounds = list((free | held).values())
-        found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds)
-        return found.x, float(self.weights @ self.scores(evidence, found.x))
+        minimum = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds)
+        return minimum.x, float(self.weights @ self.scores(evidence, minimum.x))

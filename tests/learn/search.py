@@ -16,8 +16,8 @@ def ascend(
     start: NDArray,
     report: Callable[[int, float], None] = lambda place, value: None,
 ) -> tuple[NDArray, float, NDArray]:
-    """Return the best vector found, its score, and what else the score told there."""
-    best, (value, told), step = start.copy(), score(start), FIRST_STEP
+    """Return the best vector, its score, and the details of the score there."""
+    best, (value, details), step = start.copy(), score(start), FIRST_STEP
     last = np.ones(len(start))
     while step > LAST_STEP:
         for place in range(len(start)):
@@ -26,9 +26,9 @@ def ascend(
                 tried[place] += way * step
                 now, also = score(tried)
                 if now > value:
-                    best, value, told = tried, now, also
+                    best, value, details = tried, now, also
                     last[place] = way
                     report(place, value)
                     break
         step *= 0.6
-    return best, value, told
+    return best, value, details

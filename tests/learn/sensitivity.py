@@ -39,7 +39,7 @@ in full; one of several values is then not there; all else is zero. Eight number
 act before evidence is stored, the base rate is the sessions' own, and four change no
 probability."""
 NOT_MEASURED = (*BEFORE_EVIDENCE, "base_rate", "likely", "tied", "at_floor", "left_of_explained")
-"""Criteria of which the probability of the truth, given stored evidence, tells nothing."""
+"""Criteria that do not change the probability of the truth, given stored evidence."""
 NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "lines": 1.0, "shape_sd": 1e-6}
 """Neutral values, where they are not zero."""
 
@@ -53,11 +53,13 @@ def sensitivity(
         sessions = list(sessions_of(root, worlds, set(), most, pool, criteria))
     weigh, sets = LogEvidence(sessions, workers), sets_of(sessions)
     as_it_is = weigh(criteria)
-    score, share = told_of(sets, as_it_is, criteria)
+    score, share = score_and_share(sets, as_it_is, criteria)
     rows = []
     for name, *changed in changes(criteria):
         by_prior = name in FEATURES
-        results = [told_of(sets, as_it_is if by_prior else weigh(one), one) for one in changed]
+        results = [
+            score_and_share(sets, as_it_is if by_prior else weigh(one), one) for one in changed
+        ]
         scores = [f"{own - score:+.3f}" for own, _ in results]
         shares = [f"{100.0 * (own - share):+.1f} %" for _, own in results]
         rows.append([f"`{name}`", *scores, *shares])
@@ -87,7 +89,7 @@ def changes(criteria: Criteria) -> Iterator[tuple[str, Criteria, Criteria, Crite
             )
 
 
-def told_of(sets: Sets, evidence: NDArray, criteria: Criteria) -> tuple[float, float]:
+def score_and_share(sets: Sets, evidence: NDArray, criteria: Criteria) -> tuple[float, float]:
     """Return the mean log probability of the truth, and how often it is the most probable set.
 
     Parameters

@@ -18,7 +18,7 @@ from tests.learn.vector import from_vector, names, to_vector
 
 
 def sessions(count: int = 200) -> tuple[Sets, np.ndarray]:
-    """Return sessions of a law and a cause each beside nothing; the truth is a cause in one of
+    """Return sessions of a law, a cause and the empty set; the truth is a cause in one of
     four."""
     rng = np.random.default_rng(5)
     features = np.zeros((count, 3, len(FEATURES)))
@@ -90,7 +90,7 @@ def test_a_set_is_right_where_it_holds_each_hidden_cause_and_nothing_else():
     assert not right_sets(truth("imperfect"))(frozenset({"backlash@knee"}))
 
 
-def test_a_cause_that_no_data_can_tell_from_the_hidden_one_is_as_right():
+def test_a_cause_that_no_data_can_separate_from_the_hidden_one_is_as_right():
     offset = right_sets(truth("single", hidden("torque_offset", "knee")))
     assert offset(frozenset({"coulomb_asymmetry@knee"}))
     assert not offset(frozenset({"coulomb_asymmetry@hip"}))
@@ -117,7 +117,7 @@ def test_each_world_and_each_fold_of_forms_is_left_out_once():
     assert left_out["forms of fold 2"] == []
 
 
-def test_learning_anew_starts_from_nothing_that_was_learned():
+def test_learning_again_starts_from_nothing_that_was_learned():
     start = away(CRITERIA)
     np.testing.assert_allclose(to_vector(start) - to_vector(CRITERIA), np.log(AWAY))
     assert start.cause == start.law == start.further == 0.0

@@ -1,4 +1,4 @@
-"""What would be right of one session: which sets of labels, told by its truth file."""
+"""The right answers of one session: sets of labels, from its truth file."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -9,14 +9,14 @@ ALIKE = (
     {"torque_offset", "coulomb_asymmetry"},
     {"base_tilt", "encoder_offset"},
 )
-"""Causes that no data can tell apart, at one joint."""
+"""Causes that no data can separate, at one joint."""
 NOTHING = ("none", "imperfect")
 
 Right = Callable[[frozenset[str]], bool]
 
 
 def right_sets(truth: Mapping[str, Any]) -> Right:
-    """Return what tells whether a set of labels is the truth."""
+    """Return a function of a set of labels: whether it is the truth."""
     category = truth["case"]["category"]
     if category in NOTHING:
         return lambda labels: not labels
@@ -34,18 +34,18 @@ def label_of(hidden: Mapping[str, Any]) -> str:
 
 
 def _matched(labels: Iterable[str], accepted: list[set[str]]) -> bool:
-    """Tell whether each label stands for another of the hidden causes."""
-    left = list(accepted)
+    """Return whether each label stands for another of the hidden causes."""
+    remaining = list(accepted)
     for label in labels:
-        fitting = next((own for own in left if label in own), None)
+        fitting = next((own for own in remaining if label in own), None)
         if fitting is None:
             return False
-        left.remove(fitting)
+        remaining.remove(fitting)
     return True
 
 
 def _tied(label: str, truth: Mapping[str, Any]) -> set[str]:
-    """Return labels that no data of this session can tell from one."""
+    """Return labels that no data of this session can separate from one."""
     name, _, joint = label.partition("@")
     tied = set()
     for names in ALIKE:

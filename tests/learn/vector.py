@@ -33,11 +33,13 @@ def from_vector(vector: NDArray, like: Criteria) -> Criteria:
 
 def _places(criteria: Criteria) -> list[tuple[str, int, bool, float]]:
     """Return name, number, whether there are several, and value."""
-    found = []
+    places = []
     for field in fields(Criteria):
         value = getattr(criteria, field.name)
         if field.name in (*FEATURES, *HELD):
             continue
         several = isinstance(value, tuple)
-        found += [(field.name, k, several, v) for k, v in enumerate(value if several else (value,))]
-    return found
+        places += [
+            (field.name, k, several, v) for k, v in enumerate(value if several else (value,))
+        ]
+    return places

@@ -31,41 +31,44 @@ def written(page: str, name: str, measured: str) -> str:
     return between.sub(lambda old: f"\n{measured}\n\n", page, count=1)
 
 
-def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
+def measured(diagnoses: dict[str, Diagnosed], data: Path) -> dict[str, str]:
     """Return each table of the page whose machines were diagnosed."""
-    made = {"verdicts": tables.verdicts(found)} if set(found) == set(LOGS) else {}
-    if "emps" in found:
-        made |= {"emps": tables.emps(found), "emps-pulses": tables.flexibility(found["emps"])}
+    parts = {"verdicts": tables.verdicts(diagnoses)} if set(diagnoses) == set(LOGS) else {}
+    if "emps" in diagnoses:
+        parts |= {
+            "emps": tables.emps(diagnoses),
+            "emps-pulses": tables.flexibility(diagnoses["emps"]),
+        }
     for mark, keys in {
         "A0": ("A0-fourier", "A0-swings"),
         "C1": ("C1-swings",),
         "C1-known": ("C1-known",),
     }.items():
-        if here := [found[key] for key in keys if key in found]:
-            made[mark] = tables.pendulum(
+        if here := [diagnoses[key] for key in keys if key in diagnoses]:
+            parts[mark] = tables.pendulum(
                 here, data / "double_pendulum" / f"{mark[:2]}_published_parameters.yml"
             )
-    if any(len(one.motions[0].joints) == 2 for one in found.values()):
-        made["timing"] = tables.timing(
-            {key: one for key, one in found.items() if not LOGS[key].known}
+    if any(len(one.motions[0].joints) == 2 for one in diagnoses.values()):
+        parts["timing"] = tables.timing(
+            {key: one for key, one in diagnoses.items() if not LOGS[key].known}
         )
-    if "A0-swings" in found:
+    if "A0-swings" in diagnoses:
         published = data / "double_pendulum" / "A0_published_parameters.yml"
-        made["A0-swings-zeros"] = tables.with_zeros(found["A0-swings"], published)
-    if "A0-fourier" in found:
-        made["A0-orders"] = tables.by_order(found["A0-fourier"])
-    for key, one in found.items():
-        made[f"{key}-turning"] = tables.turning(one)
+        parts["A0-swings-zeros"] = tables.with_zeros(diagnoses["A0-swings"], published)
+    if "A0-fourier" in diagnoses:
+        parts["A0-orders"] = tables.by_order(diagnoses["A0-fourier"])
+    for key, one in diagnoses.items():
+        parts[f"{key}-turning"] = tables.turning(one)
         if any(cause["each_run"] for cause in one.verdict["causes"]):
-            made[f"{key}-each-run"] = tables.of_each_run(one)
+            parts[f"{key}-each-run"] = tables.of_each_run(one)
         if LOGS[key].known:
-            made[f"{key}-known"] = tables.sizes(one, "known")
-        made[f"{key}-sizes"] = tables.sizes(one, "causes")
-        made |= {
+            parts[f"{key}-known"] = tables.sizes(one, "known")
+        parts[f"{key}-sizes"] = tables.sizes(one, "causes")
+        parts |= {
             f"{key}-depends": tables.depends(one),
             f"{key}-says": f"> {one.verdict['summary']}",
         }
-    return made
+    return parts
 
 
 def main() -> None:
@@ -77,17 +80,17 @@ def main() -> None:
     if not data.is_dir():
         parser.error(f"no real data in {data}; EXOID_REAL_DATA names their folder")
     with TemporaryDirectory() as folder:
-        found = {
+        diagnoses = {
             name: diagnosed(LOGS[name], data, Path(folder) / name, figures=True)
             for name in chosen.machines
         }
         text = chosen.page.read_text(encoding="utf-8")
-        for name, table in measured(found, data).items():
+        for name, table in measured(diagnoses, data).items():
             text = written(text, name, table)
         for name, figure in IMAGES.items():
-            if name in found:
+            if name in diagnoses:
                 shutil.copy(
-                    found[name].folder / f"{figure}.png",
+                    diagnoses[name].folder / f"{figure}.png",
                     chosen.page.parent / "images" / f"real-{name}.png",
                 )
     chosen.page.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Where the real data are: shared/data beside the checkout, or wherever EXOID_REAL_DATA says."""
+"""Where the real data are: shared/data next to the checkout, or the folder in EXOID_REAL_DATA."""
 
 import os
 from pathlib import Path

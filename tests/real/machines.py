@@ -35,20 +35,20 @@ class Logs:
     """Pattern in the folder of real data."""
     map: str
     known: tuple[str, ...] = ()
-    """What its makers' drawings show beside rigid body and friction."""
+    """Effects on its makers' drawings, in addition to rigid body and friction."""
 
     @property
     def commands(self) -> str:
         """What a user types to get from these logs to a verdict."""
+        options = " ".join(("", *self.known_options))
         return (
             f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o"
-            f" recordings/\nexoid diagnose recordings/*.parquet{' '.join(('', *self.told))} --out"
-            " diagnosed/"
+            f" recordings/\nexoid diagnose recordings/*.parquet{options} --out diagnosed/"
         )
 
     @property
-    def told(self) -> list[str]:
-        """What the diagnosis is told."""
+    def known_options(self) -> list[str]:
+        """Options of `exoid diagnose` for these effects."""
         return [word for label in self.known for word in ("--known", label)]
 
 
@@ -133,8 +133,8 @@ class Diagnosed:
             cause["each_run"] for cause in self.verdict["causes"]
         ):
             return error
-        left = RESIDUALS.read(self.folder / "residuals.parquet").frame
-        here = left[(left["file"] == motion.file) & (left["model"] == "extended")]
+        residuals = RESIDUALS.read(self.folder / "residuals.parquet").frame
+        here = residuals[(residuals["file"] == motion.file) & (residuals["model"] == "extended")]
         rms = np.array(
             [np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints]
         )
@@ -197,10 +197,10 @@ def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Di
     recorded = recordings(logs, data, folder / "recordings")
     out = folder / "diagnosed"
     drawn = "--figures" if figures else "--no-figures"
-    _exoid("diagnose", *map(str, recorded), *logs.told, "--out", str(out), drawn)
-    told = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
+    _exoid("diagnose", *map(str, recorded), *logs.known_options, "--out", str(out), drawn)
+    verdict = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
     return Diagnosed(
-        motions(recorded), told, PARAMETERS.read(out / "parameters.parquet").frame, out
+        motions(recorded), verdict, PARAMETERS.read(out / "parameters.parquet").frame, out
     )
 
 

@@ -1,5 +1,4 @@
-"""100 |e| / |tau|, as the people who published these data count it, and the error in N·m beside
-it."""
+"""100 |e| / |tau|, as the people who published these data count it, and the error in N·m."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,10 +37,10 @@ class TorqueError:
     """100 |e| / |tau|."""
 
 
-def torque_error(left: NDArray, torque: NDArray) -> TorqueError:
-    """Return the error of a residual (n, J) beside its torque (n, J)."""
-    size, all_of_it = np.linalg.norm(left, axis=0), np.linalg.norm(torque, axis=0)
-    return TorqueError(size / np.sqrt(len(left)), 100.0 * size / all_of_it)
+def torque_error(residual: NDArray, torque: NDArray) -> TorqueError:
+    """Return the error of a residual (n, J) relative to its torque (n, J)."""
+    size, all_of_it = np.linalg.norm(residual, axis=0), np.linalg.norm(torque, axis=0)
+    return TorqueError(size / np.sqrt(len(residual)), 100.0 * size / all_of_it)
 
 
 def _slow(x: NDArray, motion: Motion, order: int) -> NDArray:
@@ -105,9 +104,11 @@ def error_by_place(model: Model, motion: Motion) -> tuple[float, float]:
 
     Near is what no fit of ``exoid diagnose`` takes.
     """
-    left = decimated(motion.torque - model.torque(motion))[:, 0]
+    residual = decimated(motion.torque - model.torque(motion))[:, 0]
     away = away_from_reversals(motion)[::10][EDGE:-EDGE, 0]
-    return float(np.sqrt(np.mean(left[~away] ** 2))), float(np.sqrt(np.mean(left[away] ** 2)))
+    return float(np.sqrt(np.mean(residual[~away] ** 2))), float(
+        np.sqrt(np.mean(residual[away] ** 2))
+    )
 
 
 def decimated_error(model: Model, motion: Motion) -> TorqueError:

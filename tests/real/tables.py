@@ -34,7 +34,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
-def verdicts(found: Mapping[str, Diagnosed]) -> str:
+def verdicts(diagnoses: Mapping[str, Diagnosed]) -> str:
     """Return what the diagnosis says of each machine."""
     headings = (
         "machine",
@@ -43,20 +43,20 @@ def verdicts(found: Mapping[str, Diagnosed]) -> str:
         "torque error, rigid + friction",
         "with the causes",
     )
-    return table(headings, (_verdict(LOGS[name].title, d) for name, d in found.items()))
+    return table(headings, (_verdict(LOGS[name].title, d) for name, d in diagnoses.items()))
 
 
 def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
-    told = d.verdict
-    causes = [f"{_label(c)} ({c['probability']:.2f})" for c in told["causes"]]
-    units = {joint: unit["torque"] for joint, unit in told["units"].items()}
+    verdict = d.verdict
+    causes = [f"{_label(c)} ({c['probability']:.2f})" for c in verdict["causes"]]
+    units = {joint: unit["torque"] for joint, unit in verdict["units"].items()}
 
     def errors(key: str) -> str:
-        return ", ".join(f"{told[key][joint]:.3g} {unit}" for joint, unit in units.items())
+        return ", ".join(f"{verdict[key][joint]:.3g} {unit}" for joint, unit in units.items())
 
     return (
         title,
-        told["status"],
+        verdict["status"],
         "; ".join(causes) or "–",
         errors("baseline_rmse_nm"),
         errors("extended_rmse_nm"),
@@ -69,9 +69,9 @@ def _label(cause: Mapping[str, Any]) -> str:
     return " or ".join("per-run " * effect.each_run + effect.label for effect in effects)
 
 
-def emps(found: Mapping[str, Diagnosed]) -> str:
-    """Return parameters and errors beside the published ones."""
-    d = found["emps"]
+def emps(diagnoses: Mapping[str, Diagnosed]) -> str:
+    """Return parameters and errors next to the published ones."""
+    d = diagnoses["emps"]
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     plain, named = symmetric(d)[train.file], d.identified()[train.file]
     values = dict(
@@ -86,7 +86,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
         )
         for symbol, theirs in EMPS.items()
     ]
-    said = [
+    lines = [
         ("symmetric friction", plain, "symmetric"),
         ("the same, fitted behind this filter", fitted(plain, train), "symmetric"),
         ("what diagnose names, its own values", d.model, "asymmetric"),
@@ -98,7 +98,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
             title,
             *(f"{error:.2f}" for run in (train, pulses) for error in error_by_place(model, run)),
         )
-        for title, model, _ in said
+        for title, model, _ in lines
     ]
     errors = [
         (
@@ -106,7 +106,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
             f"{decimated_error(model, train).percent[0]:.2f} % ({EMPS_ERRORS[kind][0]:.2f} %)",
             f"{decimated_error(model, pulses).percent[0]:.2f} % ({EMPS_ERRORS[kind][1]:.2f} %)",
         )
-        for title, model, kind in said
+        for title, model, kind in lines
     ]
     return "\n\n".join(
         [
@@ -126,16 +126,16 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     )
 
 
-def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
-    """Return the torque error of every run of a double pendulum, beside that of its makers'
+def pendulum(diagnoses: Sequence[Diagnosed], published: Path) -> str:
+    """Return the torque error of every run of a double pendulum, next to that of its makers'
     parameters."""
     theirs = double_pendulum(published)
     rows = []
-    for d in found:
+    for d in diagnoses:
         trained = of_purpose(d.motions, "train")
         plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.identified()
         for motion in d.motions:
-            made = [
+            lines = [
                 *(
                     slow_error(torque, motion)
                     for torque in (their_torque(theirs, motion), plain.torque(motion))
@@ -143,7 +143,7 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
                 d.error_on(motion),
                 slow_error(refitted[motion.file].torque(motion), motion),
             ]
-            errors = [text for error in made for text in _both(error)]
+            errors = [text for error in lines for text in _both(error)]
             rows.append((motion.file.removesuffix(".parquet"), motion.purpose, *errors))
     models = ("published", "least squares", "extended", "refitted")
     headings = ("run", "for", *(f"{model}, {unit}" for model in models for unit in ("N·m", "%")))
@@ -226,8 +226,8 @@ def of_each_run(d: Diagnosed) -> str:
 
 
 def with_zeros(d: Diagnosed, file: Path) -> str:
-    """Return the makers' error on each run without and with the zeros that the diagnosis found,
-    beside its own."""
+    """Return the makers' error on each run without and with the zeros of the diagnosis,
+    next to its own."""
     theirs, rows = double_pendulum(file), []
     for motion in d.motions:
         model = d.model_of(motion)
@@ -244,11 +244,11 @@ def with_zeros(d: Diagnosed, file: Path) -> str:
     )
 
 
-def timing(found: Mapping[str, Diagnosed]) -> str:
+def timing(diagnoses: Mapping[str, Diagnosed]) -> str:
     """Return at which shift of the predicted torque each run's error is least, and how much less
     than as stamped."""
     rows = []
-    for d in found.values():
+    for d in diagnoses.values():
         for motion in d.motions if len(d.motions[0].joints) == 2 else []:
             predicted = d.model_of(motion).torque(motion)
             errors = np.array(
@@ -256,11 +256,11 @@ def timing(found: Mapping[str, Diagnosed]) -> str:
             )
             best = errors.argmin(axis=0)
             gain = 1.0 - errors.min(axis=0) / errors[len(SHIFTS_S) // 2]
-            told = " / ".join(f"{1e3 * SHIFTS_S[b]:+.0f} ms" for b in best)
+            shifts = " / ".join(f"{1e3 * SHIFTS_S[b]:+.0f} ms" for b in best)
             rows.append(
                 (
                     motion.file.removesuffix(".parquet"),
-                    told,
+                    shifts,
                     " / ".join(f"{100 * g:.1f} %" for g in gain),
                 )
             )
@@ -274,15 +274,15 @@ def _shifted(torque: NDArray, motion: Motion, by_s: float) -> NDArray:
 
 
 def depends(d: Diagnosed, most: int = 4) -> str:
-    """Return what the residual goes with, before and after, the strongest after first."""
+    """Return the residual's dependences, before and after, the strongest after first."""
     rows = []
     for joint, variables in d.verdict["depends_on"].items():
-        left = sorted(variables, key=lambda one: -one["share_after"])[:most]
+        remaining = sorted(variables, key=lambda one: -one["share_after"])[:most]
         rows += [
             (joint, v["variable"], f"{v['share_before']:.2f}", f"{v['share_after']:.2f}")
-            for v in left
+            for v in remaining
         ]
-    return table(("joint", "variable", "share foretold before", "share foretold after"), rows)
+    return table(("joint", "variable", "share predicted before", "share predicted after"), rows)
 
 
 def flexibility(d: Diagnosed) -> str:
@@ -291,19 +291,19 @@ def flexibility(d: Diagnosed) -> str:
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for title, motion in zip(RUNS, (train, pulses), strict=True):
-        left = (motion.torque - d.model.torque(motion))[motion.valid, 0]
+        residual = (motion.torque - d.model.torque(motion))[motion.valid, 0]
         mass = dict(
             zip(
                 (p.symbol for _, p in d.model.linear_parameters), d.model.linear_values, strict=True
             )
         )["X1"]
         acceleration = motion.ddq[motion.valid, 0]
-        share = 100.0 * np.linalg.norm(left) / mass / np.linalg.norm(acceleration)
+        share = 100.0 * np.linalg.norm(residual) / mass / np.linalg.norm(acceleration)
         replayed = d.strayed(motion)
         rows.append(
             (
                 title,
-                f"{np.sqrt(np.mean(left**2)):.2f} N",
+                f"{np.sqrt(np.mean(residual**2)):.2f} N",
                 f"{share:.1f} %",
                 f"{1e3 * replayed[0]:.2f} mm",
             )

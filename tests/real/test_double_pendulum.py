@@ -1,4 +1,4 @@
-"""A double pendulum whose makers published its parameters: joint torques are foretold better than
+"""A double pendulum whose makers published its parameters: joint torques are predicted better than
 by these."""
 
 import numpy as np
@@ -81,31 +81,31 @@ def test_load_friction_of_a_planetary_gear_is_named_and_predicts_what_no_fit_has
 
 def test_at_reversals_friction_builds_up_over_a_travel_of_some_counts_of_the_encoder(fourier):
     count = 0.000381
-    told, *others = fourier.verdict["reversals"]
-    assert told["joint"] == "shoulder"
+    reversal, *others = fourier.verdict["reversals"]
+    assert reversal["joint"] == "shoulder"
     # The elbow's is hardly three counts: to turn round at once by the angle as it is read does
     # nearly as well.
     assert all(one["joint"] == "elbow" and one["travel"] < 3.0 * count for one in others)
-    assert 2.0 * count < told["travel"] < 10.0 * count
-    assert told["over_travel_rmse_nm"] ** 2 < 0.8 * told["otherwise_rmse_nm"] ** 2
-    assert told["otherwise_rmse_nm"] < told["at_once_rmse_nm"]
+    assert 2.0 * count < reversal["travel"] < 10.0 * count
+    assert reversal["over_travel_rmse_nm"] ** 2 < 0.8 * reversal["otherwise_rmse_nm"] ** 2
+    assert reversal["otherwise_rmse_nm"] < reversal["at_once_rmse_nm"]
 
 
-def errors(found, theirs):
+def errors(identified, theirs):
     """Return the errors (R, J) N·m of the extended model and of the published parameters on every
     run."""
-    ours = [found.error_on(motion).rms for motion in found.motions]
+    ours = [identified.error_on(motion).rms for motion in identified.motions]
     return np.array(ours), np.array(
-        [slow_error(their_torque(theirs, m), m).rms for m in found.motions]
+        [slow_error(their_torque(theirs, m), m).rms for m in identified.motions]
     )
 
 
-def assert_noise_of_the_angles_passes_for_nothing(found):
+def assert_noise_of_the_angles_passes_for_nothing(identified):
     """Inertia and gravity nearly cancel in a free swing: noise must pass for no cause, travel or
     wrong sign."""
-    assert found.verdict["reversals"] == []
-    assert not any("reversed" in fault["what"] for fault in found.verdict["data_faults"])
-    assert any("no torque goes with" in caveat for caveat in found.verdict["caveats"])
+    assert identified.verdict["reversals"] == []
+    assert not any("reversed" in fault["what"] for fault in identified.verdict["data_faults"])
+    assert any("no torque goes with" in caveat for caveat in identified.verdict["caveats"])
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_free_swings_show_rotor_and_zeros_and_every_run_is_predicted_better_than
     assert alike == [{"rotor_inertia@elbow"}, zeros_of_the_shoulder, {"encoder_offset@elbow"}]
     assert_noise_of_the_angles_passes_for_nothing(swings)
     rotor, *zeroed = swings.verdict["causes"]
-    # What no motion tells apart from it is the rotor's coupling, -gr Ir.
+    # No motion separates it from the rotor's coupling, -gr Ir.
     reflected = (theirs["gr"] ** 2 + theirs["gr"]) * theirs["Ir"]
     assert rotor["parameters"][0]["value"] == pytest.approx(reflected, rel=0.35)
     assert all(len(cause["each_run"]) == len(swings.motions) for cause in zeroed)
@@ -157,7 +157,7 @@ def test_with_the_rotor_that_its_makers_know_half_a_swing_foretells_every_run_be
     (rotor,) = swings.verdict["known"]
     low, high = rotor["parameters"][0]["ci95"]
     theirs = double_pendulum(published_file)
-    # What no motion tells apart from it is the rotor's coupling, -gr Ir.
+    # No motion separates it from the rotor's coupling, -gr Ir.
     assert low < (theirs["gr"] ** 2 + theirs["gr"]) * theirs["Ir"] < high
     ours, published = errors(swings, theirs)
     assert (ours < published).all()

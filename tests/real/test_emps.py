@@ -32,14 +32,14 @@ def test_the_symmetric_model_is_the_published_one(diagnosis, fit):
     their filter."""
     runs = diagnosis.motions
     (train,) = of_purpose(runs, "train")
-    found = symmetric(diagnosis)[train.file]
-    found = found if fit == "command" else fitted(found, train)
+    model = symmetric(diagnosis)[train.file]
+    model = model if fit == "command" else fitted(model, train)
     values = dict(
-        zip((p.symbol for _, p in found.linear_parameters), found.linear_values, strict=True)
+        zip((p.symbol for _, p in model.linear_parameters), model.linear_values, strict=True)
     )
     assert values == pytest.approx(EMPS, rel=0.01)
     assert all(
-        e <= asked for e, asked in zip(_errors(found, runs), EMPS_ERRORS["symmetric"], strict=True)
+        e <= asked for e, asked in zip(_errors(model, runs), EMPS_ERRORS["symmetric"], strict=True)
     )
 
 
@@ -49,10 +49,10 @@ def test_diagnose_names_the_worn_screw_and_what_it_names_reaches_the_published_e
 ):
     assert ("viscous_asymmetry", "axis") in diagnosis.causes
     (train,) = of_purpose(diagnosis.motions, "train")
-    found = (
+    causes = (
         diagnosis.identified()[train.file] if fit == "command" else fitted(diagnosis.model, train)
     )
-    relative, crossed = _errors(found, diagnosis.motions)
+    relative, crossed = _errors(causes, diagnosis.motions)
     assert relative <= EMPS_ERRORS["asymmetric"][0]
     assert crossed <= EMPS_ERRORS["asymmetric"][1]
 
@@ -61,8 +61,8 @@ def test_the_few_reversals_of_the_screw_which_are_all_alike_show_no_travel(diagn
     assert diagnosis.verdict["reversals"] == []
 
 
-def test_the_screws_force_is_told_to_be_reversed_where_it_is_and_only_there(runs):
+def test_the_screws_force_is_reported_as_reversed_where_it_is_and_only_there(runs):
     assert find_faults(on_one_scale(runs)) == []
-    found = find_faults(on_one_scale([replace(run, torque=-run.torque) for run in runs]))
-    assert [fault.file for fault in found] == [run.file for run in runs]
-    assert all("the sign of axis_force_n is reversed" in fault.what for fault in found)
+    faults = find_faults(on_one_scale([replace(run, torque=-run.torque) for run in runs]))
+    assert [fault.file for fault in faults] == [run.file for run in runs]
+    assert all("the sign of axis_force_n is reversed" in fault.what for fault in faults)

@@ -36,10 +36,12 @@ def test_the_axis_of_emps_has_the_force_of_its_benchmark(imported):
 
 
 def test_the_double_pendulum_keeps_its_irregular_instants(imported):
-    tables, told = imported("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml")
+    tables, messages = imported(
+        "double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"
+    )
     train, validate = tables["A0_fourier_75s_train"], tables["A0_fourier_75s_validate"]
     assert len(train.frame) + len(validate.frame) == 21969
-    assert "irregular: 21% of the steps" in told
+    assert "irregular: 21% of the steps" in messages
     assert train.metadata["geometry"] == {"thigh_length_m": 0.3, "gravity_m_s2": 9.81}
 
 
@@ -55,9 +57,9 @@ def test_the_swing_ups_of_the_simple_pendulum(imported):
 
 
 def test_currents_of_the_xl330_get_their_sign_back(imported):
-    tables, told = imported("xl330/*.json", "xl330.toml")
+    tables, messages = imported("xl330/*.json", "xl330.toml")
     assert len(tables) == 16
-    assert "a signed register of 16 bits logged without its sign" in told
+    assert "a signed register of 16 bits logged without its sign" in messages
     # 1.5 A is what the servo's data sheet has it stall at.
     assert (
         max(np.abs(table.frame["pivot_torque_nm"]).max() for table in tables.values()) < 0.59 * 1.6
@@ -66,12 +68,12 @@ def test_currents_of_the_xl330_get_their_sign_back(imported):
     assert max(warm) >= 40.0
 
 
-def test_what_is_wrong_with_the_logs_of_modexo_is_told(imported):
-    tables, told = imported("modexo/*.csv", "modexo.toml")
-    assert "clock starts over at row 5, 136.573 s back" in told
-    assert "that 32 bits cannot hold, the first 4294967300" in told
-    assert "that 16 bits cannot hold, the first 630040" in told
-    assert "rows put in order" in told
+def test_what_is_wrong_with_the_logs_of_modexo_is_reported(imported):
+    tables, messages = imported("modexo/*.csv", "modexo.toml")
+    assert "clock starts over at row 5, 136.573 s back" in messages
+    assert "that 32 bits cannot hold, the first 4294967300" in messages
+    assert "that 16 bits cannot hold, the first 630040" in messages
+    assert "rows put in order" in messages
     assert tables["20170712-loadcellTests_2_train"].metadata["imported"]["rows_in_source"] == 22803
 
 

@@ -1,5 +1,5 @@
-"""Machines that say little: what is named of them foretells runs that no fit has seen, and no
-travel is told."""
+"""Machines with little evidence: named causes predict runs that no fit has seen, and no travel is
+reported."""
 
 import pytest
 
@@ -16,16 +16,16 @@ from tests.real.machines import LOGS, diagnosed, motions, recordings
         ("modexo", "unknown_cause"),
     ],
 )
-def test_of_small_or_dirty_logs_only_what_foretells_unseen_runs_is_named(
+def test_of_small_or_dirty_logs_only_what_predicts_unseen_runs_is_named(
     real_data, tmp_path, machine, status
 ):
-    said = diagnosed(LOGS[machine], real_data, tmp_path).verdict
-    assert (said["status"], said["reversals"]) == (status, [])
-    assert all(cause["gain"]["systematic_error_removed"] > 0.25 for cause in said["causes"])
+    outcome = diagnosed(LOGS[machine], real_data, tmp_path).verdict
+    assert (outcome["status"], outcome["reversals"]) == (status, [])
+    assert all(cause["gain"]["systematic_error_removed"] > 0.25 for cause in outcome["causes"])
 
 
 @pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
-def test_no_sign_of_a_machine_that_was_wired_rightly_is_told_to_be_reversed(
+def test_no_sign_of_a_machine_that_was_wired_rightly_is_reported_as_reversed(
     real_data, tmp_path, machine
 ):
     runs = on_one_scale(motions(recordings(LOGS[machine], real_data, tmp_path)))
