@@ -14,13 +14,13 @@ from dataclasses import replace
 from pipelines.diagnosis.candidates.library import silent
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.model_error import imperfection
-from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
 from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.presliding_test import built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
 from pipelines.diagnosis.fit.uncertainty import uncertainty
 from pipelines.diagnosis.judged_fit import JudgedFit, baseline_alone, judged_fit
-from pipelines.diagnosis.selection.selected import Report, nothing_selected, select
+from pipelines.diagnosis.selection.selection import Report, nothing_selected, select
 from pipelines.diagnosis.training_data import TrainingData, training_data
 from pipelines.mechanics.motion import Motion
 
@@ -69,7 +69,7 @@ def diagnose(
 
 
 def _by_all_runs(
-    data: TrainingData, prepared: Prepared, judged: JudgedFit, report: Report
+    data: TrainingData, prepared: PreparedRuns, judged: JudgedFit, report: Report
 ) -> JudgedFit:
     """Search all runs, and return that result where it improves on the training runs alone.
 
@@ -99,7 +99,7 @@ def _in_the_rest(report: Report) -> Report:
     return lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what)
 
 
-def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:
+def _diagnosis(data: TrainingData, prepared: PreparedRuns, judged: JudgedFit) -> Diagnosis:
     """Assemble the result: intervals, parameters, simulation errors, reversals."""
     baseline, before, after = data.baseline, judged.before, judged.after
     validate = before.runs

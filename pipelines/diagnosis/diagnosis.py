@@ -12,14 +12,14 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
-from pipelines.diagnosis.fit.validation import Validated, gains_of
+from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import Named
-from pipelines.diagnosis.selection.selected import Selected
+from pipelines.diagnosis.selection.answer import NamedCause
+from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero
@@ -33,14 +33,14 @@ class Diagnosis:
     """A session, its named causes, and the model with them."""
 
     data: TrainingData
-    prepared: Prepared
+    prepared: PreparedRuns
     """The training runs under the baseline alone."""
-    selected: Selected
-    before: Validated
+    selected: Selection
+    before: ValidationResult
     """The baseline."""
-    after: Validated
+    after: ValidationResult
     """The baseline with the named causes."""
-    without: dict[str, Validated]
+    without: dict[str, ValidationResult]
     """The named causes less one, by that cause's label."""
     floor: Floor
     """Of the validation runs."""
@@ -70,7 +70,7 @@ class Diagnosis:
         return tuple(self.before.runs)
 
     @property
-    def named(self) -> tuple[Named, ...]:
+    def named(self) -> tuple[NamedCause, ...]:
         """The named causes, the most probable first."""
         return self.selected.answer.named
 

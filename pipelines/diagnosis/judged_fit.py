@@ -7,27 +7,27 @@ import numpy as np
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import with_load
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import (
-    Validated,
+    ValidationResult,
     log_likelihoods,
     removed_share,
     without_each,
 )
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.diagnosis.selection.marginal_likelihood import power
-from pipelines.diagnosis.selection.selected import Selected
+from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
 
 
-def baseline_alone(data: TrainingData, prepared: Prepared) -> Validated:
+def baseline_alone(data: TrainingData, prepared: PreparedRuns) -> ValidationResult:
     """Return the baseline without causes, fitted, and measured on the validation runs."""
-    laden = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
-    return Validated.of(_refinement(prepared)(()), laden, data.baseline)
+    loaded = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
+    return ValidationResult.of(_refinement(prepared)(()), loaded, data.baseline)
 
 
-def _refinement(prepared: Prepared) -> Refinement:
+def _refinement(prepared: PreparedRuns) -> Refinement:
     return Refinement(prepared.runs, prepared.baseline, prepared.weights)
 
 
@@ -35,12 +35,12 @@ def _refinement(prepared: Prepared) -> Refinement:
 class JudgedFit:
     """The named causes after judging, fitted to the training runs."""
 
-    selected: Selected
-    before: Validated
+    selected: Selection
+    before: ValidationResult
     """The baseline."""
-    after: Validated
+    after: ValidationResult
     """The baseline with the named causes."""
-    without: dict[str, Validated]
+    without: dict[str, ValidationResult]
     """The named causes less one, by that cause's label."""
     log_likelihood: float
     """Of the validation runs, up to a constant."""
@@ -54,7 +54,7 @@ class JudgedFit:
         )
 
 
-def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
+def judged_fit(selected: Selection, prepared: PreparedRuns, before: ValidationResult) -> JudgedFit:
     """Fit the named causes, and judge them on the validation runs until no charge remains.
 
     The most harmful cause is charged first: in a model with it, other causes may seem to harm too.
@@ -86,7 +86,7 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
     return JudgedFit(selected, before, after, without, log_likelihood)
 
 
-def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float]:
+def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> dict[str, float]:
     """Return the share of the systematic error that each cause removes, by label.
 
     A cause is left out if the error without it is at the noise floor.
@@ -96,7 +96,11 @@ def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float
 
 
 def _shortfalls(
-    selected: Selected, after: Validated, refine: Refinement, prepared: Prepared, before: Validated
+    selected: Selection,
+    after: ValidationResult,
+    refine: Refinement,
+    prepared: PreparedRuns,
+    before: ValidationResult,
 ) -> dict[str, float]:
     """Return by how much each tie predicts the validation runs worse than the best of its group.
 
@@ -110,7 +114,7 @@ def _shortfalls(
             continue
         likelihoods = {one.element.variant: log_likelihoods(after, noise)}
         for variant, rival in rivals.items():
-            fitted = Validated.of(refine((*rest, rival)), before.runs, prepared.baseline)
+            fitted = ValidationResult.of(refine((*rest, rival)), before.runs, prepared.baseline)
             likelihoods[variant] = log_likelihoods(fitted, noise)
         explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
         weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
@@ -124,14 +128,14 @@ def _shortfalls(
 
 
 def _fitted(
-    selected: Selected, refine: Refinement, prepared: Prepared, before: Validated
-) -> tuple[Validated, dict[str, Validated]]:
+    selected: Selection, refine: Refinement, prepared: PreparedRuns, before: ValidationResult
+) -> tuple[ValidationResult, dict[str, ValidationResult]]:
     """Fit the named causes, and the same without each of them, and validate each fit."""
     candidates = selected.candidates
     if not candidates:
         return before, {}
     baseline = prepared.baseline
-    after = Validated.of(refine(candidates), before.runs, baseline)
+    after = ValidationResult.of(refine(candidates), before.runs, baseline)
     if len(candidates) == 1:
         return after, {candidates[0].label: before}
     without = without_each(after.fit, prepared.runs, before.runs, baseline, prepared.weights)

@@ -7,8 +7,8 @@ import numpy as np
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault, excluding, find_faults
-from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, like_trained
-from pipelines.diagnosis.evidence.downsampling import thinned
+from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, only_trained_outputs
+from pipelines.diagnosis.evidence.downsampling import downsampled
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
@@ -63,7 +63,7 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     refuse_unfit(motions)
     effects = known_effects(known, motions[0].machine)
     faults = tuple(find_faults(motions))
-    valid = [thinned(motion) for motion in excluding(motions, faults) if motion.valid.any()]
+    valid = [downsampled(motion) for motion in excluding(motions, faults) if motion.valid.any()]
     _refuse_missing_purpose(valid)
     runs = [observe(motion) for motion in valid]
     noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
@@ -74,7 +74,11 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
         _refuse_unknown_noise(validate, faults)
     baseline = baseline_of(train, effects)
     return TrainingData(
-        train, tuple(like_trained(run, baseline) for run in validate), baseline, faults, noisy
+        train,
+        tuple(only_trained_outputs(run, baseline) for run in validate),
+        baseline,
+        faults,
+        noisy,
     )
 
 

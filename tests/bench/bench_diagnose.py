@@ -23,7 +23,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.evidence.order_tracking import lines_in
-from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
 from pipelines.diagnosis.selection.evidence import Evidence, _stack
 from pipelines.diagnosis.selection.posterior import posterior
 from pipelines.effects import EFFECTS
@@ -59,7 +59,7 @@ def recorded(seconds: float) -> list[Motion]:
     return session(seconds=seconds, **HIDDEN)
 
 
-def prepared_from(motions: Sequence[Motion]) -> Prepared:
+def prepared_from(motions: Sequence[Motion]) -> PreparedRuns:
     """Return the training runs under the baseline."""
     runs = [observe(m) for m in motions if m.purpose == "train"]
     return prepare(runs, baseline_of(runs))

@@ -9,7 +9,7 @@ import numpy as np
 from pipelines.diagnosis.diagnose import _diagnosis
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.judged_fit import judged_fit
-from pipelines.diagnosis.selection.answer import Answer, Named
+from pipelines.diagnosis.selection.answer import Answer, NamedCause
 from pipelines.diagnosis.selection.findings import findings
 from pipelines.diagnosis.selection.posterior import Posterior
 
@@ -22,7 +22,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     assert selected.library is not None and selected.posterior is not None
     elements = [_best(d, label) for label in labels]
     named = tuple(
-        Named(element, PROBABILITY, PROBABILITY, ties if number == 0 else ())
+        NamedCause(element, PROBABILITY, PROBABILITY, ties if number == 0 else ())
         for number, element in enumerate(elements)
     )
     chosen = tuple(sorted(selected.posterior.elements.index(element) for element in elements))

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.candidates.shape_grid import screened
-from pipelines.diagnosis.candidates.shape_refinement import Fitted, ShapeRefinement
+from pipelines.diagnosis.candidates.shape_refinement import CandidateFit, ShapeRefinement
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run, observe
-from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
 from pipelines.effects import Effect
 from pipelines.mechanics.motion import Motion
 
@@ -19,7 +19,7 @@ from pipelines.mechanics.motion import Motion
 class Screening:
     """What single candidates are fitted in."""
 
-    prepared: Prepared
+    prepared: PreparedRuns
     regression: DecisionRegression
     rows: CandidateRows
     alone: ShapeRefinement
@@ -40,10 +40,10 @@ class Screening:
         rows = CandidateRows(prepared.runs, prepared.baseline, regression)
         return cls(prepared, regression, rows, ShapeRefinement(rows, regression))
 
-    def fits(self, effect: Effect) -> list[Fitted]:
+    def fits(self, effect: Effect) -> list[CandidateFit]:
         """Return the fits of an effect's coarse search, the best first."""
         return screened(effect, self.alone, self.prepared.runs, self.regression)
 
-    def refined(self, start: Fitted) -> tuple[float, ...]:
+    def refined(self, start: CandidateFit) -> tuple[float, ...]:
         """Return the shape that the refinement finds from a start."""
         return self.alone.refined(start)[0].candidate.shapes[0]

@@ -10,7 +10,7 @@ from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.diagnosis.selection.selected import Selected
+from pipelines.diagnosis.selection.selection import Selection
 
 
 def cause(name: str, joint: str, family: str) -> Element:
@@ -145,7 +145,7 @@ def test_nothing_missing_has_no_findings():
 def after(posterior, ratios):
     """Return what is selected after validation, given log likelihood ratios of named causes by
     label."""
-    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    selected = Selection(None, None, posterior, posterior, answer_of(posterior), (), ())
     while harm := selected.worst_harm(ratios):
         selected = selected.judged(harm, harms=True)
     return selected
@@ -246,7 +246,7 @@ def test_what_takes_the_place_of_a_cause_that_harms_is_a_finding_and_its_ties_ar
 
 def test_a_tie_that_predicts_the_validation_runs_better_is_named_instead():
     posterior = weighed(_2=0.7, _3=0.25, _=0.05)
-    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    selected = Selection(None, None, posterior, posterior, answer_of(posterior), (), ())
     judged = selected.judged({"quadratic_drag@hip": -4.0, "stribeck_friction@hip": 0.0})
     (named,) = judged.answer.named
     assert named.element is PEAK and named.members == {"stribeck_friction@hip"}
@@ -295,7 +295,7 @@ def test_of_three_causes_the_two_that_do_no_harm_stay_named():
 
 def test_ties_that_are_likely_together_stay_named_though_none_is_as_probable_as_nothing():
     posterior = weighed(_2=0.3, _3=0.2, _0=0.18, _=0.25, _4=0.07)
-    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    selected = Selection(None, None, posterior, posterior, answer_of(posterior), (), ())
     assert selected.answer.named[0].members == {
         "quadratic_drag@hip",
         "stribeck_friction@hip",
@@ -311,7 +311,7 @@ def test_ties_that_are_likely_together_stay_named_though_none_is_as_probable_as_
 
 def test_a_tie_that_won_is_charged_when_it_harms():
     posterior = weighed(_2=0.7, _3=0.25, _=0.05)
-    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    selected = Selection(None, None, posterior, posterior, answer_of(posterior), (), ())
     won = selected.judged({"quadratic_drag@hip": -4.0, "stribeck_friction@hip": 0.0})
     harm = won.worst_harm({"stribeck_friction@hip": -50.0})
     assert harm == {"stribeck_friction@hip": -50.0}

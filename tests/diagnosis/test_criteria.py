@@ -20,7 +20,7 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import BEFORE_EVIDENCE, CRITERIA, Criteria
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S
-from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.judged_fit import JudgedFit
 from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence, explained
@@ -185,7 +185,10 @@ def test_a_cause_that_removes_a_sixth_of_the_error_is_as_likely_a_look_alike():
 
 def test_an_error_within_three_percent_of_the_floor_is_noise():
     validated = SimpleNamespace(errors=SimpleNamespace(rms=np.array([1.029, 1.031])))
-    assert Validated.above(validated, SimpleNamespace(rms=np.ones(2))).tolist() == [False, True]
+    assert ValidationResult.above(validated, SimpleNamespace(rms=np.ones(2))).tolist() == [
+        False,
+        True,
+    ]
 
 
 def test_a_joint_is_explained_where_a_fifth_of_the_systematic_power_is_left():

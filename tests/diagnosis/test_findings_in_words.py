@@ -11,7 +11,7 @@ from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings as read_off
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.diagnosis.selection.selected import Selected
+from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.wording.label import effect_labelled
 
@@ -46,7 +46,7 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE, has_periods=True):
     p = np.array([sets[chosen] for chosen in order])
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
     answer = answer_of(trained)
-    selected = Selected(None, None, trained, trained, answer, tuple(read_off(trained, answer)), ())
+    selected = Selection(None, None, trained, trained, answer, tuple(read_off(trained, answer)), ())
     while harm := selected.worst_harm(dict(ratios)):
         selected = selected.judged(harm, harms=True)
     labels = tuple(one.element.label for one in selected.answer.named)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.evidence.baseline import baseline_of, like_trained
+from pipelines.diagnosis.evidence.baseline import baseline_of, only_trained_outputs
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.joint_fit import fit, residuals_on
 from pipelines.estimation.regression import TURN_S, away_from_turns
@@ -65,8 +65,8 @@ def test_a_validation_run_has_no_cuffs_where_training_had_none(motions):
     validated = observe(motions[3])
     baseline = baseline_of([trained])
     assert validated.has_cuffs
-    assert not like_trained(validated, baseline).has_cuffs
-    assert like_trained(validated, baseline_of([validated])) is validated
+    assert not only_trained_outputs(validated, baseline).has_cuffs
+    assert only_trained_outputs(validated, baseline_of([validated])) is validated
 
 
 def test_torque_of_the_model_obeys_it_behind_the_low_pass_but_not_along_a_low_passed_motion(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.diagnosis.evidence.downsampling import thinned
+from pipelines.diagnosis.evidence.downsampling import downsampled
 from pipelines.diagnosis.evidence.observed_run import observe
 from tests.diagnosis.sessions import session
 
@@ -48,7 +48,7 @@ def fast():
 
 
 def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):
-    thin = thinned(fast)
+    thin = downsampled(fast)
     assert thin.sample_rate_hz == 200.0
     assert len(thin) == len(fast) // 5
     before, after = observe(fast), observe(thin)
@@ -62,7 +62,7 @@ def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):
 def test_forces_that_were_read_with_each_set_point_alone_are_there_at_200_hz(fast):
     forces = np.full_like(fast.forces, np.nan)
     forces[2::5] = fast.forces[2::5]
-    thin, whole = thinned(replace(fast, forces=forces)), thinned(fast)
+    thin, whole = downsampled(replace(fast, forces=forces)), downsampled(fast)
     assert np.isfinite(thin.forces[1:-1]).all()
     apart = np.sqrt(np.mean((thin.forces - whole.forces)[1:-1] ** 2))
     assert apart < 0.05 * whole.forces.std()
@@ -71,21 +71,21 @@ def test_forces_that_were_read_with_each_set_point_alone_are_there_at_200_hz(fas
 def test_the_angle_as_it_was_read_keeps_the_counts_of_its_encoder(fast):
     count = 1e-3
     read = count * np.round(fast.q / count)
-    thin = thinned(replace(fast, measured_angle=read))
+    thin = downsampled(replace(fast, measured_angle=read))
     assert_allclose(thin.measured_angle, read[2::5])
     assert np.abs(thin.measured_angle - thin.q).max() <= 0.5 * count + 1e-9
 
 
 def test_a_slow_recording_is_left_as_it_is(fast):
-    thin = thinned(fast)
-    assert thinned(thin) is thin
+    thin = downsampled(fast)
+    assert downsampled(thin) is thin
 
 
 def test_no_average_reaches_across_a_gap(fast):
     segment = np.zeros(len(fast), dtype=np.int64)
     segment[1003:] = 1
     time = fast.time + 0.5 * segment
-    thin = thinned(replace(fast, segment=segment, time=time))
+    thin = downsampled(replace(fast, segment=segment, time=time))
     spread = np.diff(thin.time)
     assert np.count_nonzero(spread > 0.4) == 1
     assert not np.any((thin.time > fast.time[1002] + 0.002) & (thin.time < time[1003]))

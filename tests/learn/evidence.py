@@ -102,7 +102,7 @@ def _one(case: Case, root: Path, revision: str, keep: bool) -> str:
 
 def evidence_row(recordings: Path) -> dict[str, Any]:
     """Return the evidence of a folder of recordings, packed; why there is none in ``refused``."""
-    from pipelines.diagnosis.selection.selected import evidence_of
+    from pipelines.diagnosis.selection.selection import evidence_of
     from pipelines.errors import ExoidError
     from pipelines.mechanics.read import read_motions
     from pipelines.settings.filter import FilterSettings

@@ -12,7 +12,7 @@ from tests.blind.splits import forms_by_fold
 from tests.learn.cross_validation import AWAY, away, parts
 from tests.learn.prior_fit import Sets
 from tests.learn.search import ascend
-from tests.learn.sensitivity import CHANGE, changes, told_of
+from tests.learn.sensitivity import CHANGE, changes, score_and_share
 from tests.learn.truth import right_sets
 from tests.learn.vector import from_vector, names, to_vector
 
@@ -66,8 +66,8 @@ def test_each_number_is_changed_alone_and_by_the_same_factor():
 
 def test_a_prior_that_forbids_causes_is_seldom_right_where_causes_are_the_truth():
     sets, evidence = sessions()
-    score, share = told_of(sets, evidence, replace(CRITERIA, cause=-3.0))
-    worse, seldom = told_of(sets, evidence, replace(CRITERIA, cause=-30.0))
+    score, share = score_and_share(sets, evidence, replace(CRITERIA, cause=-3.0))
+    worse, seldom = score_and_share(sets, evidence, replace(CRITERIA, cause=-30.0))
     assert score > worse
     assert share > seldom
     assert seldom == pytest.approx(sets.weights @ sets.right[:, 0])

@@ -1,11 +1,11 @@
 """Evidence for causes other than their effect on the mean of the torque."""
 
 from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import VoluntaryTorque
 
 
-def auxiliary_evidence(prepared: Prepared) -> dict[str, float]:
+def auxiliary_evidence(prepared: PreparedRuns) -> dict[str, float]:
     """Return the log likelihood ratio of each label from evidence other than the mean torque.
 
     For a wearer's pushes it is the part that cuffs and drives share. A rhythm that is fitted

@@ -70,14 +70,14 @@ class Candidate:
         )
 
     @property
-    def bends(self) -> bool:
+    def transforms_motion(self) -> bool:
         """Whether the effect changes kinematics or readings, and adds no torque of its own."""
-        return bends_motion(self.effect)
+        return transforms_motion(self.effect)
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
         """Return the places of the candidate's columns in runs of some kinds."""
         width = max(1, len(self.directions))
-        per_run = [self.effect.per_run] * width if self.bends else None
+        per_run = [self.effect.per_run] * width if self.transforms_motion else None
         return TermColumns.of(self.effect, kinds, per_run, start)
 
     def typical(self, kinds: Sequence[str]) -> NDArray:
@@ -88,7 +88,7 @@ class Candidate:
         """
         if self.directions:
             sizes = [_largest(self.effect, direction) for direction in self.directions]
-        elif self.bends:
+        elif self.transforms_motion:
             sizes = [1.0]
         else:
             sizes = [max(map(abs, parameter.typical)) for parameter in self.effect.linear]
@@ -124,19 +124,21 @@ class Candidate:
         return not parameter.forms and (parameter.default is None or spanned)
 
     @property
-    def own_bend(self) -> int | None:
+    def per_run_transform(self) -> int | None:
         """Place of the per-run shape parameter that transforms the motion, None without one."""
-        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.bends)
+        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.transforms_motion)
         return next(own, None)
 
     @property
     def onset(self) -> int | None:
         """Place of the shape that is the instant of onset in each run, None without one."""
-        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
+        own = (
+            i for i, p in enumerate(self.effect.shape) if p.per_run and not self.transforms_motion
+        )
         return next(own, None)
 
 
-def bends_motion(effect: Effect) -> bool:
+def transforms_motion(effect: Effect) -> bool:
     """Return whether an effect changes kinematics or readings, and adds no torque of its own."""
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (

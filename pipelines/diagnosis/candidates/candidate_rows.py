@@ -42,7 +42,7 @@ class CandidateRows:
         )
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
-        self._last_laden: tuple[tuple[float, ...], list[Run]] = (), self._slow
+        self._last_loaded: tuple[tuple[float, ...], list[Run]] = (), self._slow
         self._last_change: tuple[Candidate, NDArray | None, tuple[NDArray, NDArray]] | None = None
 
     def __call__(self, candidate: Candidate, others: NDArray | None = None) -> NDArray | None:
@@ -60,7 +60,7 @@ class CandidateRows:
         (N, k) array or None
             None where the rows are not finite.
         """
-        if not candidate.bends:
+        if not candidate.transforms_motion:
             runs = self._runs if self._ripples_within_blocks(candidate) else self._slow
             parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
             rows = self._regression.rows(self._expanded(candidate, parts))
@@ -89,17 +89,17 @@ class CandidateRows:
         bodies = relaxed(refitted, np.array(candidate.bodies) if candidate.bodies else None)
         return replace(candidate, bodies=tuple(bodies.tolist()))
 
-    def _laden(self, candidate: Candidate) -> list[Run]:
+    def _with_loads(self, candidate: Candidate) -> list[Run]:
         """Return the runs with the loads of a candidate's rigid bodies."""
         if not candidate.bodies:
             return self._slow
-        if self._last_laden[0] != candidate.bodies:  # most often they are those of the call before
+        if self._last_loaded[0] != candidate.bodies:  # most often they are those of the call before
             values = np.array(candidate.bodies)
-            self._last_laden = (
+            self._last_loaded = (
                 candidate.bodies,
                 [with_load(run, self._baseline, values) for run in self._slow],
             )
-        return self._last_laden[1]
+        return self._last_loaded[1]
 
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
         """Return whether a wave over the angle passes within a few blocks."""
@@ -140,7 +140,7 @@ class CandidateRows:
     def _compute_change(
         self, candidate: Candidate, others: NDArray | None
     ) -> tuple[NDArray, NDArray]:
-        regression, runs = self._regression, self._laden(candidate)
+        regression, runs = self._regression, self._with_loads(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         transformed = [
             columns_under([candidate.term(r)], run, self._baseline) if acts else self._plain[r]

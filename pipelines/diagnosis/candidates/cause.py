@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.shape_refinement import Fitted
+from pipelines.diagnosis.candidates.shape_refinement import CandidateFit
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 
 RANK = 1e-6
@@ -43,7 +43,7 @@ class Cause:
     @classmethod
     def of(
         cls,
-        fitted: Fitted,
+        fitted: CandidateFit,
         slopes: NDArray,
         regression: DecisionRegression,
         *,
@@ -54,7 +54,7 @@ class Cause:
 
         Parameters
         ----------
-        fitted : Fitted
+        fitted : CandidateFit
             The candidate at its best shapes, with its columns.
         slopes : (N, d) array
             Change of the rows by each shape, per unit of change.
@@ -81,7 +81,7 @@ class Cause:
         )
 
 
-def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:
+def towards(best: CandidateFit, others: Sequence[CandidateFit]) -> NDArray:
     """Return the change from the best form of a cause to its best other form, (N, 0 or 1)."""
     forms = [p.forms for p in best.candidate.effect.shape]
     here = best.candidate.shapes[0]

@@ -20,11 +20,13 @@ from pipelines.diagnosis.candidates.smooth_laws import (
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.estimation.regression import away_from_reversals
 
 
-def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[LawColumn], NDArray]:
+def law_rows(
+    prepared: PreparedRuns, regression: DecisionRegression
+) -> tuple[list[LawColumn], NDArray]:
     """Return every smooth law and its rows (N, l), the baseline projected out."""
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
@@ -51,7 +53,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
 
-def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
+def _hums(prepared: PreparedRuns, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the columns of each joint's tones; every run has its own phases."""
     for j, lines in enumerate(prepared.lines):
         tones = np.array([line.cycles for line in lines.of_kind(Kind.TIME)])
@@ -67,7 +69,7 @@ def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], li
 
 
 def _coarse_steps(
-    prepared: Prepared, joints: int
+    prepared: PreparedRuns, joints: int
 ) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the column of each joint whose torque may have coarse steps."""
     runs = prepared.runs
@@ -99,7 +101,9 @@ def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
     return [np.concatenate([d, c], axis=1) for d, c in zip(drives, cuffs, strict=True)]
 
 
-def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[Curve], NDArray]:
+def curve_rows(
+    prepared: PreparedRuns, regression: DecisionRegression
+) -> tuple[list[Curve], NDArray]:
     """Return every curve of time, and their rows (N, t), the baseline projected out."""
     kept, rows = [], []
     for r, run in enumerate(prepared.runs):

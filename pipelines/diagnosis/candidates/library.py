@@ -16,12 +16,16 @@ from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.candidates.cause import Cause, towards
 from pipelines.diagnosis.candidates.law_rows import curve_rows, law_rows
 from pipelines.diagnosis.candidates.shape_grid import others_of, screened
-from pipelines.diagnosis.candidates.shape_refinement import Fitted, ShapeRefinement, has_shapes
+from pipelines.diagnosis.candidates.shape_refinement import (
+    CandidateFit,
+    ShapeRefinement,
+    has_shapes,
+)
 from pipelines.diagnosis.candidates.smooth_laws import TIME, Curve, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import Cogging, Effect
 from pipelines.wording.law import law_label
 
@@ -50,7 +54,7 @@ class Context:
 class Library:
     """All competing causes and laws, the baseline projected out."""
 
-    prepared: Prepared
+    prepared: PreparedRuns
     regression: DecisionRegression
     rows: CandidateRows
     causes: tuple[Cause, ...]
@@ -66,7 +70,7 @@ class Library:
     baseline."""
     contexts: tuple[Context, ...] = ()
     """Sets whose causes were refined together."""
-    screened: tuple[tuple[Fitted, ...], ...] = ()
+    screened: tuple[tuple[CandidateFit, ...], ...] = ()
     """The fits of each effect's coarse search."""
 
     def refined_together(self, contexts: Sequence[Context]) -> "Library":
@@ -90,7 +94,7 @@ class Library:
             for fits in self.screened
             if fits[0].candidate.label != main.candidate.label
         ]
-        fits = sorted((f for f in partners if f is not None), key=lambda f: -f.worth)
+        fits = sorted((f for f in partners if f is not None), key=lambda f: -f.score)
         for fitted in fits[:most]:
             none = np.zeros((len(rows_of_main), 0))
             cause = Cause.of(fitted, none, self.regression, first=True)
@@ -142,12 +146,12 @@ class Library:
         return self.curve_columns[:, joint]
 
 
-def build_library(prepared: Prepared, report: Report = silent) -> Library:
+def build_library(prepared: PreparedRuns, report: Report = silent) -> Library:
     """Compute the columns of every cause and every law.
 
     Parameters
     ----------
-    prepared : Prepared
+    prepared : PreparedRuns
         The searched runs under the baseline alone.
     report : callable, optional
         Takes the share that is done, 0 to 1, and the present effect.
@@ -164,7 +168,7 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     alone = ShapeRefinement(rows, regression)
     causes: list[Cause] = []
     left_out: list[str] = []
-    grids: list[tuple[Fitted, ...]] = []
+    grids: list[tuple[CandidateFit, ...]] = []
     effects = _effects(prepared)
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -192,7 +196,7 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     )
 
 
-def _effects(prepared: Prepared) -> list[Effect]:
+def _effects(prepared: PreparedRuns) -> list[Effect]:
     """Return the effects that the runs can show."""
     motions = [run.motion for run in prepared.runs]
     listed = proposals(prepared.baseline, [motion.run for motion in motions])
@@ -200,7 +204,7 @@ def _effects(prepared: Prepared) -> list[Effect]:
 
 
 def _ripples(
-    prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression
+    prepared: PreparedRuns, alone: ShapeRefinement, regression: DecisionRegression
 ) -> list[Cause]:
     """Return each joint's ripple from order tracking, at the full sampling rate."""
     ripples, machine = [], prepared.baseline.machine
@@ -214,14 +218,14 @@ def _ripples(
     return [cause for cause in ripples if cause is not None]
 
 
-def orders_of(joint: str, prepared: Prepared) -> tuple[float, ...]:
+def orders_of(joint: str, prepared: PreparedRuns) -> tuple[float, ...]:
     """Return the cycles a turn of a joint's ripple, as found at the full sampling rate."""
     lines = prepared.lines[prepared.baseline.joints.index(joint)]
     return tuple(line.cycles for line in lines.of_kind(Kind.ANGLE))
 
 
 def _shapes(
-    fits: Sequence[Fitted], alone: ShapeRefinement, regression: DecisionRegression
+    fits: Sequence[CandidateFit], alone: ShapeRefinement, regression: DecisionRegression
 ) -> list[Cause]:
     """Return an effect at its best shape, refined, and at the next best of the coarse search."""
     if not fits:
@@ -238,7 +242,9 @@ def _shapes(
     return [cause for cause in shaped if cause is not None]
 
 
-def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
+def best_transmission(
+    fits: Sequence[CandidateFit], alone: ShapeRefinement
+) -> tuple[CandidateFit, NDArray]:
     """Return a transmission at its best shape, and its slopes there, (N, d).
 
     It is refined from several starts. Where a load swings, the likelihood has several maxima, and
@@ -248,4 +254,4 @@ def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[F
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]
     refined = [alone.refined(kind[0]) for kind in (plain, refitted) if kind]
-    return max(refined, key=lambda pair: pair[0].worth)
+    return max(refined, key=lambda pair: pair[0].score)

@@ -6,8 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import ALWAYS, TURNS, Candidate, bends_motion, lowest
-from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted, ShapeRefinement
+from pipelines.diagnosis.candidates.candidate import (
+    ALWAYS,
+    TURNS,
+    Candidate,
+    lowest,
+    transforms_motion,
+)
+from pipelines.diagnosis.candidates.shape_refinement import (
+    TONE_STEP_HZ,
+    CandidateFit,
+    ShapeRefinement,
+)
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect, Parameter
@@ -23,16 +33,16 @@ OSCILLATING = {"Hz", *TURNS}
 APART = 2
 """Least distance between two maxima along an oscillating parameter, in grid steps."""
 
-Fit = Callable[[Candidate], Fitted | None]
+Fit = Callable[[Candidate], CandidateFit | None]
 
 
 def screened(
     effect: Effect, alone: ShapeRefinement, runs: Sequence[Run], regression: DecisionRegression
-) -> list[Fitted]:
+) -> list[CandidateFit]:
     """Return the fits of an effect's grid, those that explain most first."""
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
-    elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
+    elif any(p.per_run for p in effect.shape) and not transforms_motion(effect):
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [
@@ -42,7 +52,7 @@ def screened(
         fits = [fitted for start in starts for fitted in alone.fits_of_transmission(start)]
     else:
         fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
-    return sorted(fits, key=lambda fitted: -fitted.worth)
+    return sorted(fits, key=lambda fitted: -fitted.score)
 
 
 def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
@@ -50,7 +60,7 @@ def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -
     return Candidate(effect, (directions[0],) * runs, tuple(directions))
 
 
-def others_of(fits: Sequence[Fitted], chosen: Fitted, most: int) -> list[Fitted]:
+def others_of(fits: Sequence[CandidateFit], chosen: CandidateFit, most: int) -> list[CandidateFit]:
     """Return the best fits at other forms or other maxima than the chosen fit."""
     effect = chosen.candidate.effect
     kept = [chosen]
@@ -85,7 +95,7 @@ def _grid(
     if [p.unit for p in effect.shape] == ["Hz"]:
         yield from ((f,) for f in _rhythms(effect, runs, regression))
         return
-    few = BENDING if bends_motion(effect) and not effect.swings else VALUES
+    few = BENDING if transforms_motion(effect) and not effect.swings else VALUES
     yield from itertools.product(*(_tried(effect, p, few, runs) for p in effect.shape))
 
 

@@ -43,7 +43,7 @@ TONE_STEP_HZ = 0.01
 
 
 @dataclass(frozen=True)
-class Fitted:
+class CandidateFit:
     """One candidate and how much it explains."""
 
     candidate: Candidate
@@ -57,7 +57,7 @@ class Fitted:
     """The same with amplitude one, for a candidate that transforms the motion."""
 
     @property
-    def worth(self) -> float:
+    def score(self) -> float:
         """The gain by which shapes are compared.
 
         For a swinging load the amplitude is one: another amplitude would scale the twist, and the
@@ -68,7 +68,7 @@ class Fitted:
     @property
     def torque(self) -> NDArray:
         """Prediction of the candidate at its shape, (N,) rows."""
-        transforms = self.candidate.bends and not self.candidate.directions
+        transforms = self.candidate.transforms_motion and not self.candidate.directions
         amplitudes = np.ones_like(self.amplitudes) if transforms else self.amplitudes
         return self.columns @ amplitudes
 
@@ -98,30 +98,30 @@ class ShapeRefinement:
         size = np.linalg.norm(rows, axis=0)
         return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
 
-    def fit(self, candidate: Candidate) -> Fitted | None:
+    def fit(self, candidate: Candidate) -> CandidateFit | None:
         """Fit a candidate's amplitudes; return None where its rows are not finite."""
         columns = self._rows(candidate, self._others)
         return None if columns is None else self._fitted(candidate, columns)
 
-    def _fitted(self, candidate: Candidate, columns: NDArray) -> Fitted:
+    def _fitted(self, candidate: Candidate, columns: NDArray) -> CandidateFit:
         """Fit the amplitudes of a candidate's columns (N, k)."""
         plain = self._project(columns)
         amplitudes, gain = _solved(plain, self._measured)
         as_is = gain
-        if candidate.bends and not candidate.directions:
+        if candidate.transforms_motion and not candidate.directions:
             remainder = self._measured - plain.sum(axis=1)
             as_is = 0.5 * float(self._measured @ self._measured - remainder @ remainder)
-        return Fitted(candidate, columns, amplitudes, gain, as_is)
+        return CandidateFit(candidate, columns, amplitudes, gain, as_is)
 
-    def best_of(self, fits: Sequence[Fitted]) -> Fitted | None:
+    def best_of(self, fits: Sequence[CandidateFit]) -> CandidateFit | None:
         """Return the fit of an effect that explains most here, from fits made elsewhere."""
         if fits[0].candidate.onset is not None:
             return self._with_onsets(fits[0].candidate)
         return max(
-            (self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.worth
+            (self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.score
         )
 
-    def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
+    def refined(self, start: CandidateFit) -> tuple[CandidateFit, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d).
 
         A transmission's rigid bodies and shapes are fitted in turn. Either may come first, because
@@ -131,16 +131,16 @@ class ShapeRefinement:
             return self._refined(start)
         own = None if start.candidate.bodies else self.fit(self._with_own_bodies(start.candidate))
         starts = [start] if own is None else [start, own]
-        best, slopes = max(map(self._refined, starts), key=lambda pair: pair[0].worth)
+        best, slopes = max(map(self._refined, starts), key=lambda pair: pair[0].score)
         for _ in range(BODY_REFITS):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._others))
             refined = None if ahead is None else self._refined(ahead)
-            if refined is None or refined[0].worth < best.worth + ENOUGH:
+            if refined is None or refined[0].score < best.score + ENOUGH:
                 break
             best, slopes = refined
         return best, slopes
 
-    def _refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
+    def _refined(self, start: CandidateFit) -> tuple[CandidateFit, NDArray]:
         """Return the candidate's best shape with given rigid bodies, and slopes, (N, d)."""
         if start.candidate.directions:
             # Linear in its shapes: the amplitudes are the shape.
@@ -161,7 +161,7 @@ class ShapeRefinement:
                 break
         return best, slopes
 
-    def fits_of_transmission(self, candidate: Candidate) -> list[Fitted]:
+    def fits_of_transmission(self, candidate: Candidate) -> list[CandidateFit]:
         """Fit a transmission with the baseline's bodies, and with refitted ones.
 
         A fit whose rows are not finite is left out.
@@ -175,7 +175,7 @@ class ShapeRefinement:
             candidate = self._rows.with_refitted_bodies(candidate, self._others)
         return candidate
 
-    def _with_onsets(self, candidate: Candidate) -> Fitted | None:
+    def _with_onsets(self, candidate: Candidate) -> CandidateFit | None:
         """Return a candidate whose onset in each run is the instant at which it explains most.
 
         It never begins in a run where that explains as much. Its amplitude is the same in all runs.
@@ -225,10 +225,10 @@ class ShapeRefinement:
         square = np.sum(plain**2, axis=0)
         return 0.5 * (plain.T @ self._measured) ** 2 / np.where(square > 0.0, square, np.inf)
 
-    def _scaled(self, start: Fitted) -> Fitted:
+    def _scaled(self, start: CandidateFit) -> CandidateFit:
         """Return a candidate that transforms the motion, its shape scaled by the amplitude."""
         effect, (amplitude, *others) = start.candidate.effect, start.amplitudes
-        if not start.candidate.bends or others or amplitude <= 0.0:
+        if not start.candidate.transforms_motion or others or amplitude <= 0.0:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         if parameter.by_factors:
@@ -248,7 +248,7 @@ class ShapeRefinement:
             else candidate
         )
 
-    def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
+    def _slopes(self, fitted: CandidateFit, units: list[tuple[int, float]]) -> NDArray:
         """Return the change of the prediction by each free shape, per unit of change, (N, d)."""
         slopes = np.zeros((len(self._measured), len(units)))
         for d, (i, unit) in enumerate(units):
@@ -259,10 +259,10 @@ class ShapeRefinement:
         return slopes
 
     def _step(
-        self, fitted: Fitted, slopes: NDArray, units: list[tuple[int, float]]
-    ) -> Fitted | None:
+        self, fitted: CandidateFit, slopes: NDArray, units: list[tuple[int, float]]
+    ) -> CandidateFit | None:
         """Return the fit after one step along all free shapes; None where no step gains."""
-        transforms = fitted.candidate.bends
+        transforms = fitted.candidate.transforms_motion
         parts = [slopes] if transforms else [fitted.columns, slopes]
         plain = self._project(np.hstack(parts))
         # An effect that transforms the motion has no amplitude: its shape alone explains the rest.
@@ -291,7 +291,7 @@ def _solved(rows: NDArray, target: NDArray) -> tuple[NDArray, float]:
     return solution / size, 0.5 * float(right @ solution)
 
 
-def _shaped(fitted: Fitted) -> Fitted:
+def _shaped(fitted: CandidateFit) -> CandidateFit:
     """Return a candidate that is linear in its shapes, at the shape given by its amplitudes."""
     candidate = fitted.candidate
     directions = np.array(candidate.directions)

@@ -30,7 +30,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
-from pipelines.diagnosis.evidence.downsampling import thinned
+from pipelines.diagnosis.evidence.downsampling import downsampled
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.known_effects import known_effects
@@ -308,7 +308,7 @@ def detectability_of_recorded(
     """
     motions = on_one_scale(motions)
     refuse_unfit(motions)
-    motions = [thinned(m) for m in motions]
+    motions = [downsampled(m) for m in motions]
     runs = [observe(m) for m in motions if m.purpose == "train"] or [observe(m) for m in motions]
     baseline = baseline_of(runs, known_effects(known, runs[0].motion.machine))
     active = np.any([run.usable.any(axis=0) for run in runs], axis=0).astype(float)
@@ -338,7 +338,7 @@ def _results_of(
     effect: Effect, problem: DetectionProblem, power: float
 ) -> Iterator[DetectionResult]:
     for candidate in _shapes(effect, problem.runs):
-        if candidate.bends:
+        if candidate.transforms_motion:
             yield _bent(candidate, problem, power)
         else:
             yield _added(candidate, problem, power)
@@ -350,7 +350,7 @@ def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
     if chosen := effect.directions([run.motion for run in runs]):
         yield from (Candidate(effect, (shape,) * len(runs)) for shape in chosen[0])
         return
-    if probe.bends:
+    if probe.transforms_motion:
         weak = values_of(effect.shape[0], BENDING)[-1]
         yield Candidate(effect, ((float(weak),),) * len(runs))
         return

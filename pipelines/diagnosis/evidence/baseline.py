@@ -78,7 +78,7 @@ def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
     return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
 
 
-def like_trained(run: Run, baseline: Baseline) -> Run:
+def only_trained_outputs(run: Run, baseline: Baseline) -> Run:
     """Return the run without its cuffs if no training run has any: their zeros are unknown."""
     if baseline.cuffs or not run.has_cuffs:
         return run

@@ -11,7 +11,7 @@ ENOUGH_HZ = 200.0
 """Rate down to which neighbouring samples are averaged."""
 
 
-def thinned(motion: Motion) -> Motion:
+def downsampled(motion: Motion) -> Motion:
     """Return the motion averaged to ``ENOUGH_HZ`` or a little more; unchanged if slower."""
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:

@@ -18,7 +18,7 @@ from pipelines.model import Model
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedRuns:
     """Runs under the baseline alone: the training runs, or all runs where all are searched."""
 
     runs: tuple[Run, ...]
@@ -54,23 +54,23 @@ class Prepared:
         return [r.measured - c @ self.values for r, c in zip(self.runs, self.columns, strict=True)]
 
 
-def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
+def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
     """Fit the baseline alone, and measure the noise of its residual."""
     columns = tuple(columns_under((), run, baseline)[0] for run in runs)
     gram = gram_of_runs(runs, columns)
     weights = weights_under(gram)
     values = solve(gram, weights)
-    laden = tuple(with_load(run, baseline, values) for run in runs)
+    loaded = tuple(with_load(run, baseline, values) for run in runs)
     residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
-    noise = noise_model(laden, residuals)
-    predicted = _at_full_rate(laden, baseline, values)
-    motions = [run.motion for run in laden]
+    noise = noise_model(loaded, residuals)
+    predicted = _at_full_rate(loaded, baseline, values)
+    motions = [run.motion for run in loaded]
     lines = lines_in(
         motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)]
     )
     torque = varying_torque(runs)
-    return Prepared(
-        laden, baseline, columns, values, weights, noise, torque, predicted, tuple(lines)
+    return PreparedRuns(
+        loaded, baseline, columns, values, weights, noise, torque, predicted, tuple(lines)
     )
 
 

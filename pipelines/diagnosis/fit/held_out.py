@@ -16,7 +16,7 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.change_point import Onset
-from pipelines.diagnosis.fit.joint_fit import Fit, laden, step_of
+from pipelines.diagnosis.fit.joint_fit import Fit, step_of, with_loads_of
 from pipelines.model import Model, Term
 
 STRETCH_S = 1.0
@@ -30,7 +30,7 @@ NEWTON_STEPS = 3
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return the residuals (m, O) N·m of each run under a model fitted elsewhere."""
-    return [_residual(fit, run, baseline) for run in laden(runs, fit, baseline)]
+    return [_residual(fit, run, baseline) for run in with_loads_of(runs, fit, baseline)]
 
 
 def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
@@ -62,7 +62,7 @@ def _shared_term(cause: Candidate) -> Term:
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> list[Term]:
     """Return the causes as terms of a run's model with its own onsets and phases."""
-    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
+    values, _, terms = _learn(fit, with_loads_of([run], fit, baseline)[0], baseline, run.usable)
     return list(Model(tuple(terms)).with_linear(values[baseline.size :])) if terms else []
 
 
@@ -128,7 +128,9 @@ def _bent(
     """
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     places = [
-        (number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None
+        (number, i)
+        for number, cause in enumerate(fit.causes)
+        if (i := cause.per_run_transform) is not None
     ]
     for _ in range(NEWTON_STEPS if places else 0):
         columns, measured = plain

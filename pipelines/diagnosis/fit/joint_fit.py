@@ -78,7 +78,7 @@ def fit(
     return Fit(causes, values, errors, rms, cost, _layout(causes, runs, baseline), loads)
 
 
-def laden(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
+def with_loads_of(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
     """Return runs with the joint loads of a fit."""
     return (
         list(runs)
@@ -89,7 +89,7 @@ def laden(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[Run]:
 
 def residuals_on(fitted: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return a fit's residuals on each run that it was fitted to, (m, O) N·m."""
-    columns = stacked_columns(fitted.causes, laden(runs, fitted, baseline), baseline)
+    columns = stacked_columns(fitted.causes, with_loads_of(runs, fitted, baseline), baseline)
     return [measured - c @ fitted.values for c, measured in columns]
 
 

@@ -58,7 +58,7 @@ class Refinement:
         """Return the fit at the same shapes with joint loads of its own rigid bodies."""
         for _ in range(SETTLING):
             loads = self._loads_after(best)
-            best = self._fit(best.causes, self._laden(loads), loads)
+            best = self._fit(best.causes, self._with_loads(loads), loads)
         return best
 
     def _refined(self, best: Fit) -> Fit:
@@ -67,7 +67,7 @@ class Refinement:
         for _ in range(ROUNDS if best.causes else 0):
             # Without this cause the fit's bodies were biased, and so were the loads.
             loads = self._loads_after(best)
-            runs = self._laden(loads)
+            runs = self._with_loads(loads)
             start = self._fit(best.causes, runs, loads)
             ahead = self._round(start, runs)
             fits.append(ahead)
@@ -82,14 +82,14 @@ class Refinement:
         if bodies is None:
             return self._fit(causes, self._runs, None)
         loads = np.array(bodies)
-        return self._fit(causes, self._laden(loads), loads)
+        return self._fit(causes, self._with_loads(loads), loads)
 
     def _loads_after(self, best: Fit) -> NDArray:
         """Return baseline values (size,) whose bodies make the loads of the next round."""
         size = self._baseline.size
         return relaxed(best.values[:size], None if best.loads is None else best.loads[:size])
 
-    def _laden(self, loads: NDArray) -> list[Run]:
+    def _with_loads(self, loads: NDArray) -> list[Run]:
         """Return the runs with the loads of the rigid bodies in a fit's values."""
         return [with_load(run, self._baseline, loads) for run in self._runs]
 
@@ -169,7 +169,7 @@ class Refinement:
         places: list[Place] = []
         for number, cause in enumerate(fitted.causes):
             for i, unit in free_shapes(cause):
-                own = i == cause.own_bend
+                own = i == cause.per_run_transform
                 acting = fitted.columns_of(number).runs if own else (-1,)
                 places += [(number, i, run, unit) for run in acting]
         return places

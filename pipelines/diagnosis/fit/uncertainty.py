@@ -16,7 +16,13 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slow_error
 from pipelines.diagnosis.fit.change_point import ALIKE_S
-from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
+from pipelines.diagnosis.fit.joint_fit import (
+    Fit,
+    onsets_of,
+    slope,
+    stacked_columns,
+    with_loads_of,
+)
 from pipelines.estimation.long_run import long_run_covariance
 
 RECURRENCE_S = 10.0
@@ -85,7 +91,7 @@ def uncertainty(
     -------
     Uncertainty
     """
-    runs = laden(runs, fit, baseline)
+    runs = with_loads_of(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
     residuals = [y - c @ fit.values for c, y in plain]

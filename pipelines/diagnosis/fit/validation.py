@@ -14,12 +14,12 @@ from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
-from pipelines.diagnosis.fit.joint_fit import Fit, fit, laden
+from pipelines.diagnosis.fit.joint_fit import Fit, fit, with_loads_of
 from pipelines.diagnosis.fit.validation_error import Errors, Gain, errors_of, gain
 
 
 @dataclass(frozen=True)
-class Validated:
+class ValidationResult:
     """A fitted model and its residuals on the validation runs."""
 
     fit: Fit
@@ -29,7 +29,7 @@ class Validated:
     errors: Errors
 
     @classmethod
-    def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "Validated":
+    def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "ValidationResult":
         """Evaluate a fit on the validation runs."""
         residuals = tuple(evaluate(fit, validate, baseline))
         return cls(fit, validate, residuals, errors_of(validate, residuals))
@@ -51,7 +51,7 @@ class Validated:
 
 def without_each(
     fitted: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
-) -> dict[str, Validated]:
+) -> dict[str, ValidationResult]:
     """Return the model without each of its causes, by label.
 
     The other causes are kept and fitted again under the same joint loads.
@@ -64,26 +64,26 @@ def without_each(
     weights : (O,) array
         Inverse variances of the outputs, 1/(N·m)².
     """
-    validated, runs = {}, laden(train, fitted, baseline)
+    validated, runs = {}, with_loads_of(train, fitted, baseline)
     for label in dict.fromkeys(cause.label for cause in fitted.causes):
         rest = [cause for cause in fitted.causes if cause.label != label]
-        validated[label] = Validated.of(
+        validated[label] = ValidationResult.of(
             fit(rest, runs, baseline, weights, fitted.loads), validate, baseline
         )
     return validated
 
 
-def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Gain]:
+def gains_of(without: Mapping[str, ValidationResult], whole: ValidationResult) -> dict[str, Gain]:
     """Return the gain of each cause, the others kept, by label."""
     return {label: gain(less.errors, whole.errors) for label, less in without.items()}
 
 
-def removed_share(less: Validated, whole: Validated) -> float | None:
+def removed_share(less: ValidationResult, whole: ValidationResult) -> float | None:
     """Return the share of a joint's systematic mean square that a cause removes, 0 to 1.
 
     Parameters
     ----------
-    less, whole : Validated
+    less, whole : ValidationResult
         The model without the cause, and with it.
 
     Returns
@@ -100,7 +100,7 @@ def removed_share(less: Validated, whole: Validated) -> float | None:
     return float(np.clip((without**2 - with_it**2) / power, 0.0, 1.0)) if power > 0.0 else None
 
 
-def log_likelihoods(validated: Validated, noise: NoiseModel) -> NDArray:
+def log_likelihoods(validated: ValidationResult, noise: NoiseModel) -> NDArray:
     """Return the log likelihood of the validation runs for each drive, (J,), up to a constant.
 
     It is computed in the decision band, under the noise of the training runs.

@@ -9,7 +9,7 @@ from pipelines.diagnosis.selection.posterior import Posterior, Set
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedCause:
     """A named cause."""
 
     element: Element
@@ -31,7 +31,7 @@ class Named:
 class Answer:
     """The answer of the posterior: named causes, and two probabilities."""
 
-    named: tuple[Named, ...]
+    named: tuple[NamedCause, ...]
     """The most probable first."""
     nothing: float
     """Probability that nothing is missing."""
@@ -124,13 +124,13 @@ def in_place(
     return own, dict(sorted(rivals.items(), key=lambda item: -item[1]))
 
 
-def _named(posterior: Posterior, best: Set, i: int) -> Named:
+def _named(posterior: Posterior, best: Set, i: int) -> NamedCause:
     """Return a cause of the best set with its ties: listed causes that could replace it."""
     element = posterior.elements[i]
     rest = posterior.labels_of(best) - {element.label}
     own, rivals = in_place(posterior, element.label, rest)
     ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied * own]
     members = frozenset((element.label, *(label for label, _ in ties)))
-    return Named(
+    return NamedCause(
         element, posterior.any_of(members), posterior.marginals[element.label], tuple(ties)
     )

@@ -21,7 +21,7 @@ from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import HUM, QUANTISATION, TIME, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import Cogging, Family
 from pipelines.wording.law import FAMILIES, law_label
 
@@ -346,7 +346,7 @@ def _normalised(variance: Sequence[float]) -> list[float]:
     return [v / total for v in variance]
 
 
-def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
+def _shown(kind: Kind, joint: int, prepared: PreparedRuns) -> list[Shown]:
     """Return the evidence of a joint's lines of one kind."""
     phases = 1 if kind is Kind.ANGLE else len(prepared.runs)
     lines = prepared.lines[joint].of_kind(kind)
@@ -354,7 +354,7 @@ def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
     return [(line.log_likelihood_ratio, line.amplitude / rms, phases) for line in lines]
 
 
-def _of_cause(number: int, cause: Cause, at: _Places, prepared: Prepared) -> Element:
+def _of_cause(number: int, cause: Cause, at: _Places, prepared: PreparedRuns) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
     tracked = (
@@ -387,10 +387,10 @@ def _of_cause(number: int, cause: Cause, at: _Places, prepared: Prepared) -> Ele
 
 def _positive(cause: Cause) -> list[int]:
     """Return which of the effect's amplitudes are never negative."""
-    effect, bends = cause.candidate.effect, cause.candidate.bends
+    effect = cause.candidate.effect
     if cause.candidate.directions:
         return []
-    if bends:
+    if cause.candidate.transforms_motion:
         # A column is the effect at its shape. Reversed, it would be a spring that pushes, or a
         # negative delay.
         free = [p for p in effect.shape if p.default is None]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.selection.answer import Answer, Named
+from pipelines.diagnosis.selection.answer import Answer, NamedCause
 from pipelines.diagnosis.selection.posterior import Posterior
 
 CLOSEST = 3
@@ -77,7 +77,7 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     return sorted(results, key=lambda finding: -finding.probability)
 
 
-def _of_cause(posterior: Posterior, named: Named) -> Finding:
+def _of_cause(posterior: Posterior, named: NamedCause) -> Finding:
     element = named.element
     alternatives = ((element.label, named.alone), *named.ties)
     labels = dict(alternatives)

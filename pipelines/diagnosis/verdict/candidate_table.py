@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
@@ -66,7 +66,7 @@ def _log_odds(d: Diagnosis, probability: float) -> float | None:
     return float(np.log(probability) - np.log(nothing))
 
 
-def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
+def _fitted(d: Diagnosis, labels: frozenset[str]) -> ValidationResult | None:
     """Return the fit of a set: the named one, or it without one cause; else None."""
     named = frozenset(d.causes)
     if labels == named:
@@ -75,7 +75,7 @@ def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
     return d.without[next(iter(missing))] if len(missing) == 1 and labels < named else None
 
 
-def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
+def _parameters(fitted: ValidationResult, d: Diagnosis) -> list[dict[str, Any]]:
     """Return the fitted parameters with their names in files; per-run parameters are left out."""
     rows: list[dict[str, Any]] = []
     for number, cause in enumerate(fitted.fit.causes):

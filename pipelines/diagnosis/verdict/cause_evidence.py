@@ -2,7 +2,7 @@
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.selection.answer import Named, in_place
+from pipelines.diagnosis.selection.answer import NamedCause, in_place
 from pipelines.effects import Effect, VoluntaryTorque
 from pipelines.wording.label import amount, effect_labelled, in_words, number
 
@@ -21,7 +21,7 @@ AUXILIARY = {
 """The auxiliary evidence in words, by effect (``candidates/auxiliary_evidence.py``)."""
 
 
-def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
+def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     """Return the sentences for a named cause."""
     label = named.element.label
     effect, gained = d.effects[label], d.gains[label]
@@ -77,7 +77,7 @@ def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
     return "whose gain may be chance", "that gain may be chance: its 95 % interval includes zero"
 
 
-def _next(d: Diagnosis, named: Named) -> str | None:
+def _next(d: Diagnosis, named: NamedCause) -> str | None:
     """Return in words how much less likely the next listed cause is in its place.
 
     The other named causes are kept.

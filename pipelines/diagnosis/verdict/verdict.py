@@ -9,7 +9,7 @@ from pipelines.diagnosis.dependence.explained_share import Dependence, dependenc
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.validation import removed_share
-from pipelines.diagnosis.selection.answer import Named
+from pipelines.diagnosis.selection.answer import NamedCause
 from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
 from pipelines.diagnosis.verdict.caveats import caveats
 from pipelines.diagnosis.verdict.control_benefit import control
@@ -142,7 +142,7 @@ def _depends_on(
     }
 
 
-def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:
+def _cause(d: Diagnosis, named: NamedCause) -> dict[str, Any]:
     label = named.element.label
     effect, gained = d.effects[label], d.gains[label]
     return {

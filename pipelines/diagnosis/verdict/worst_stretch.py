@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.fitted_model import model_of_run
-from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
@@ -56,7 +56,7 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
 
 
 def simulated_error(
-    validated: Validated, d: Diagnosis, stretch: Stretch
+    validated: ValidationResult, d: Diagnosis, stretch: Stretch
 ) -> tuple[NDArray, NDArray] | None:
     """Return times (k,) s and angle errors (k, J) rad of consecutive 1 s windows.
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import either
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
 from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
 from pipelines.plotting.style import NOISE
@@ -132,7 +132,7 @@ def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int)
 def _angles(
     angles: list[Axes],
     errors: list[Axes],
-    validated: Validated,
+    validated: ValidationResult,
     d: Diagnosis,
     stretch: Stretch,
     name: str,
@@ -153,7 +153,7 @@ def _angles(
 def _torques(
     torques: list[Axes],
     errors: list[Axes],
-    validated: Validated,
+    validated: ValidationResult,
     d: Diagnosis,
     stretch: Stretch,
     colour: str,

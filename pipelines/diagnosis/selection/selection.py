@@ -9,9 +9,9 @@ from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import Library, build_library, silent
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
-from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
+from pipelines.diagnosis.selection.answer import Answer, NamedCause, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.look_alikes import with_look_alikes
@@ -45,7 +45,7 @@ class AllRunsSearch:
 
 
 @dataclass(frozen=True)
-class Selected:
+class Selection:
     """The answer from the searched runs, before and after the validation runs judge it.
 
     The training runs are searched. Where their named causes leave more than noise on the validation
@@ -92,7 +92,7 @@ class Selected:
         return bool(self.answer.named) and not self.shows_unlisted
 
     @property
-    def without_names(self) -> "Selected":
+    def without_names(self) -> "Selection":
         """The same findings without named causes, which the validation runs contradict."""
         assert self.posterior is not None
         answer = replace(self.answer, named=())
@@ -101,7 +101,7 @@ class Selected:
             self, answer=answer, findings=findings_now, dropped=frozenset(self.answer.labels)
         )
 
-    def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
+    def as_all_runs_search(self, first: "Selection", train_count: int) -> "Selection":
         """Mark the result of all runs, after the training runs alone gave ``first``.
 
         The training runs are the first ``train_count``.
@@ -171,7 +171,7 @@ class Selected:
             if tie.variant not in self.charged and not tie.sized_each_run
         }
 
-    def judged(self, charges: Mapping[str, float], *, harms: bool = False) -> "Selected":
+    def judged(self, charges: Mapping[str, float], *, harms: bool = False) -> "Selection":
         """Return the answer after further charges.
 
         Parameters
@@ -195,7 +195,7 @@ class Selected:
         }
         return replace(again, dropped=(self.dropped | doubted) - set(again.answer.labels))
 
-    def _reweighed(self, weighed: Posterior) -> "Selected":
+    def _reweighed(self, weighed: Posterior) -> "Selection":
         """Return the answer of another posterior; only causes named or tied before may be named."""
         likely = answer_of(weighed, [one.members for one in self.answer.named])
         # Other causes that become likely are findings only: refuting one cause is no evidence for
@@ -206,7 +206,7 @@ class Selected:
             self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer))
         )
 
-    def with_look_alikes(self, removed: Mapping[str, float]) -> "Selected":
+    def with_look_alikes(self, removed: Mapping[str, float]) -> "Selection":
         """Return the answer in which named causes may be unlisted effects that resemble them.
 
         Parameters
@@ -226,7 +226,7 @@ class Selected:
     def _elements(self) -> tuple[Element, ...]:
         return () if self.searched is None else self.searched.elements
 
-    def _best_shape(self, label: str, one: Named) -> Element:
+    def _best_shape(self, label: str, one: NamedCause) -> Element:
         """Return the most probable shape of a tie in the place of a named cause."""
         assert self.posterior is not None
         labels = map(self.posterior.labels_of, self.posterior.sets)
@@ -243,7 +243,7 @@ class Selected:
         return next(e for i in best if (e := self.posterior.elements[i]).label == label)
 
 
-def _lowered(one: Named, charges: Mapping[str, float], elements: Sequence[Element]) -> float:
+def _lowered(one: NamedCause, charges: Mapping[str, float], elements: Sequence[Element]) -> float:
     """Return the probability of a named cause and its ties after the smallest of their charges.
 
     It was fitted without the other charged causes, so their charges do not lower it.
@@ -263,11 +263,11 @@ def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> 
     return weighed
 
 
-def select(prepared: Prepared, report: Report = silent) -> Selected:
+def select(prepared: PreparedRuns, report: Report = silent) -> Selection:
     """Weigh all sets of causes and laws, and read the answer off the posterior."""
     library, evidence, result = weighed(prepared, report)
     answer = answer_of(result)
-    return Selected(
+    return Selection(
         library,
         evidence,
         result,
@@ -285,12 +285,12 @@ def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidenc
     return weighed(prepared)[1]
 
 
-def nothing_selected(prepared: Prepared) -> Selected:
+def nothing_selected(prepared: PreparedRuns) -> Selection:
     """Return the empty answer where faults of acquisition prevent a search."""
-    return Selected(None, None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
+    return Selection(None, None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
 
 
-def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evidence, Posterior]:
+def weighed(prepared: PreparedRuns, report: Report = silent) -> tuple[Library, Evidence, Posterior]:
     """Return the library, its evidence, and the probability of each set.
 
     Causes are refined alone first, then together with the others of likely sets.
@@ -310,5 +310,5 @@ def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evide
     return refined, evidence, posterior(evidence)
 
 
-def _router(prepared: Prepared) -> tuple[ResidualShares, ...]:
+def _router(prepared: PreparedRuns) -> tuple[ResidualShares, ...]:
     return tuple(residual_shares(prepared.runs, prepared.residuals, prepared.noise))
