@@ -110,7 +110,8 @@ def _shortfalls(
     noise = prepared.noise
     for n, one in enumerate(selected.answer.named):
         rest = selected.candidates[:n] + selected.candidates[n + 1 :]
-        if not (rivals := selected.rivals_of(n)):
+        rivals = selected.rivals_of(n)
+        if not rivals:
             continue
         likelihoods = {one.element.variant: log_likelihoods(after, noise)}
         for variant, rival in rivals.items():

@@ -1,1 +1,1 @@
-"""What competes: the catalogue's causes and unlisted laws, as columns of one regression."""
+"""The candidates: the catalogue's causes and unlisted laws, as columns of one regression."""

@@ -35,9 +35,21 @@ def bent_column(
 
 
 def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
-    """Return a torque effect's columns in one run, (m, O, k): for drives, then for cuffs.
+    """Return a torque effect's columns in one run, for drives, then for cuffs.
 
     The cuffs' columns are zero where the person does not carry the effect.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    number : int
+        Number of the run.
+    run : Run
+
+    Returns
+    -------
+    (m, O, k) array
+        N·m per unit of each linear parameter.
     """
     # The same as Model.regressor of one plain term, but faster: it is called thousands of times.
     columns = candidate.effect.columns(run.motion, candidate.shapes[number])

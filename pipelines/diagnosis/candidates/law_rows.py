@@ -27,7 +27,20 @@ from pipelines.estimation.regression import away_from_reversals
 def law_rows(
     prepared: PreparedRuns, regression: DecisionRegression
 ) -> tuple[list[LawColumn], NDArray]:
-    """Return every smooth law and its rows (N, l), the baseline projected out."""
+    """Return every smooth law and its rows, the baseline projected out.
+
+    Parameters
+    ----------
+    prepared : PreparedRuns
+    regression : DecisionRegression
+
+    Returns
+    -------
+    list of LawColumn
+        One for each column.
+    (N, l) array
+        Weighted rows; a coefficient is a share of the joint's rms torque.
+    """
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
     drives: list[NDArray] = []
@@ -104,7 +117,20 @@ def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
 def curve_rows(
     prepared: PreparedRuns, regression: DecisionRegression
 ) -> tuple[list[Curve], NDArray]:
-    """Return every curve of time, and their rows (N, t), the baseline projected out."""
+    """Return every curve of time and its rows, the baseline projected out.
+
+    Parameters
+    ----------
+    prepared : PreparedRuns
+    regression : DecisionRegression
+
+    Returns
+    -------
+    list of Curve
+        One for each column.
+    (N, t) array
+        Weighted rows; a coefficient is a share of the joint's rms torque.
+    """
     kept, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)

@@ -216,9 +216,20 @@ def _speed_laws(v: NDArray, way: NDArray) -> Iterator[tuple[str, int, NDArray]]:
 
 
 def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
-    """Return cosines over a run, (m, k), and the prior variance of each coefficient, (k,).
+    """Return cosines over a run, and the prior variance of their coefficients.
 
     Together they are a torque that wanders in time with a share of one.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    (m, k) array
+        Cosines.
+    (k,) array
+        Variances.
     """
     elapsed = run.time - run.time[0]
     duration = float(elapsed[-1]) + 1e-6

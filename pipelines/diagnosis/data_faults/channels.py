@@ -249,7 +249,8 @@ def has_silent_cuffs(motion: Motion) -> bool:
     if motion.held_forces is None or motion.run != "with_human":
         return False
     channels = motion.held_forces.reshape(len(motion.held_forces), -1).T
-    return not any(np.ptp(known) > 0.0 for x in channels if len(known := x[np.isfinite(x)]))
+    known = [x[np.isfinite(x)] for x in channels]
+    return not any(len(x) and np.ptp(x) > 0.0 for x in known)
 
 
 def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:

@@ -25,7 +25,7 @@ class Fault:
 
     @property
     def spoils(self) -> bool:
-        """Whether it spoils the whole recording, so that physics would be blamed for it."""
+        """Whether it spoils the whole recording: physics must not be blamed for it."""
         return self.samples is None
 
 

@@ -86,8 +86,8 @@ def averages(motion: Motion) -> Averages | None:
         block.mean(x, starts)
         for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
     )
-    cuffs = None
-    if (forces := motion.on_segments) is not None and motion.geometry.has_cuffs:
+    cuffs, forces = None, motion.on_segments
+    if forces is not None and motion.geometry.has_cuffs:
         cuffs = block.mean(forces, starts)
     return Averages(motion, q, dq, ddq, direction, torque, cuffs)
 
@@ -123,9 +123,15 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
 
 
 def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
-    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains.
+    """Return the share of the cuffs' torque that no limb explains.
 
     The zeros of the sensors are free.
+
+    Parameters
+    ----------
+    run : Averages
+    cuffs : (m, 2, 3) array
+        Sums of front and back at thigh and shank, N.
     """
     g = run.motion.geometry
     measured = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)

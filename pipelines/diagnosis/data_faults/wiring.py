@@ -116,7 +116,8 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         f"rigid body and friction then leave {_percent(misfit(best))} of the torques' power"
         f" unexplained, {_percent(misfit(as_recorded))} as recorded"
     )
-    if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
+    mirror = MIRROR_IMAGES.get(best[3])
+    if best[4] == SIGN and mirror:
         mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
         why += f" (reversing {mirror} instead gives the same)"
     say = _reversed if best[4] == SIGN else _exchanged

@@ -1,1 +1,1 @@
-"""What a residual depends on, for what no listed cause explains."""
+"""Dependences of a residual that no listed cause explains."""

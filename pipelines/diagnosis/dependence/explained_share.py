@@ -399,7 +399,19 @@ def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) 
 
 
 def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) -> list[Excess]:
-    """Return each run's residual (m, O) N·m above the noise floor, joint by joint."""
+    """Return each run's residual above the noise floor, joint by joint.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+    floor : Floor
+
+    Returns
+    -------
+    list of Excess
+    """
     return [
         Excess(
             joint,

@@ -34,9 +34,8 @@ class Curve:
         """Place the knots where equally many blocks lie between two."""
         knots = []
         for variable in variables:
-            known = [
-                (x[run.usable[:, j]]) for run in runs if (x := variable.of(run, j)) is not None
-            ]
+            values = [(run, variable.of(run, j)) for run in runs]
+            known = [x[run.usable[:, j]] for run, x in values if x is not None]
             knots.append(
                 _knots(np.concatenate(known), variable.knots if len(variables) == 1 else FEWER)
             )
@@ -104,10 +103,22 @@ def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
 
 
 def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) -> list[Products]:
-    """Return the products of a design (n, k) and a residual (n,) for some partitions.
+    """Return the products of a design and a residual for some partitions of the rows into folds.
 
-    Each partition assigns the rows to folds, (n,). Rows that all partitions put into the same folds
-    are multiplied once.
+    Rows that all partitions put into the same folds are multiplied once.
+
+    Parameters
+    ----------
+    design : (n, k) array
+    y : (n,) array
+        Residual, N·m.
+    partitions : sequence of (n,) arrays
+        Number of each row's fold.
+
+    Returns
+    -------
+    list of Products
+        One for each partition.
     """
     cell = np.ravel_multi_index(tuple(partitions), (FOLDS,) * len(partitions))
     order = np.argsort(cell, kind="stable")

@@ -76,10 +76,20 @@ class SmoothTerm:
 
 
 def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm:
-    """Fit surfaces to the residuals (m, O) N·m of training runs, joint by joint.
+    """Fit surfaces to the residuals of training runs, joint by joint.
 
     With both kinds of run a law must predict one kind from the other, or act in the one with most
     of the error.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    SmoothTerm
     """
     terms = [
         _of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))

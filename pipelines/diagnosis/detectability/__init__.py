@@ -1,1 +1,1 @@
-"""Which sizes of each cause a motion and a noise level would reveal."""
+"""The sizes of each cause that a motion and a noise level reveal."""

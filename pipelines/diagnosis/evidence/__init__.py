@@ -1,2 +1,1 @@
-"""What the decision is made from: runs behind filters, their noise, and how the residual
-repeats."""
+"""The basis of the decision: filtered runs, their noise, and how the residual repeats."""

@@ -96,7 +96,15 @@ def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with loads of links and limb from the rigid bodies in ``values`` (b,)."""
+    """Return the run with loads of links and limb from the baseline's rigid bodies.
+
+    Parameters
+    ----------
+    run : Run
+    baseline : Baseline
+    values : (b,) array
+        Values of the baseline.
+    """
     layout = baseline.layout
     body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
     return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

@@ -59,9 +59,18 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
 
 
 def scatter(run: Run, residual: NDArray) -> NDArray:
-    """Return differences of adjacent periods over the root of two, (k, O) N·m.
+    """Return differences of adjacent periods at the same phase over the root of two.
 
-    They are NaN where a sample is not usable.
+    Parameters
+    ----------
+    run : Run
+    residual : (m, O) array
+        N·m.
+
+    Returns
+    -------
+    (k, O) array
+        N·m; NaN where a sample is not usable.
     """
     period = run.motion.period_s
     if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:

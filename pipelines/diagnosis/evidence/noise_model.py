@@ -92,7 +92,18 @@ class NoiseModel:
 
 
 def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel:
-    """Estimate the noise of each output from the residuals (m, O) N·m of each run."""
+    """Estimate the noise of each output.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    NoiseModel
+    """
     differences = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(one) for one in differences)
     if from_periods:

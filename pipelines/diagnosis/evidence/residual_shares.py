@@ -53,7 +53,20 @@ class ResidualShares:
 def residual_shares(
     runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel
 ) -> list[ResidualShares]:
-    """Split the residuals (m, O) N·m of each run, for each joint."""
+    """Split the mean square residual of each joint.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+    noise : NoiseModel
+
+    Returns
+    -------
+    list of ResidualShares
+        One for each joint.
+    """
     bands = [DecisionBand.of(run) for run in runs]
     averaged = [band.average(r) for band, r in zip(bands, residuals, strict=True)]
     joints = len(runs[0].motion.joints)

@@ -17,7 +17,7 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
 SLOW_S = 0.1
-"""Length of the averages: they pass what is slower than 4.4 Hz."""
+"""Length of the averages, s: they pass frequencies below 4.4 Hz."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,18 @@ class SlowError:
 
 
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
-    """Return the error of residuals (m, O) N·m in the slow band."""
+    """Return the error of residuals in the slow band.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    SlowError
+    """
     slow = [slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     longer = [run for run, _ in slow]
     floor = noise_floor(longer, [residual for _, residual in slow])

@@ -171,10 +171,25 @@ def filtered(x: NDArray, response: NDArray) -> NDArray:
 
 
 def noise(x: NDArray, mask: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
-    """Return frequencies (k,) Hz, and the power of a sample of noise at them, (k,) (N·m)².
+    """Estimate the spectrum of noise by Welch's method.
 
     Spectra of half-overlapping segments are averaged (Welch, 1967, IEEE Trans. Audio and
     Electroacoustics 15(2)), weighted by their usable part.
+
+    Parameters
+    ----------
+    x : (N,) array
+        Samples, zero where not usable, N·m.
+    mask : (N,) array
+        1 where a sample is usable, 0 elsewhere.
+    rate_hz : float
+
+    Returns
+    -------
+    (k,) array
+        Frequencies, Hz.
+    (k,) array
+        Power of a sample at them, (N·m)².
     """
     length = min(len(x), max(32, round(SEGMENT_S * rate_hz)))
     window = np.hanning(length)

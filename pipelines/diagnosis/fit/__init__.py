@@ -1,1 +1,1 @@
-"""The named causes fitted with the baseline, and what the fit says on other runs."""
+"""The named causes fitted with the baseline, and validated on other runs."""

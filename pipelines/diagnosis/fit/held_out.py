@@ -29,7 +29,19 @@ NEWTON_STEPS = 3
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
-    """Return the residuals (m, O) N·m of each run under a model fitted elsewhere."""
+    """Return the residuals of runs under a model fitted to other runs.
+
+    Parameters
+    ----------
+    fit : Fit
+    runs : sequence of Run
+    baseline : Baseline
+
+    Returns
+    -------
+    list of (m, O) arrays
+        Measured less predicted torque, N·m.
+    """
     return [_residual(fit, run, baseline) for run in with_loads_of(runs, fit, baseline)]
 
 

@@ -108,9 +108,20 @@ def _layout(
 def stacked_columns(
     causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 ) -> list[tuple[NDArray, NDArray]]:
-    """Return columns (m, O, c) and measured torque (m, O) N·m of each run.
+    """Return the columns of baseline and causes in each run, and its measured torque.
 
     Per-run parameters have columns of their own.
+
+    Parameters
+    ----------
+    causes : sequence of Candidate
+    runs : sequence of Run
+    baseline : Baseline
+
+    Returns
+    -------
+    list of ((m, O, c) array, (m, O) array)
+        Columns, N·m per unit, and torque, N·m.
     """
     layout = _layout(causes, runs, baseline)
     of_runs = (

@@ -20,9 +20,23 @@ from pipelines.estimation.parameter_table import Row, interval, rows_of, table_o
 
 
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
-    """Return ``parameters/1`` of a fit, p rows, and their covariance (p, p).
+    """Return ``parameters/1`` of a fit, and the covariance of its rows.
 
     There is a rigid body for each kind of run, and the human's.
+
+    Parameters
+    ----------
+    fit : Fit
+    baseline : Baseline
+    sure : Uncertainty
+        Of the fit.
+
+    Returns
+    -------
+    DataFrame
+        p rows.
+    (p, p) array
+        Covariance.
     """
     units = np.eye(len(sure.covariance))
     values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
@@ -92,7 +106,23 @@ def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray
 
 
 def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's parameters in a run, (p,), and the ends of their intervals, (p, 2)."""
+    """Return a cause's parameters in a run, and the ends of their intervals.
+
+    Parameters
+    ----------
+    fit : Fit
+    sure : Uncertainty
+        Of the fit.
+    number, run : int
+        Numbers of the cause and of a run that it acts in.
+
+    Returns
+    -------
+    (p,) array
+        Values.
+    (p, 2) array
+        Ends of the 95 % intervals.
+    """
     effect = fit.causes[number].effect
     fitted, fitted_slopes = _in_run(fit, sure, number, run)
     values, slopes = effect.physical(fitted), effect.jacobian(fitted) @ fitted_slopes

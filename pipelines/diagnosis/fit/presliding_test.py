@@ -163,7 +163,8 @@ def built_up(
         about = [[one for one in some if one is not None] for some in seen]
         if not all(about):
             continue
-        if (one := _of_joint(about[0], about[1], baseline, j)) is not None:
+        one = _of_joint(about[0], about[1], baseline, j)
+        if one is not None:
             rows.append(one)
     return rows
 
@@ -237,10 +238,18 @@ def _count(angle: NDArray) -> float:
 
 @njit(cache=True)
 def dahl(angle: NDArray, grain: float, travel: float) -> NDArray:
-    """Return Dahl's friction along an angle (n,), from -1 to 1, (n,).
+    """Return Dahl's friction along an angle, from -1 to 1, (n,).
 
-    It depends on the travel, not on time. An encoder that flickers by less than ``grain`` has not
-    moved. Dahl (1976), AIAA Journal 14(12), eq. 4, exponent 1.
+    It depends on the travel, not on time. Dahl (1976), AIAA Journal 14(12), eq. 4, exponent 1.
+
+    Parameters
+    ----------
+    angle : (n,) array
+        rad or m.
+    grain : float
+        An encoder that flickers by less has not moved.
+    travel : float
+        Over which 63 % of the friction changes sides.
     """
     out = np.zeros(len(angle))
     at, z = angle[0], 0.0

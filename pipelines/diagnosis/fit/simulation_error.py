@@ -14,9 +14,18 @@ from pipelines.errors import ExoidError
 
 
 def simulation_error(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArray | None:
-    """Return the rms angle error of consecutive 1 s simulations over all runs, (J,) rad.
+    """Return the rms angle error of consecutive 1 s simulations over all runs.
 
-    None where the forward dynamics cannot simulate the fitted model, or diverge.
+    Parameters
+    ----------
+    fit : Fit
+    runs : sequence of Run
+    baseline : Baseline
+
+    Returns
+    -------
+    (J,) array or None
+        rad; None where the forward dynamics cannot simulate the fitted model, or diverge.
     """
     squares, count = 0.0, 0
     for run in runs:

@@ -101,9 +101,19 @@ def removed_share(less: ValidationResult, whole: ValidationResult) -> float | No
 
 
 def log_likelihoods(validated: ValidationResult, noise: NoiseModel) -> NDArray:
-    """Return the log likelihood of the validation runs for each drive, (J,), up to a constant.
+    """Return the log likelihood of the validation runs for each drive, up to a constant.
 
     It is computed in the decision band, under the noise of the training runs.
+
+    Parameters
+    ----------
+    validated : ValidationResult
+    noise : NoiseModel
+        Of the training runs.
+
+    Returns
+    -------
+    (J,) array
     """
     joints = len(validated.runs[0].motion.joints)
     sigma = noise.sigma(LENGTH_S)[:joints]

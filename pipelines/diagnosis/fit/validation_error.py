@@ -41,7 +41,18 @@ def scored(run: Run) -> NDArray:
 
 
 def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
-    """Sum up the squared residuals (m, O) N·m of each run's drives."""
+    """Sum up the squared residuals of each run's drives, by period.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    Errors
+    """
     squares, counts, everywhere, valid = [], [], 0.0, 0
     for run, residual in zip(runs, residuals, strict=True):
         J = len(run.motion.joints)

@@ -1,1 +1,1 @@
-"""Which causes and unlisted laws explain a session: a posterior over sets of them."""
+"""The posterior over sets of causes and unlisted laws that explain a session."""

@@ -139,10 +139,11 @@ class Evidence:
         outputs = [regression.output == o for o in range(len(regression.torque))]
         parts = [(X[rows], regression.measured[rows]) for rows in outputs]
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
+        elements = tuple(_elements(library, at))
         return cls(
             gram,
             right,
-            (elements := tuple(_elements(library, at))),
+            elements,
             tuple(_background(library, at)),
             dict(auxiliary),
             np.array(list(_explained(library, at, gram, right))),

@@ -141,17 +141,18 @@ class Selection:
         ratios : mapping of str to float
             Log likelihood of the validation runs with a named cause over that without it, by label.
         """
-        harmful = [
-            (ratio, one.members)
+        judged = [
+            (ratios.get(one.element.label, 0.0), one.members)
             for one in self.answer.named
-            if (ratio := ratios.get(one.element.label, 0.0)) < 0.0
-            and not one.element.sized_each_run
+            if not one.element.sized_each_run
         ]
+        harmful = [(ratio, members) for ratio, members in judged if ratio < 0.0]
         for ratio, members in sorted(harmful, key=lambda pair: pair[0]):
             alike = {
                 e.variant for e in self._elements if e.label in members and not e.sized_each_run
             }
-            if charges := {variant: ratio for variant in alike if not self.charged.get(variant)}:
+            charges = {variant: ratio for variant in alike if not self.charged.get(variant)}
+            if charges:
                 return charges
         return {}
 
@@ -240,7 +241,8 @@ class Selection:
             chosen for own, chosen in has_it if rest <= own and one.element.label not in own
         )
         best = next(in_place, has_it[0][1])
-        return next(e for i in best if (e := self.posterior.elements[i]).label == label)
+        elements = (self.posterior.elements[i] for i in best)
+        return next(element for element in elements if element.label == label)
 
 
 def _lowered(one: NamedCause, charges: Mapping[str, float], elements: Sequence[Element]) -> float:

@@ -33,9 +33,11 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
         f"it removes {taken} of {amount(machine, joint, before)} of {machine.joint(joint).effort} "
         f"error at {the(joint)}{others} on the validation runs"
     ]
-    if doubt := doubt_of_gain(d, label):
+    doubt = doubt_of_gain(d, label)
+    if doubt:
         sentences.append(doubt[1])
-    if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
+    share = d.selected.removed.get(label, 1.0)
+    if share < NEARLY_ALL:
         sentences.append(
             f"it removes {100.0 * share:.0f} % of the systematic error there, and a true cause"
             " removes nearly all. So a part of its probability belongs to an unlisted effect that"
@@ -46,10 +48,12 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     assert d.selected.evidence is not None
     if d.selected.evidence.auxiliary.get(label, 0.0) > MENTIONED_FROM:
         sentences.append(AUXILIARY[effect.name])
-    if lines := len(named.element.shown):
+    lines = len(named.element.shown)
+    if lines:
         plural = "s stand" if lines > 1 else " stands"
         sentences.append(f"{lines} line{plural} out over the angle at the full sampling rate")
-    if rival := _next(d, named):
+    rival = _next(d, named)
+    if rival:
         sentences.append(rival)
     return [*sentences, f"it looks like {effect.looks_like}", f"to make sure: {effect.confirm}"]
 

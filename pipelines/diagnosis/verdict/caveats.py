@@ -22,7 +22,7 @@ LARGER = 2.0
 def caveats(d: Diagnosis) -> list[str]:
     """Return the caveats of the verdict, a sentence or two each."""
     noisy = (
-        f"{IN_WORDS}. Fits would underestimate inertia, so only what is below {CUTOFF_HZ:g} Hz is "
+        f"{IN_WORDS}. Fits would underestimate inertia, so only the band below {CUTOFF_HZ:g} Hz is "
         f"used: set filter.cutoff_hz = {CUTOFF_HZ:g} for the other stages, and check encoder "
         "counts and time stamps"
     )

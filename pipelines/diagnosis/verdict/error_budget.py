@@ -107,10 +107,21 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:
-    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)².
+    """Return the variance of residuals about their means at the same phase.
 
     It has noise and all that changes from period to period, drift included; the rest of the mean
-    square repeats. None without periods.
+    square repeats.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    residuals : sequence of (m, O) arrays
+        N·m of each run.
+
+    Returns
+    -------
+    (J,) array or None
+        (N·m)²; None without periods.
     """
     squares, freedom = np.zeros(len(runs[0].motion.joints)), 0
     for run, residual in zip(runs, residuals, strict=True):

@@ -132,7 +132,7 @@ def _nearest(d: Diagnosis) -> str:
 
 
 def _unlisted(d: Diagnosis) -> str:
-    """Return in words, at the known depth, what is missing that no listed cause explains."""
+    """Return in words, at the known depth, the missing effect that no listed cause explains."""
     results = findings(d)
     if not results:
         return "Something is missing, and no listed cause is likely."

@@ -58,10 +58,20 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
 def simulated_error(
     validated: ValidationResult, d: Diagnosis, stretch: Stretch
 ) -> tuple[NDArray, NDArray] | None:
-    """Return times (k,) s and angle errors (k, J) rad of consecutive 1 s windows.
+    """Simulate a stretch in consecutive 1 s windows, and return the angle errors.
 
-    NaN separates two windows. None where the model cannot be simulated: the forward dynamics cannot
-    combine its causes, or its mass matrix is that of no leg.
+    Parameters
+    ----------
+    validated : ValidationResult
+    d : Diagnosis
+    stretch : Stretch
+
+    Returns
+    -------
+    (k,) array and (k, J) array, or None
+        Times, s, and errors, rad, with NaN between two windows. None where the model cannot be
+        simulated: the forward dynamics cannot combine its causes, or its mass matrix is that of no
+        leg.
     """
     run = d.validate[stretch.run]
     try:

@@ -29,7 +29,7 @@ from pipelines.wording.label import in_words
 WIDTH = 125
 """Characters of the summary in a line."""
 LINE_IN, BODY_IN = 0.19, 3.5
-"""Heights of a line of the summary and of what is beneath it."""
+"""Heights of a line of the summary and of the panels below it."""
 
 
 def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
