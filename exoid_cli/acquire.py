@@ -112,7 +112,7 @@ def _record(
     reset_faults: bool,
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
-    from pipelines.acquisition.preconditions.human_interlock import unnoticed
+    from pipelines.acquisition.preconditions.human_interlock import unmonitored
     from pipelines.workflow.imported import refuse_imported, refuse_recorded
 
     def claim() -> None:
@@ -130,7 +130,7 @@ def _record(
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
             if settings.run == "with_human" and not rig.embedded:
-                for warning in unnoticed(rig):
+                for warning in unmonitored(rig):
                     console.warn(warning)
                 if not yes:
                     confirm(rig, settings, trajectory, motion, rate)

@@ -10,7 +10,7 @@ from exoid_cli.experiment_folder import open_experiment
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
-    from pipelines.acquisition.recording.recover import Recovered
+    from pipelines.acquisition.recording.recover import Recovery
 
 
 def recover(
@@ -35,7 +35,7 @@ def recover(
       exoid recover
       exoid recover recordings/with_human_train.parquet.journal
     """
-    from pipelines.acquisition.recording.recover import Recovered, journals_in
+    from pipelines.acquisition.recording.recover import Recovery, journals_in
     from pipelines.acquisition.recording.recover import recover as make_recording
 
     if not journals:
@@ -48,7 +48,7 @@ def recover(
         raise InputError(
             f"-o: names one recording, but there are {len(files)} journals; leave it out"
         )
-    recovered, refused = list[Recovered](), list[InputError]()
+    recovered, refused = list[Recovery](), list[InputError]()
     for file in files:
         try:
             with console.working(f"recovering {file.name}"):
@@ -64,33 +64,33 @@ def recover(
         raise refused[-1]
 
 
-def _in_words(recording: "Recovered") -> str:
-    account = recording.account
-    text = f"{recording.path}: {account.samples} samples"
-    if account.cut_off:
-        seconds = account.cut_off / account.rate_hz
-        text += f"; {account.cut_off} more ({seconds:.3f} s) were planned"
+def _in_words(recording: "Recovery") -> str:
+    summary = recording.summary
+    text = f"{recording.path}: {summary.samples} samples"
+    if summary.cut_off:
+        seconds = summary.cut_off / summary.rate_hz
+        text += f"; {summary.cut_off} more ({seconds:.3f} s) were planned"
     text += (
-        f"; {account.missed} are missing in {len(account.gaps)} gaps"
-        if account.gaps
+        f"; {summary.missed} are missing in {len(summary.gaps)} gaps"
+        if summary.gaps
         else "; no gaps"
     )
-    if account.damaged:
+    if summary.damaged:
         text += "; the journal is damaged or cut off, and is kept: check the disk"
-    if not account.checked:
+    if not summary.checked:
         text += "; its numbers were not checked, an older exoid wrote it without checksums"
-    return f"{text}; {account.abort or 'the run had ended, only its recording was not written'}"
+    return f"{text}; {summary.abort or 'the run had ended, only its recording was not written'}"
 
 
-def _as_json(recording: "Recovered") -> dict:
-    account = recording.account
+def _as_json(recording: "Recovery") -> dict:
+    summary = recording.summary
     return {
         "path": recording.path,
-        "samples": account.samples,
-        "planned": account.planned,
-        "cut_off": account.cut_off,
-        "gaps": account.gaps,
-        "abort": account.abort,
-        "damaged": account.damaged,
-        "checked": account.checked,
+        "samples": summary.samples,
+        "planned": summary.planned,
+        "cut_off": summary.cut_off,
+        "gaps": summary.gaps,
+        "abort": summary.abort,
+        "damaged": summary.damaged,
+        "checked": summary.checked,
     }

@@ -16,8 +16,8 @@ from exoid_cli.experiment_folder import (
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
-    from pipelines.acquisition.check.look import DeviceReport, RigReport
     from pipelines.acquisition.check.rate import Rate
+    from pipelines.acquisition.check.survey import DeviceReport, RigReport
 
 BLOCKS = " ▁▂▃▄▅▆▇█"
 FORCES = ("force_x", "force_y", "force_z")

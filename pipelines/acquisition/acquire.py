@@ -18,19 +18,20 @@ from pipelines.acquisition.loop import Loop
 from pipelines.acquisition.machine.embedded_rig import embedded
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.sampling import sampling_of
-from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import Lock, locked
 from pipelines.acquisition.pacing import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
-from pipelines.acquisition.preconditions.feasible_rate import refusals
+from pipelines.acquisition.preconditions.feasible_rate import rate_checks
 from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded
 from pipelines.acquisition.preconditions.rehearsal import refuse_unkept_rate
 from pipelines.acquisition.preconditions.set_point_resolution import refuse_coarse_set_points
-from pipelines.acquisition.preconditions.set_point_scale import refuse_misplaced_set_points
+from pipelines.acquisition.preconditions.set_point_scale import refuse_contradictory_set_points
 from pipelines.acquisition.progress import Progress, Report
 from pipelines.acquisition.recording.columns import columns_of
-from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
-from pipelines.acquisition.recording.recording import account_of, place_for, write_recording
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
+from pipelines.acquisition.recording.recording import recording_path, summarize, write_recording
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.states import State
 from pipelines.acquisition.uninterrupted import run_to_its_end
@@ -112,10 +113,10 @@ def acquire(
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
     with about(rig_path):
         refuse_coarse_set_points(rig, sample_rate_hz)
-        refuse_misplaced_set_points(rig)
+        refuse_contradictory_set_points(rig)
     if rig.clock == "real_time":
         with about(rig_path):
-            for refuse in refusals(with_sensors=run.run == "with_human"):
+            for refuse in rate_checks(with_sensors=run.run == "with_human"):
                 refuse(rig, sample_rate_hz)
     RECORDING.refuse_place(output)
     journal = journal_of(output)
@@ -136,7 +137,7 @@ def acquire(
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
     with (
         place as present,
-        alone(present),
+        exclusive_access(present),
         nullcontext() if rig.clock == "lockstep" else urgent(),
         _signals() as stopped_by,
     ):
@@ -262,7 +263,7 @@ def _signals() -> Iterator[list[str]]:
 def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str]:
     """Return whose fault the end of a run is, and in words how it ended and how it left the leg."""
     if supervisor.fault:
-        log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
+        log = _keep_traceback(supervisor.fault, recording_path(output, supervisor.why))
         return ExoidError, _with_drive_state(
             supervisor, f"{supervisor.why}; please report it with {log}"
         )
@@ -293,16 +294,16 @@ def _recorded(
     path = lock.path
     try:
         journal = JournalFile(path)
-        account = account_of(journal)
-        place, samples = place_for(output, account.abort), account.samples
-        if samples or not (account.abort or account.damaged):
-            write_recording(journal, place, account)
+        summary = summarize(journal)
+        place, samples = recording_path(output, summary.abort), summary.samples
+        if samples or not (summary.abort or summary.damaged):
+            write_recording(journal, place, summary)
     except (ExoidError, OSError) as error:
         raise kind(
             f"{text}; its samples are in {path}, but could not be written as a recording: {error};"
             f" once that is mended, `exoid recover {path}` makes one"
         ) from error
-    if account.damaged:
+    if summary.damaged:
         state_of_drives = (
             f"{samples} samples are in {place}, but"
             if samples
@@ -313,7 +314,7 @@ def _recorded(
             f" disk, {path} is kept"
         ) from fault
     lock.remove()
-    if account.abort:
+    if summary.abort:
         rest = (
             f", its {samples} samples so far are in {place}"
             if samples
@@ -321,7 +322,7 @@ def _recorded(
         )
         raise kind(text + rest) from fault
     return Outcome(
-        place, samples, account.missed, account.found.get("latency", {}).get("left_out", 0)
+        place, samples, summary.missed, summary.metadata.get("latency", {}).get("left_out", 0)
     )
 
 

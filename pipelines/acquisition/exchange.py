@@ -5,8 +5,9 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from pipelines.acquisition.machine.drive import Drive, Reading
+from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.machine import Machine, all_answers
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Answers
 from pipelines.acquisition.recording.latency_histogram import Latencies
 from pipelines.acquisition.safety.supervisor import Supervisor
@@ -77,9 +78,9 @@ class Exchange:
 
     def update(self, joint: int) -> None:
         """Pass on a drive's reports that came next to what was awaited, or were asked again."""
-        conditions = self.machine.drives[joint].conditions
-        while conditions:
-            self._supervisor.update_enabled(joint, conditions.pop(0))
+        statuses = self.machine.drives[joint].statuses
+        while statuses:
+            self._supervisor.update_enabled(joint, statuses.pop(0))
 
     def sent_at(self, joint: int) -> float:
         """Return when a drive was sent something last, or is being sent it."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from pipelines.acquisition.exchange import Exchange
+from pipelines.acquisition.machine.drive_protocol import disable
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.uninterrupted import outlive
 from pipelines.errors import DeviceError, Unanswered
@@ -132,7 +133,7 @@ class Stopping:
                 if not is_first:
                     await self._until_others_rest(joint)
                     await drive.device.line.renew()
-                await drive.disable(tracker.sent, in_motion=is_first)
+                await disable(drive, tracker.sent, in_motion=is_first)
                 return None
             # It may have waited for its turn: that was no try.
             except asyncio.CancelledError as error:

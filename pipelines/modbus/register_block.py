@@ -1,5 +1,4 @@
-"""Modbus registers and what they mean: one block of a device's register map, read and written as SI
-values."""
+"""A block of a device's Modbus registers, read and written as SI values."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -22,14 +21,14 @@ _STEP = {"big": 1, "little": -1}
 
 
 class Block:
-    """Registers that travel in one exchange, from the lowest address to the highest."""
+    """Registers of one exchange, from the lowest address to the highest."""
 
     def __init__(self, registers: Mapping[str, Register]) -> None:
         self.registers = dict(registers)
         self.names = tuple(registers)
         self.address = min(r.address for r in registers.values())
         self.count = max(r.address + r.registers for r in registers.values()) - self.address
-        # Bytes are picked in the order in which one big-endian structure of all values holds them.
+        # Bytes are picked in the order of one big-endian structure of all values.
         self._places = [place for r in registers.values() for place in self._bytes(r)]
         self._pick = itemgetter(*self._places)
         self._words_format = struct.Struct(f">{self.count}H")
@@ -45,7 +44,7 @@ class Block:
         return [2 * word + byte for word in words for byte in (0, 1)[:: _STEP[register.byte_order]]]
 
     def decode(self, words: Sequence[int]) -> dict[str, float]:
-        """Return the SI values in ``count`` words that were read at ``address``."""
+        """Return the SI values of ``count`` words read from ``address`` on."""
         raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
         return {
             name: value * scale + offset
@@ -53,8 +52,7 @@ class Block:
         }
 
     def encode(self, values: Mapping[str, float]) -> list[int]:
-        """Return ``count`` words that hold SI values; what does not fit saturates, as it does in a
-        device."""
+        """Return the ``count`` words of SI values; values beyond a register's range saturate."""
         raw = []
         for name, (scale, offset), limits in zip(
             self.names, self._scales, self._ranges, strict=True
@@ -67,8 +65,7 @@ class Block:
         return list(self._words_format.unpack(packed))
 
     def span(self, name: str) -> float:
-        """Return after which difference an unsigned counter begins anew, in SI units; 0 for one
-        that does not."""
+        """Return the modulus of an unsigned register in SI units; 0 for other registers."""
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0

@@ -1,1 +1,1 @@
-"""The process that exoid runs in: its event loop, and the signals that end it."""
+"""The process of exoid: its event loop, and the signals that end it."""

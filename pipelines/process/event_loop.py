@@ -1,4 +1,4 @@
-"""The event loop of whoever keeps time to a fraction of a millisecond."""
+"""An event loop that keeps time to a fraction of a millisecond."""
 
 import asyncio
 import os
@@ -7,20 +7,19 @@ import sys
 from contextlib import suppress
 
 MOST_FILES = 512
-"""Open files up to which the exact loop is used: it serves 1024 at most."""
+"""Most open files with which the exact loop is used, which supports 1024 at most."""
 
 
 def exact_event_loop() -> asyncio.AbstractEventLoop:
-    """Return an event loop that wakes its sleepers when they are due; the usual one waits for whole
-    milliseconds.
+    """Return an event loop with exact sleeps; the default one waits for whole milliseconds.
 
-    On Windows, and in a process with very many open files, it is the usual one all the same.
+    On Windows, and in a process with very many open files, it is the default one.
     """
-    descriptor = os.open(os.devnull, os.O_RDONLY)  # the lowest that is free
+    descriptor = os.open(os.devnull, os.O_RDONLY)  # the lowest free one
     os.close(descriptor)
     if sys.platform != "win32" and descriptor <= MOST_FILES:
         selector = selectors.SelectSelector()
-        with suppress(OSError):  # where nothing but sockets can be waited for
+        with suppress(OSError):  # where select supports only sockets
             selector.select(0.0)
             return asyncio.SelectorEventLoop(selector)
     return asyncio.new_event_loop()

@@ -1,4 +1,4 @@
-"""Signals that ask exoid to end, and whoever hears them in Python's place."""
+"""Signals that end exoid, and handlers in place of Python's."""
 
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -6,12 +6,11 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 ENDING = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT"}
-"""Signals that end exoid where the system has them, and what a user calls them."""
+"""Signals that end exoid on systems that have them, with their names for users."""
 
 
 def known(words: Mapping[str, str]) -> dict[signal.Signals, str]:
-    """Return those of some signals that this system has (Windows: two), and what a user calls
-    them."""
+    """Return those signals that this system has (Windows: two), with their names for users."""
     return {
         signal.Signals[name]: word
         for name, word in words.items()
@@ -20,8 +19,7 @@ def known(words: Mapping[str, str]) -> dict[signal.Signals, str]:
 
 
 def not_ignored(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
-    """Return the signals that nohup or a shell's background does not have ignored: those stay
-    so."""
+    """Return the signals that are not ignored, as nohup or a shell's background may have them."""
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
 
 
@@ -29,10 +27,9 @@ def not_ignored(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
 def handled(
     numbers: Iterable[signal.Signals], handle: Callable[[int, FrameType | None], None]
 ) -> Iterator[None]:
-    """Let ``handle`` be told of signals for as long as a block lasts, and whoever was before it
-    afterwards."""
+    """Handle signals for the duration of the block, then restore the handlers before it."""
     before = {}
-    # Outside a process's main thread nobody can catch signals, and nobody is sent them.
+    # Only the main thread can set handlers, and only it gets signals.
     with suppress(ValueError):
         for number in numbers:
             before[number] = signal.signal(number, handle)

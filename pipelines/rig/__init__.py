@@ -1,1 +1,1 @@
-"""The virtual rig: a plant that nobody has to fear, behind the registers of real devices."""
+"""The virtual rig: a simulated plant behind the registers of real devices."""

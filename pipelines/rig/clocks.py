@@ -1,5 +1,4 @@
-"""A virtual device's own clock: it samples the machine at instants of its own, which drift against
-other devices'."""
+"""A virtual device's own clock, whose sampling instants drift against those of other devices."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -11,14 +10,13 @@ from pipelines.rig.plant import Samples
 from pipelines.signals.interpolation import cubic_weights
 
 DELAY = 2.5
-"""Samples of the plant from the instant at which a device samples to that at which it can tell."""
+"""Samples of the plant from a device's sampling instant until the sample is available."""
 KEPT = 16
-"""Samples of the plant that are looked back on, beside those that are new."""
+"""Earlier samples of the plant that the interpolation keeps."""
 
 
 class OwnClock:
-    """Samples of the plant turned into those of a device whose clock gains ``ppm`` and began at
-    ``offset_s``."""
+    """Samples of a device whose clock gains ``ppm`` and began at ``offset_s``, from the plant's."""
 
     def __init__(self, ppm: float, offset_s: float, rate_hz: float, plant_rate_hz: float) -> None:
         self._rate = rate_hz
@@ -29,8 +27,7 @@ class OwnClock:
         self._seen: list[Samples] = []
 
     def sampled(self, chunk: Samples) -> Samples:
-        """Return what the device can tell since the last time, given what the plant did since then;
-        maybe nothing."""
+        """Add the plant's newest samples; return the device's new samples, if any."""
         self._seen.append(chunk)
         latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
@@ -50,7 +47,7 @@ class OwnClock:
 
 
 def _between(seen: Samples, at: NDArray) -> Samples:
-    """Return the plant's samples at fractional places, by cubic interpolation."""
+    """Interpolate the plant's samples at fractional places ``at`` (k,) by cubic polynomials."""
     base = np.clip(np.floor(at).astype(int), 1, max(len(seen.time) - 3, 1))
     x = at - base
     weights = np.stack(cubic_weights(x))

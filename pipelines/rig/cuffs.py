@@ -1,4 +1,4 @@
-"""Forces in the cuffs: how the exoskeleton hands its torque to the leg."""
+"""Forces in the cuffs, through which the exoskeleton's torque acts on the leg."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,11 @@ from pipelines.settings.rig.plant import PlantSettings
 
 
 def cuff_forces(human_torque: NDArray, q: NDArray, plant: PlantSettings) -> NDArray:
-    """Return what the four sensors feel without error, (n, 4, 3) N: thigh front, back, shank front,
-    back; x, y, z.
+    """Return the forces on the four sensors without error.
 
-    The inverse of ``mechanics.mechanisms.leg.cuff_torque``, made unique by how the limb hangs in
-    its cuffs: along its axis it carries a share of its weight, across it front and back cuff press,
-    never pull.
+    This is the inverse of ``mechanics.mechanisms.leg.cuff_torque``. Two assumptions make it unique:
+    along its axis each limb carries a share of its weight, and across it cuffs press but never
+    pull.
 
     Parameters
     ----------
@@ -20,6 +19,11 @@ def cuff_forces(human_torque: NDArray, q: NDArray, plant: PlantSettings) -> NDAr
         Torque of the exoskeleton on the leg, N·m about hip and knee.
     q : (n, 2) array
         Angles of the links, rad.
+
+    Returns
+    -------
+    (n, 4, 3) array
+        x, y, z, N, at thigh front, thigh back, shank front and shank back.
     """
     cuff = plant.cuff
     shank_x = -cuff.carried_share * cuff.shank_weight_n * np.cos(q[:, 0] + q[:, 1])

@@ -1,4 +1,4 @@
-"""What a virtual rig does about clients that mean harm, or do not know better."""
+"""Protection of a virtual rig against hostile or faulty clients."""
 
 from typing import TypeVar
 
@@ -11,14 +11,14 @@ Server = TypeVar("Server", bound=ModbusBaseServer)
 
 
 class NoRequest(ModbusPDU):
-    """A frame that asks for nothing that can be understood; answered as the specification says."""
+    """A frame that is no valid request; it gets the exception reply of the specification."""
 
     def __init__(self, function: int) -> None:
         super().__init__()
         self.function_code = function & 0x7F
 
     async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
-        """Refuse it."""
+        """Refuse the request."""
         return ExceptionResponse(self.function_code, ExcCodes.ILLEGAL_VALUE)
 
 
@@ -26,22 +26,21 @@ class Handler(ServerRequestHandler):
     """The rig's end of one connection."""
 
     def pause_writing(self) -> None:
-        """Hang up on a client that asks and does not fetch: its answers would pile up without
-        end."""
+        """Close the connection of a client that does not read its replies, which would pile up."""
         self.transport.abort()  # type: ignore[attr-defined]  # pymodbus declares the base of all transports
 
     def resume_writing(self) -> None:
-        """Nothing waits: whoever fell behind is gone."""
+        """Do nothing: the connection of a slow client was closed."""
 
     def callback_data(self, data: bytes, addr: tuple | None = None) -> int:
-        """Take what has come; drop what not even the end can be found of."""
+        """Process received bytes; discard those in which no frame can be found."""
         try:
             return super().callback_data(data, addr)
         except Exception:  # asyncio would print it and close the line for all devices on it
             return len(data)
 
     async def handle_request(self) -> None:
-        """Answer a request; for a unit that is not there as a gateway does."""
+        """Answer a request; for a missing unit as a gateway does."""
         request = self.last_pdu
         if request is None or request.dev_id in self.server.context.device_ids():
             await super().handle_request()
@@ -58,7 +57,7 @@ class Handler(ServerRequestHandler):
 
 
 def guarded(server: Server) -> Server:
-    """Return a server that no client can break or make grow."""
+    """Return a server that no client can stop or let grow without bounds."""
     decode = server.decoder.decode
     server.decoder.decode = lambda frame: decode(frame) or NoRequest(frame[0])  # type: ignore[method-assign]
     connection = (server.trace_packet, server.trace_pdu, server.trace_connect)

@@ -1,4 +1,4 @@
-"""Where a virtual rig is reached: a Modbus server at the end of a line, whatever its transport."""
+"""The Modbus server of a virtual rig's line, for any transport."""
 
 import asyncio
 import ssl
@@ -29,8 +29,7 @@ from pipelines.settings.rig.line import (
 async def listening(
     line: LineSettings, devices: list[SimDevice], requests: Sequence[type[ModbusPDU]] = ()
 ) -> AsyncIterator[str]:
-    """Serve devices on a line for as long as the block lasts; yields the place where clients find
-    them.
+    """Serve devices on a line for the duration of the block; yield the address for clients.
 
     Parameters
     ----------
@@ -40,14 +39,14 @@ async def listening(
         it is empty.
     devices : list of SimDevice
     requests : sequence of ModbusPDU types
-        Requests that are served otherwise than by pymodbus.
+        Requests that replace those of pymodbus.
 
     Raises
     ------
     DeviceError
-        The place is taken.
+        The address is in use.
     SettingsError
-        A TLS line names no certificate that could be shown.
+        A TLS line has no usable certificate.
     """
     if isinstance(line, RtuLine):
         with null_modem() as (ours, theirs), _linked(line.serial_port, theirs) as place:
@@ -66,12 +65,11 @@ async def listening(
 def _network_server(line: NetworkLine, devices: list[SimDevice]) -> ModbusTcpServer:
     address = (line.host, line.port)
     if isinstance(line, TlsLine):
-        # pymodbus takes each record for one whole frame, whatever length the frame tells; records
-        # do not promise that.
+        # pymodbus takes each TLS record for one whole frame, which TLS does not guarantee.
         return ModbusTlsServer(
             devices, framer=FramerType.SOCKET, address=address, sslctx=_tls_context(line)
         )
-    # As on the bus behind a gateway, nobody answers for one who is not there.
+    # As on the bus behind a gateway, a missing device does not answer.
     if isinstance(line, RtuOverTcpLine):
         return ModbusTcpServer(
             devices, framer=FramerType.RTU, address=address, ignore_missing_devices=True
@@ -94,21 +92,21 @@ async def _serving(
         yield
     finally:
         for connection in server.active_connections.values():
-            if connection.transport:  # at once: TLS would wait for the client to say goodbye
+            if connection.transport:  # without the closing handshake of TLS
                 cast(asyncio.Transport, connection.transport).abort()
         await server.shutdown()
-        await asyncio.sleep(0)  # sockets are closed by the loop, one turn later
+        await asyncio.sleep(0)  # the loop closes sockets in its next turn
 
 
 @contextmanager
 def _linked(wanted: str, port: str) -> Iterator[str]:
-    """Make a path lead to a port, if one is wanted; yields where the port is found."""
+    """Link the ``wanted`` path to a port, unless it is empty; yield the path of the port."""
     if not wanted:
         yield port
         return
     link = Path(wanted)
     if link.is_symlink() and not link.exists():
-        link.unlink()  # what a killed rig left
+        link.unlink()  # left by a killed rig
     try:
         link.symlink_to(port)
     except FileExistsError as error:
@@ -127,8 +125,7 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
 
 
 def _what_is_there(link: Path) -> str:
-    # The system gives the number of a killed rig's port to others, so a link that leads somewhere
-    # may be its leftover.
+    # A killed rig's port may now be another process's, so a valid link may still be a leftover.
     if link.is_symlink():
         return (
             f"is a link to {link.readlink()} already, as a virtual rig makes one; end the rig that"
@@ -140,8 +137,7 @@ def _what_is_there(link: Path) -> str:
 
 
 def _tls_context(line: TlsLine) -> ssl.SSLContext:
-    """Return what the rig shows; it asks for a certificate where the rig file gives clients one to
-    show."""
+    """Return a TLS context with the rig's certificate; clients need one if the rig file has it."""
     if line.rig_certificate is None or line.rig_key is None:
         raise SettingsError(
             "a virtual rig on a TLS line shows a certificate too; give the line rig_certificate and"

@@ -9,8 +9,10 @@ from contextlib import contextmanager, suppress
 
 @contextmanager
 def null_modem() -> Iterator[tuple[str, str]]:
-    """Join two serial ports for as long as the block lasts, within a running event loop; yields
-    their paths."""
+    """Connect two serial ports for the duration of the block, in a running event loop.
+
+    Yield their paths.
+    """
     loop = asyncio.get_running_loop()
     pairs = [os.openpty(), os.openpty()]
     for (near, _), (far, _) in (pairs, pairs[::-1]):
@@ -18,8 +20,8 @@ def null_modem() -> Iterator[tuple[str, str]]:
         loop.add_reader(near, _pass_on, near, far)
     try:
         for _, port in pairs:
-            tty.setraw(port)  # else it would echo whatever came before a client sets it up
-        # The ports stay open here too: a client may come and go without the cable being pulled.
+            tty.setraw(port)  # else it echoes bytes until a client sets it up
+        # The ports stay open here too, so that a client can disconnect and connect again.
         yield os.ttyname(pairs[0][1]), os.ttyname(pairs[1][1])
     finally:
         for pair in pairs:
@@ -29,6 +31,6 @@ def null_modem() -> Iterator[tuple[str, str]]:
 
 
 def _pass_on(near: int, far: int) -> None:
-    # What nobody fetches at the far end is lost, as on a cable.
+    # Bytes that are not read at the far end are lost, as on a cable.
     with suppress(BlockingIOError):
         os.write(far, os.read(near, 4096))

@@ -1,5 +1,4 @@
-"""The machine behind the virtual rig: a leg under its drives' position loops, and what its sensors
-say of it."""
+"""The simulated machine of the virtual rig: a leg, its drives' position loops, and its sensors."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ JOINTS = ("hip", "knee")
 
 @dataclass(frozen=True)
 class Samples:
-    """What the rig's devices measured at n instants, SI units."""
+    """Measurements of the rig's devices at n instants, SI units."""
 
     time: NDArray
     """(n,) s, the middle of each sample's window."""
@@ -43,13 +42,13 @@ class Samples:
     reference: NDArray
     """(n, J) rad, set-point at the window's end."""
     forces: NDArray
-    """(n, 4, 3) N; zeros and noise alone with nobody in the machine."""
+    """(n, 4, 3) N; only zeros and noise in an empty machine."""
     truth: NDArray
-    """(n, 4, J) link angle, speed, acceleration, motor angle: what no device knows, for tests."""
+    """(n, 4, J) true link angle, speed, acceleration and motor angle, for tests."""
 
 
 class Plant:
-    """A leg in motion; each call of ``run`` carries it on from where it stood."""
+    """A leg in motion; each call of ``run`` continues from the last state."""
 
     def __init__(
         self,
@@ -69,9 +68,9 @@ class Plant:
         seed : int
             Seed of this run's noise.
         effects : iterable of Term
-            Effects beside those that the settings name, such as sealed ones.
+            Effects in addition to those of the settings, such as hidden ones.
         sample_rate_hz : float, optional
-            Samples a second, where not the settings'.
+            Samples a second; by default that of the settings.
         """
         self.settings = settings
         self.has_human = run == "with_human"
@@ -96,8 +95,8 @@ class Plant:
         self._loop = loop_at_rest(self._assembly, np.array(settings.rest_rad))
         self._scratch = workspace(len(JOINTS)), stages(len(JOINTS), len(self._loop.memory))
         self._noise = np.random.default_rng(seed)
-        # Of its own: what an empty machine's sensors say must not change what its drives do.
-        self._unfelt = np.random.default_rng([seed, 1])
+        # Separate, so that an empty machine's sensors do not change its drives' noise.
+        self._sensor_noise = np.random.default_rng([seed, 1])
         self._ripple = np.zeros(len(JOINTS))
         warming = settings.temperature
         self._warming = (warming.ambient_c, warming.heating_c_nm2, warming.time_constant_s)
@@ -107,7 +106,7 @@ class Plant:
 
     @property
     def reference(self) -> NDArray:
-        """Last set-point, (J,) rad: to begin with, where the leg stands."""
+        """Last set-point, (J,) rad; at first the leg's angle."""
         return self._loop.reference.copy()
 
     def run(self, reference: NDArray, enabled: NDArray) -> Samples:
@@ -118,7 +117,12 @@ class Plant:
         reference : (n, J) array
             Set-point at each sample's end, rad.
         enabled : (J,) array of bool
-            Which drives follow theirs; the others apply no torque.
+            Drives that follow their set-points; the others apply no torque.
+
+        Returns
+        -------
+        Samples
+            One for each set-point.
         """
         n = len(reference)
         period = 1.0 / self.sample_rate_hz
@@ -169,16 +173,16 @@ class Plant:
         )
 
     def _noise_alone(self, n: int) -> NDArray:
-        return self._zeros + self._unfelt.normal(0.0, self.settings.cuff.noise_n, (n, 4, 3))
+        return self._zeros + self._sensor_noise.normal(0.0, self.settings.cuff.noise_n, (n, 4, 3))
 
 
 def term_of(effect: PlantEffect, source: str) -> Term:
-    """Return a setting as a term of the model; ``source`` starts the message of a refusal.
+    """Return a setting as a term of the model; errors begin with ``source``.
 
     Raises
     ------
     SettingsError
-        Where its joint or its values are not the effect's.
+        The effect has no such joint or values.
     """
     try:
         built = effect_named(effect.effect)(joint=effect.joint)
@@ -191,7 +195,7 @@ def term_of(effect: PlantEffect, source: str) -> Term:
 
 
 def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term]) -> Model:
-    """Return the whole machine's model, the person a rigid body of their own."""
+    """Return the model of the machine, with the person as a rigid body of their own."""
     exo, human = np.array(settings.exo_inertial), np.array(settings.human_inertial)
     for name, X in (("exo_inertial", exo), ("exo_inertial + human_inertial", exo + human)):
         if broken := LEG.unrealizable(X, geometry):
@@ -213,8 +217,7 @@ def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term])
 
 @njit(cache=True)
 def _first_order(wanted, share, state):
-    """Let ``state`` (J,) follow ``wanted`` (n, J), closing ``share`` of the distance at each
-    sample."""
+    """Low-pass ``wanted`` (n, J) by a first-order filter of gain ``share`` and ``state`` (J,)."""
     out = np.empty_like(wanted)
     for k in range(len(wanted)):
         for j in range(len(state)):
@@ -225,13 +228,13 @@ def _first_order(wanted, share, state):
 
 @njit(cache=True)
 def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human, warming):
-    """Carry the loop on along set-points (n, J).
+    """Simulate the position loops along set-points (n, J).
 
-    ``warming`` is the temperature of the room (°C), the final rise per squared torque, and the
-    rise's time constant.
+    ``warming`` is the room's temperature (°C), the final rise per squared torque (°C/(N·m)²), and
+    the rise's time constant (s).
 
     Returns measured angle, speed and torque (n, J), the motors' temperature (n, J), truth (n, 4,
-    J), and the torque that the terms marked in ``of_human`` take of the drives' (n, J).
+    J), and the torque of the terms marked in ``of_human`` (n, J).
     """
     ambient, heating, time_constant = warming
     n, joints = reference.shape

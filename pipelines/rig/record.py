@@ -1,5 +1,4 @@
-"""A ``recording/1`` made without devices: the plant moved by arrays, for tests and identification
-campaigns."""
+"""A ``recording/1`` of the plant without devices, for tests and identification campaigns."""
 
 from typing import Any
 
@@ -13,15 +12,15 @@ from pipelines.mechanics.trajectory import Trajectory
 from pipelines.rig.plant import JOINTS, Plant
 
 LEAD_S = 4.0
-"""Time to go from rest into the motion, and for transients to fade."""
+"""Time for the way from rest into the motion, in which transients decay."""
 
 
 def record(
     plant: Plant, trajectory: Trajectory, duration_s: float, purpose: str = "train"
 ) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """Return frame and metadata of a run of ``duration_s`` along a trajectory.
+    """Simulate a run of ``duration_s`` along a trajectory; return its table and metadata.
 
-    The same physics and the same channels as over Modbus. The leg goes from rest into the motion
+    Physics and channels are those of the rig behind Modbus. The leg goes from rest into the motion
     first; the recording begins where the motion repeats.
     """
     rate = plant.sample_rate_hz
@@ -47,8 +46,7 @@ def record(
 
 
 def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) -> NDArray:
-    """Return set-points (n, J) from rest into the motion: a share of it that grows smoothly from 0
-    to 1."""
+    """Return set-points (n, J) rad from rest into the motion, by a share from 0 to 1 of it."""
     ahead = (np.arange(-samples, 0) + 0.5) / rate
     share = smooth_share((ahead + LEAD_S) / (0.75 * LEAD_S))[:, np.newaxis]
     period = trajectory.period_s

@@ -1,5 +1,4 @@
-"""A drive's own record of its latest samples, as the virtual rig serves it: a ring for FC03, or a
-queue for FC24."""
+"""A virtual drive's own record of its latest samples: a ring for FC03, or a queue for FC24."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -13,11 +12,11 @@ from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.ring import MOST_QUEUED, RingSettings
 
 QUEUE_RECORDS = 4096
-"""What a queue holds; the oldest record makes room."""
+"""Capacity of a queue; the oldest record is overwritten."""
 
 
 class Ring:
-    """The latest samples of one drive in its registers."""
+    """The latest samples of one drive."""
 
     def __init__(self, settings: RingSettings) -> None:
         self._block = Block(registers_of(settings.record))
@@ -33,14 +32,14 @@ class Ring:
 
     @property
     def spans(self) -> tuple[range, ...]:
-        """The addresses it takes; a queue takes none."""
+        """Its addresses; a queue has none."""
         if self.newest is None:
             return ()
         newest = range(self.newest.address, self.newest.address + self.newest.count)
         return newest, range(self.address, self.address + len(self.held))
 
     def append(self, sequence: int, values: Mapping[str, float]) -> None:
-        """Add a sample; the oldest makes room."""
+        """Add a sample in place of the oldest one."""
         words = [0] * self._words
         words[self._block.address : self._block.address + self._block.count] = self._block.encode(
             values
@@ -53,8 +52,10 @@ class Ring:
         self.last = sequence
 
     def show(self, registers: list[int], first: int, address: int, count: int) -> None:
-        """Put that part of the ring into a device's ``registers`` which a request for ``count`` of
-        them will see."""
+        """Write the requested part of the ring into a device's ``registers``.
+
+        They begin at address ``first``; ``count`` of them are requested from ``address`` on.
+        """
         low, high = max(address, self.address), min(address + count, self.address + len(self.held))
         if low < high:
             registers[low - first : high - first] = self.held[
@@ -65,17 +66,19 @@ class Ring:
             words = self.newest.encode({"newest": self.last % self.newest.span("newest")})
             registers[start : start + self.newest.count] = words
 
-    def taken(self) -> list[int]:
-        """Return as many whole records as one FC24 answer carries, and let them go."""
+    def take(self) -> list[int]:
+        """Remove and return the words of as many whole records as one FC24 reply can hold."""
         records = min(len(self._queue), MOST_QUEUED // self._words)
         return [word for _ in range(records) for word in self._queue.popleft()]
 
 
 def fifo_request(queues: Mapping[int, Callable[[int], list[int] | None]]) -> type[ModbusPDU]:
-    """Return an FC24 request that devices answer: of each unit id a function from address to words,
-    None for no queue.
+    """Return an FC24 request that is answered from ``queues``, since pymodbus answers constants.
 
-    pymodbus' own request answers with four constants.
+    Parameters
+    ----------
+    queues : mapping
+        For each unit id, a function from a queue's address to its words; None for no queue.
     """
 
     class ReadFifo(ReadFifoQueueRequest):

@@ -1,8 +1,7 @@
-"""A sealed file: what a virtual rig hides. Only the rig's own process opens it; nothing of it is
-ever recorded.
+"""A sealed file: the hidden effects of a virtual rig. Only the rig's own process reads it.
 
-It lists possibilities, each an effect with a range for every value; the file's seed chooses among
-them. So a person who reads the file knows what might be hidden, and still has to find what is.
+It lists possible effects with a range for every value; the file's seed chooses among them. So a
+reader of the file knows the possibilities, but not the choice.
 """
 
 from pathlib import Path
@@ -18,7 +17,7 @@ from pipelines.settings.rig.plant import PlantEffect
 
 
 class Possibility(Settings):
-    """An effect that may be hidden."""
+    """An effect that may be hidden in the rig."""
 
     effect: str = Field(description="Its name.")
     joints: tuple[Literal["hip", "knee"], ...] = Field(
@@ -29,14 +28,14 @@ class Possibility(Settings):
 
 
 class SealedFile(Settings):
-    """What might be hidden, and the seed that decides."""
+    """Possible hidden effects, and the seed that chooses among them."""
 
     seed: int = Field(ge=0, description="Chooses the effects, their joints and their values.")
     hidden: int = Field(1, ge=0, description="How many of the possibilities are there.")
     possibility: tuple[Possibility, ...] = Field(min_length=1, description="The possibilities.")
 
     @model_validator(mode="after")
-    def _there_are_enough(self) -> Self:
+    def _check_count(self) -> Self:
         if self.hidden > len(self.possibility):
             raise ValueError(
                 f"hidden: found {self.hidden}, expected at most the {len(self.possibility)}"
@@ -48,18 +47,20 @@ class SealedFile(Settings):
 def hidden_effects(path: Path) -> tuple[Term, ...]:
     """Return the effects that a sealed file's seed chooses."""
     file = load_toml(path, SealedFile)
-    draw = np.random.default_rng(file.seed)
-    chosen = draw.permutation(len(file.possibility))[: file.hidden]
-    return tuple(_drawn(file.possibility[i], draw, f"{path}: possibility[{i}]") for i in chosen)
-
-
-def _drawn(possibility: Possibility, draw: np.random.Generator, source: str) -> Term:
-    joint = (
-        possibility.joints[draw.integers(len(possibility.joints))] if possibility.joints else None
+    rng = np.random.default_rng(file.seed)
+    chosen = rng.permutation(len(file.possibility))[: file.hidden]
+    return tuple(
+        _draw_effect(file.possibility[i], rng, f"{path}: possibility[{i}]") for i in chosen
     )
-    sign = draw.choice([-1.0, 1.0]) if possibility.either_sign else 1.0
+
+
+def _draw_effect(possibility: Possibility, rng: np.random.Generator, source: str) -> Term:
+    joint = (
+        possibility.joints[rng.integers(len(possibility.joints))] if possibility.joints else None
+    )
+    sign = rng.choice([-1.0, 1.0]) if possibility.either_sign else 1.0
     values = {
-        name: float(sign * draw.uniform(low, high))
+        name: float(sign * rng.uniform(low, high))
         for name, (low, high) in possibility.values.items()
     }
     return term_of(PlantEffect(effect=possibility.effect, joint=joint, values=values), source)

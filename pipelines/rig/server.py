@@ -1,10 +1,8 @@
-"""The virtual rig on the wire: drives and force sensors as Modbus devices, all latched at one
-instant.
+"""The virtual rig as Modbus devices: drives and force sensors, all latched at one instant.
 
-In lockstep a cycle (a sample, or those that a ring takes from one set-point to the next) lasts
-until every drive has been exchanged once (FC23: set-point in, sample out), so a run depends on
-seeds and set-points alone. In real time samples come on the rig's own clock, or on a clock of each
-drive's own.
+In lockstep a cycle (one sample, or those of a ring from one set-point to the next) lasts until
+there was one exchange with every drive (FC23: set-point in, sample out). So a run depends only on
+seeds and set-points. In real time the samples follow the rig's clock, or each drive's own.
 """
 
 import asyncio
@@ -30,12 +28,12 @@ from pipelines.mechanics.motion import CUFFS
 from pipelines.modbus.register_block import Block
 from pipelines.process.event_loop import exact_event_loop
 from pipelines.rig.clocks import OwnClock
-from pipelines.rig.ended import ended_by_signals
 from pipelines.rig.listening import listening
 from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.ring import Ring, fifo_request
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
+from pipelines.rig.stop_signals import set_on_signals
 from pipelines.settings.rig import RigSettings, load_rig
 from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import DriveSettings, SensorSettings
@@ -43,41 +41,40 @@ from pipelines.settings.rig.line import LineSettings, RtuLine, TcpLine
 from pipelines.settings.rig.register_map import DriveMap, Identity, SensorMap
 
 Announce = Callable[[str, str | None], None]
-"""Told a place and whose it is: the name of a line, None for devices that are on none."""
+"""Called with an address and the name of its line; None for devices that are on no line."""
 
 READ_WRITE = 23
-"""Function code of the exchange that lockstep counts."""
+"""Function code of the exchange that ends a cycle in lockstep."""
 
 
 def build_plant(
     rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None
 ) -> Plant:
-    """Return the plant of a rig file, with what it hides; ``sample_rate_hz`` is that of set-points.
+    """Return the plant of a rig file with its hidden effects, for a rate of set-points.
 
     Raises
     ------
     SettingsError
-        Where it has no ``[plant]``.
+        The file has no ``[plant]``.
     """
     if rig.plant is None:
         raise SettingsError(
-            f"{path}: plant: missing, so there is no machine to play; add a [plant], see"
+            f"{path}: plant: missing, so there is no machine to simulate; add a [plant], see"
             " docs/rig.md"
         )
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
     cycle_hz = sample_rate_hz or rig.plant.sample_rate_hz
     with about(path):
         device_hz = cycle_hz * rig.samples_per_cycle(cycle_hz)
-        # What a device samples between the plant's samples is interpolated: those must lie closely.
-        finer = (
-            max(1, round(rig.plant.drive_rate_hz / device_hz)) if any(rig.plant.clock_ppm) else 1
-        )
+        finer = 1
+        if any(rig.plant.clock_ppm):
+            # Devices then sample between the plant's samples, which must be close to interpolate.
+            finer = max(1, round(rig.plant.drive_rate_hz / device_hz))
         return Plant(rig.plant, run, seed, hidden, device_hz * finer)
 
 
 class Device:
-    """Registers of one device; they are written when they are read, from the sample that is latched
-    then."""
+    """Registers of one device, filled at each request with the sample that is latched then."""
 
     def __init__(
         self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]
@@ -87,17 +84,17 @@ class Device:
         self.identity = tuple(identity)
         self.blocks = tuple(blocks)
         self.registers: list[int] = []
-        """The words of the device, shared with the server, from ``first`` on."""
+        """The device's words from address ``first`` on, shared with the server."""
         self.first = 0
         self.written = False
-        """Whether it was told anything since the last sample."""
+        """Whether it was written to since the last sample."""
 
     def as_served(self) -> SimDevice:
-        """Return the device as the server knows it."""
+        """Return the device for the server."""
         held = {entry.address: entry.value for entry in self.identity}
         for span in self.spans():
             held |= dict.fromkeys(span, 0)
-        # One SimData for each stretch of addresses: what lies between does not exist.
+        # One SimData for each stretch of addresses; registers in between do not exist.
         stretches = groupby(enumerate(sorted(held)), lambda numbered: numbered[1] - numbered[0])
         addresses = [[address for _, address in stretch] for _, stretch in stretches]
         data = [
@@ -107,7 +104,7 @@ class Device:
         return SimDevice(self.unit, simdata=data, action=self._serve)
 
     def spans(self) -> tuple[range, ...]:
-        """Return the addresses it takes, beside those of its identity."""
+        """Return the addresses of its registers, except those of its identity."""
         return tuple(range(block.address, block.address + block.count) for block in self.blocks)
 
     async def _serve(
@@ -122,7 +119,7 @@ class Device:
         self.registers, self.first = registers, first
         if written is not None and not self.takes(address, count):
             return ExcCodes.ILLEGAL_ADDRESS
-        self.rig.catch_up()  # before a write takes effect: until now the old set-point held
+        self.rig.catch_up()  # with the old set-point, before a write takes effect
         self.written |= written is not None
         if written is None:
             self.show(self.latched())
@@ -136,7 +133,7 @@ class Device:
         return False
 
     def latched(self) -> Samples:
-        """Return the sample that the device tells now."""
+        """Return the sample that the device has latched."""
         return self.rig.sample
 
     def show(self, sample: Samples) -> None:
@@ -144,8 +141,7 @@ class Device:
         raise NotImplementedError
 
     def show_records(self, address: int, count: int) -> None:
-        """Put into the registers what is asked for of a record of earlier samples; nothing where
-        there is none."""
+        """Put requested records of earlier samples into the registers; a device may have none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:
         start = block.address - self.first
@@ -158,10 +154,8 @@ class Drive(Device):
     def __init__(
         self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, servo: Servo
     ) -> None:
-        self.read, self.write = (
-            Block(registers_of(registers.read)),
-            Block(registers_of(registers.write)),
-        )
+        self.read = Block(registers_of(registers.read))
+        self.write = Block(registers_of(registers.write))
         self.ring = Ring(registers.ring) if registers.ring else None
         super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
         self.joint = JOINTS.index(settings.joint)
@@ -173,7 +167,7 @@ class Drive(Device):
         """Latest sample by its own clock."""
 
     def spans(self) -> tuple[range, ...]:
-        """Return the addresses it takes, those of the ring among them."""
+        """Return the addresses of its registers and of its ring."""
         return super().spans() + (self.ring.spans if self.ring else ())
 
     def takes(self, address: int, count: int) -> bool:
@@ -184,19 +178,19 @@ class Drive(Device):
         )
 
     def receive(self) -> None:
-        """Let the servo take what was written since it was last heard."""
+        """Pass a set-point and control word that were written since the last call to the servo."""
         if not self.written:
             return
         self.written = False
         start = self.write.address - self.first
         values = self.write.decode(self.registers[start : start + self.write.count])
-        # Where there is a counter for that, only a new count tells that the host lives.
+        # With a heartbeat register, only a new count proves that the host is alive.
         beat, self._beat = self._beat, values.get("heartbeat")
         if beat is None or beat != self._beat:
             self.servo.receive(values["reference"], int(values["control"]))
 
     def record(self, samples: Samples) -> None:
-        """Take in what the plant did since the last time."""
+        """Add the plant's newest samples."""
         if self.clock:
             samples = self.clock.sampled(samples)
             if len(samples.sequence):
@@ -206,7 +200,7 @@ class Drive(Device):
                 self.ring.append(sequence, self._values(one(samples, k)))
 
     def latched(self) -> Samples:
-        """Return the sample that the device tells now."""
+        """Return the sample that the device has latched."""
         return self.sample or self.rig.sample
 
     def show(self, sample: Samples) -> None:
@@ -215,20 +209,19 @@ class Drive(Device):
         self._put(self.read, self._values(sample))
 
     def show_records(self, address: int, count: int) -> None:
-        """Put into the registers what is asked for of the ring."""
+        """Put the requested records of the ring into the registers."""
         if self.ring:
             self.ring.show(self.registers, self.first, address, count)
 
     def queue(self, address: int) -> list[int] | None:
-        """Return the oldest records of the queue at an address, which lets them go; None where
-        there is no queue."""
+        """Remove and return the oldest records of the queue at an address; None for no queue."""
         if self.ring is None or self.ring.fifo != address:
             return None
         self.rig.catch_up()
-        return self.ring.taken()
+        return self.ring.take()
 
     def _values(self, sample: Samples) -> dict[str, float]:
-        """Return what the registers tell of a sample, by quantity."""
+        """Return the values of a sample's registers by quantity, SI units."""
         j = self.joint
         return {
             "sequence": sample.sequence[0] % (self.read.span("sequence") or 2**63),
@@ -237,8 +230,7 @@ class Drive(Device):
             "velocity": sample.velocity[0, j],
             "current": sample.torque[0, j] / self.torque_per_ampere,
             "temperature": sample.temperature[0, j],
-            # The drive's state as it is now: a control word is answered at once, not at the next
-            # sample.
+            # The present state, so that a control word shows at once, not at the next sample.
             "status": float(self.servo.status),
             "reference": sample.reference[0, j],
         }
@@ -260,7 +252,7 @@ class Sensor(Device):
 
 
 def one(samples: Samples, k: int) -> Samples:
-    """Return the k-th of some samples."""
+    """Return the k-th sample."""
     places = slice(k, k + 1 or None)
     return Samples(**{name: values[places] for name, values in vars(samples).items()})
 
@@ -269,8 +261,7 @@ class VirtualRig:
     """All devices of a rig and the plant behind them."""
 
     def __init__(self, rig: RigSettings, plant: Plant, sample_rate_hz: float | None = None) -> None:
-        """Begin at rest; ``sample_rate_hz`` is that of set-points, where not the plant's
-        settings'."""
+        """Begin at rest; set-points come at ``sample_rate_hz``, by default the plant's."""
         self.plant = plant
         self.lockstep = rig.clock == "lockstep"
         cycle_hz = sample_rate_hz or plant.settings.sample_rate_hz
@@ -285,7 +276,7 @@ class VirtualRig:
         self._began = asyncio.get_running_loop().time()
 
     def _keep_own_time(self, rate_hz: float) -> None:
-        """Give the drives the clocks that the settings ask for."""
+        """Give the drives clocks of their own, where the settings have errors of clocks."""
         settings = self.plant.settings
         if any((*settings.clock_ppm, *settings.clock_offset_s)):
             for drive, ppm, offset in zip(
@@ -294,8 +285,7 @@ class VirtualRig:
                 drive.clock = OwnClock(ppm, offset, rate_hz, self.plant.sample_rate_hz)
 
     def exchanged(self, drive: Device) -> None:
-        """Note that a drive has been exchanged; after the last one the plant goes on, once its
-        reply is sent."""
+        """Note an exchange with a drive; after the last one's reply the plant goes on."""
         self._waiting.discard(drive)
         if self.lockstep and not self._waiting:
             asyncio.get_running_loop().call_soon(self.catch_up)
@@ -312,7 +302,7 @@ class VirtualRig:
             self._advance(self.sample.angle[0], due)
 
     async def keep_time(self) -> None:
-        """Latch samples on the rig's own clock, for ever."""
+        """Latch samples by the rig's own clock until cancelled."""
         loop = asyncio.get_running_loop()
         while True:
             due = (
@@ -336,8 +326,7 @@ class VirtualRig:
         )
 
     def _advance(self, angle: NDArray, count: int = 1) -> None:
-        """Go on by some samples, during which the drives are told nothing new, from measured angles
-        (J,) rad."""
+        """Advance by ``count`` samples without new set-points, from measured angles (J,) rad."""
         for drive in self.drives:
             drive.receive()
         set_points = [
@@ -364,28 +353,27 @@ async def serve(
     bind: str = "127.0.0.1",
     sample_rate_hz: float | None = None,
 ) -> None:
-    """Serve a rig on this machine until an event is set.
+    """Serve a rig on this computer until an event is set.
 
     Parameters
     ----------
     rig : RigSettings
     plant : Plant
     port : int or None
-        One TCP port for all devices, 0 for a free one of each line; None for what the rig file
-        names.
+        One TCP port for all devices, 0 for a free one per line; None for those of the rig file.
     announce : callable
-        Called with the place of each server once it listens, and the name of its line, None for
-        devices without.
+        Called with the address of each server once it listens, and the name of its line, None for
+        devices on no line.
     until : asyncio.Event
     bind : str
         Address on which TCP ports listen.
     sample_rate_hz : float, optional
-        Rate of set-points, where not the plant's settings'.
+        Rate of set-points; by default that of the plant's settings.
 
     Raises
     ------
     SettingsError
-        Where one ``port`` is given for devices on several lines, or on a serial one.
+        One ``port`` is given for several lines, or for a serial one.
     """
     virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
@@ -393,8 +381,8 @@ async def serve(
     for settings, device in zip(
         (*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True
     ):
-        alone = settings.port if port is None else port
-        key = alone if settings.line is None else settings.line
+        own_port = settings.port if port is None else port
+        key = own_port if settings.line is None else settings.line
         on_line[key].append(device.as_served())
         if isinstance(device, Drive):
             queues[key][device.unit] = device.queue
@@ -426,7 +414,7 @@ async def serve(
 
 
 def _placed(line: LineSettings, bind: str, port: int | None) -> LineSettings:
-    """Return where a line is served."""
+    """Return a line with the address at which it is served."""
     if isinstance(line, RtuLine):
         return line if port is None else line.at("")
     return line.at(f"{bind}:{line.port if port is None else port}")
@@ -443,15 +431,13 @@ def serve_file(
     until_input_ends: bool,
     bind: str = "127.0.0.1",
 ) -> None:
-    """Serve the rig in a file until Ctrl-C, another signal or, if asked, until standard input is
-    closed.
+    """Serve the rig of a file until a signal comes or, if wanted, standard input is closed.
 
-    The last ties the rig to the process that started it: an operating system closes the pipe
-    whatever becomes of that process.
+    The latter ends the rig with the process that started it: the operating system closes the pipe
+    even if that process is killed.
     """
     rig = load_rig(path)
-    # A first sample compiles the plant, which may take seconds: not once a client waits for a
-    # reply.
+    # The first sample compiles the plant, which may take seconds: before a client waits for it.
     build_plant(rig, path, run, seed, sample_rate_hz).run(
         np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool)
     )
@@ -467,12 +453,12 @@ def serve_file(
                 loop.call_soon_threadsafe(until.set)
 
             threading.Thread(target=wait, daemon=True).start()
-        with ended_by_signals(until) as came:
+        with set_on_signals(until) as came:
             await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
         return came
 
     if rig.clock == "real_time":
-        # Else looking through all that was imported would cost several samples now and then.
+        # A garbage collection through all imported modules would cost several samples.
         gc.freeze()
         with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -480,6 +466,6 @@ def serve_file(
     with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         came = runner.run(until_stopped())
     for number in came:
-        # Ctrl-C is how it is meant to end; who else asked for it is told so.
+        # Ctrl-C is the normal end; for other signals the process must end by that signal.
         if number != signal.SIGINT:
             signal.raise_signal(number)

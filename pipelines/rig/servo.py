@@ -1,22 +1,19 @@
-"""What a virtual drive makes of control words, set-points and silence: when its motor follows, and
-where to."""
+"""The logic of a virtual drive: when its motor follows, and to which set-point."""
 
 from math import ceil, floor, isfinite
 
 from pipelines.settings.rig.register_map import DriveMap
 
 EXTRAPOLATED = 5
-"""Cycles over which a drive goes on at its set-points' speed when none comes; then it slows
-down."""
+"""Cycles for which a drive continues at its set-points' speed without one; then it slows down."""
 EARLY, LATE = 0.25, 0.5
-"""Shares of a cycle by which a set-point is clearly that one and not another, though it comes early
-or late."""
+"""Shares of a cycle by which a set-point may come early or late and still be identified."""
 CATCH = 0.02
-"""Share of how early or late a set-point comes that the drive's own cycles follow."""
+"""Gain by which the drive's cycles follow the set-points' instants."""
 
 
 class Servo:
-    """The logic of one drive, a sample at a time."""
+    """The logic of one drive, sample by sample."""
 
     def __init__(
         self,
@@ -28,80 +25,82 @@ class Servo:
         heartbeat_s: float | None,
         samples_per_cycle: int = 1,
     ) -> None:
-        """Be a disabled drive at rest.
+        """Begin disabled and at rest.
 
         Parameters
         ----------
         rest : float
-            Where it stands, rad.
+            Angle of the joint, rad.
         angle_rad : (low, high)
-            Its joint's limits, rad.
+            Limits of the joint, rad.
         deceleration_rad_s2 : float
-            How it slows down when nothing is told any more.
+            Deceleration when set-points stay away.
         heartbeat_s : float or None
-            How long it may be told nothing before it disables itself; None for a drive without such
-            a watchdog.
+            Longest time without a set-point, after which the drive disables itself; None for a
+            drive without a watchdog.
         samples_per_cycle : int
-            Samples from one set-point to the next, a cycle. It goes to each in a straight line, to
-            be there a cycle after it was at the one before: set-points that come a little early or
-            late move it no less evenly.
+            Samples from one set-point to the next. The drive interpolates linearly, and reaches
+            each set-point one cycle after the one before, even if they come unevenly.
         """
         self.fault = False
-        """Latched until a fault reset, and no drive with a fault is enabled."""
+        """Latched until a fault reset; a drive with a fault is not enabled."""
         self._map = registers
         self._cycle = samples_per_cycle
         self._limits = angle_rad
         self._slowing = deceleration_rad_s2 / sample_rate_hz**2
-        self._patience = None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
+        self._heartbeat_samples = (
+            None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
+        )
         self._set_point, self._control = rest, registers.disable
-        self._last, self._step, self._unheard = rest, 0.0, 0
+        self._last, self._step = rest, 0.0
+        self._since = 0
+        """Samples since the last set-point."""
         self._pace = 0.0
+        """Speed of the set-points, rad per sample."""
         self._from, self._way = rest, float(samples_per_cycle)
-        """Where it was when the set-point came, and samples from then to when it is to be
-        reached."""
+        """Angle when the set-point came, and samples from then until it is to be reached."""
 
     @property
     def enabled(self) -> bool:
-        """Whether the motor follows."""
+        """Whether the motor follows set-points."""
         return not self.fault and self._control in (self._map.enable, self._map.halt)
 
     @property
     def status(self) -> int:
-        """The status word; a bit that the map gives no meaning stays 0."""
-        # A bit that means a fault does not say that the drive is merely disabled, though it is 0
-        # while it is enabled.
+        """The status word; bits without a meaning in the map are 0."""
+        # A fault bit may be part of enabled_mask, but must not be set by disabling alone.
         is_enabled, mask = self._map.enabled_value, self._map.enabled_mask & ~self._map.fault_mask
         word = is_enabled if self.enabled else is_enabled ^ mask
-        # The lowest bit that means a fault: which of them it is, the map does not tell.
+        # The lowest fault bit, as the map does not distinguish faults.
         return word | (self._map.fault_mask & -self._map.fault_mask if self.fault else 0)
 
     def receive(self, reference: float, control: int) -> None:
-        """Take a set-point (rad) and a control word."""
-        # It holds where it is told no number: arithmetic would carry that on for ever.
+        """Accept a set-point (rad) and a control word."""
+        # NaN would remain in the arithmetic for ever, so the drive holds instead.
         set_point = reference if isfinite(reference) else self._last
         cycles = self._cycles_to(set_point)
-        # The set-points' own speed: the way back from having gone on too far is none to go on at.
-        if cycles:
-            self._pace = (
-                (set_point - self._set_point) / (cycles * self._cycle) if self.enabled else 0.0
-            )
-        # A cycle after the one before was to be reached; by and by a cycle after it comes.
-        way = self._way - self._unheard + cycles * self._cycle
+        # From the set-points alone: after an extrapolation the way back has another speed.
+        if cycles and self.enabled:
+            self._pace = (set_point - self._set_point) / (cycles * self._cycle)
+        elif cycles:
+            self._pace = 0.0
+        # One cycle after the last set-point's; CATCH slowly adapts this to when set-points come.
+        way = self._way - self._since + cycles * self._cycle
         self._from, self._way = self._last, max(way + CATCH * (self._cycle - way), 1.0)
-        self._unheard = 0
+        self._since = 0
         if control == self._map.fault_reset:
             self.fault = False
         self._set_point, self._control = set_point, control
 
     def _cycles_to(self, set_point: float) -> int:
-        """Return how many set-points a new one (rad) is after the last one; 0 where it corrects
-        that.
+        """Return the cycles from the last set-point to a new one (rad); 0 for a correction.
 
-        The time tells; what is very late could be another one, and is what goes on at their speed.
+        The time decides. Where it is ambiguous, the set-points' speed does.
         """
-        waited = (self._unheard + self._cycle - self._way) / self._cycle
-        if (clear := floor(waited + EARLY)) != floor(waited - LATE):
-            return clear
+        waited = (self._since + self._cycle - self._way) / self._cycle
+        cycles = floor(waited + EARLY)
+        if cycles != floor(waited - LATE):
+            return cycles
         return min(
             max(floor(waited), 0),
             ceil(waited),
@@ -109,18 +108,18 @@ class Servo:
         )
 
     def next(self, angle: float) -> tuple[float, bool]:
-        """Return the set-point (rad) for the next sample and whether the motor follows it.
+        """Return the set-point (rad) of the next sample, and whether the motor follows it.
 
-        While it does not, the set-point is the measured ``angle`` (rad), so that enabling begins
-        without a jump.
+        If it does not, the set-point is the measured ``angle`` (rad), so that enabling the drive
+        causes no jump.
         """
         reference = self._reference() if self.enabled else angle
         self._step, self._last = reference - self._last, reference
-        self._unheard += 1
+        self._since += 1
         if (
             self.enabled
-            and self._patience is not None
-            and self._unheard > self._patience
+            and self._heartbeat_samples is not None
+            and self._since > self._heartbeat_samples
             and self._step == 0.0
         ):
             self.fault = True
@@ -129,10 +128,11 @@ class Servo:
     def _reference(self) -> float:
         if self._control == self._map.halt:
             return self._last
-        if (after := self._unheard + 1) <= self._way:
+        after = self._since + 1
+        if after <= self._way:
             return self._from + (self._set_point - self._from) * after / self._way
         reference = self._set_point + self._pace * (after - self._way)
-        if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
+        if self._since >= self._cycle * (1 + EXTRAPOLATED):
             slower = max(abs(self._step) - self._slowing, 0.0)
             reference = self._last + (slower if self._step > 0 else -slower)
         low, high = self._limits

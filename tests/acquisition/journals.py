@@ -2,7 +2,7 @@
 
 import pyarrow as pa
 
-from pipelines.acquisition.recording.journal import JournalFile, in_pieces
+from pipelines.acquisition.recording.journal_file import JournalFile, in_pieces
 
 
 def read_journal(path):

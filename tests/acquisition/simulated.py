@@ -15,7 +15,7 @@ from pipelines.acquisition import exchange as exchanges
 from pipelines.acquisition import holding, loop, pacing, progress, stopping
 from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.loop import Loop
-from pipelines.acquisition.machine import drive, force_sensor, machine
+from pipelines.acquisition.machine import drive, drive_protocol, force_sensor, machine
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.recording import journal
@@ -463,7 +463,18 @@ def _patched(simulated, time, run, plan, own):
             run.followed_since = time.now
 
     with ExitStack() as stack:
-        timed = (drive, exchanges, force_sensor, holding, loop, machine, pacing, progress, stopping)
+        timed = (
+            drive,
+            drive_protocol,
+            exchanges,
+            force_sensor,
+            holding,
+            loop,
+            machine,
+            pacing,
+            progress,
+            stopping,
+        )
         for module in timed:
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(

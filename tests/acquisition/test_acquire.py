@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.recording.journal import Journal, refuse_leftover
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.journal_file import refuse_leftover
 from pipelines.acquisition.recording.recording import write_recording
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of

@@ -113,7 +113,7 @@ def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record,
         "USE THE EMERGENCY STOP: the run is complete; and could not be disabled: drive hip"
         " (127.0.0.1:"
     )
-    assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(
+    assert "was sent the word to disable, but its status word is still 0x0001 after 0.3 s" in str(
         caught.value
     )
     assert (told.count("hip"), told.count("knee")) == (4, 2)

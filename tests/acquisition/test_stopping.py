@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.errors import DeviceError

@@ -184,7 +184,7 @@ def test_with_yes_given_beforehand_a_warning_says_that_nobody_watches_the_cuffs(
     (tmp_path / "rig.toml").write_text(without)
     outcome = exoid(*arguments, "--yes")
     assert outcome.err.startswith(
-        "warning: the rig file has no [[sensor]]: nobody watches how hard the cuffs press\n"
+        "warning: the rig file has no [[sensor]]: the force on the cuffs is not watched\n"
     )
 
 
@@ -206,8 +206,8 @@ def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_a_person_in_it(
     assert (outcome.code, outcome.out) == (2, "")
     assert (
         outcome.err
-        == f"exoid: {option} wants nobody in the machine, but --run with_human says that somebody"
-        " is; drop one\n"
+        == f"exoid: {option} needs an empty machine, but --run with_human means that a person is in"
+        " it; drop one\n"
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from exoid_cli.operator_view import Gauge, OperatorView, plain_line
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Row
 from pipelines.acquisition.progress import Progress
 from pipelines.acquisition.states import State

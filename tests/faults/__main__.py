@@ -40,7 +40,7 @@ def rows() -> Iterator[str]:
             journal = journal_of(ended.output)
             if journal.exists():
                 made = recover(journal)
-                missing, wrong = made.account.missed, _wrong(made.path, ended.latched)
+                missing, wrong = made.summary.missed, _wrong(made.path, ended.latched)
                 fate = (
                     "is killed, then `exoid recover`"
                     if ended.code < 0
@@ -48,7 +48,7 @@ def rows() -> Iterator[str]:
                 )
                 yield (
                     f"| TCP | {name} | {fate} | {missing} | {wrong} |"
-                    f" {_plain(ended.said) or made.account.abort} |\n"
+                    f" {_plain(ended.said) or made.summary.abort} |\n"
                 )
             else:
                 kept = Path(folder) / "run.aborted.parquet"

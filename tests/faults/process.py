@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.acquisition.recording.journal import JournalFile
+from pipelines.acquisition.recording.journal_file import JournalFile
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import ContractError
 from tests.faults.faults import nothing

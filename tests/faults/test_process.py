@@ -36,7 +36,7 @@ def test_a_full_disk_ends_the_run_and_what_was_written_before_is_recovered(tmp_p
     )
     made = recover(journal_of(ended.output))
     frame = RECORDING.read(made.path).frame
-    assert made.account.samples >= 40
+    assert made.summary.samples >= 40
     assert not wrong_rows(frame, ended.latched).any()
     assert (np.diff(frame["sequence"]) == 1).all()
 

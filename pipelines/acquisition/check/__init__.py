@@ -1,2 +1,1 @@
-"""Is the rig what its file says? Looked at from outside, then, if asked for, moved by hand or by
-itself."""
+"""Checks whether a rig agrees with its file: by reading, by hand, and by a small movement."""

@@ -1,5 +1,4 @@
-"""A person moves the leg and presses the cuffs as told; the registers are watched. The drives are
-disabled."""
+"""A guided manual test: a person moves the leg and presses the cuffs, with the drives disabled."""
 
 import asyncio
 import time
@@ -14,24 +13,26 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import AXES
 from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.drive_protocol import disable
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 PATIENCE_S = 20.0
 """Longest wait for each movement."""
 LOOK_S = 0.005
-"""From one look at the devices to the next."""
+"""Pause between two readings."""
 STILL_S = 0.3
-"""How long a movement must be over before it is judged."""
+"""Time at rest after which a movement is over."""
 BACK = 0.3
-"""Share of a movement's size at which it counts as over."""
+"""Largest distance from the start at rest, as a share of the movement."""
 SWING_RAD = (0.1, 1.0)
-"""Angles that a person swings who was asked for 10 to 40 degrees."""
+"""Credible angles of a movement of 10 to 40 degrees by hand."""
 PUSH_SHARE = 0.025
-"""Share of ``safety.cuff_force_n`` that a push must have."""
+"""Least force of a push, as a share of ``safety.cuff_force_n``."""
 CLEAR = 3.0
-"""How much more than another one a channel moves that is meant."""
+"""Least ratio of the movements of the intended channel and another."""
 HARDLY_RAD = 1e-4
+"""Movement below which an angle counts as constant."""
 MOTIONS = {
     "hip": (
         (
@@ -45,21 +46,20 @@ MOTIONS = {
         -1.0,
     ),
 }
-"""What is asked for of each joint, and the sign of the angle that it makes: see
-docs/contracts.md."""
+"""Instruction for each joint, and the sign of its angle: see docs/contracts.md."""
 
 
 class Operator(Protocol):
-    """Whoever stands at the leg."""
+    """The person at the leg."""
 
     async def ready(self, prompt: str) -> None:
-        """Tell what to do; return once it is begun."""
+        """Show an instruction; return when the person begins."""
 
 
 async def by_hand(
     probes: Sequence[Probe], rig: RigSettings, rate_hz: float | None, operator: Operator
 ) -> list[Finding]:
-    """Let a person move every joint and press every cuff.
+    """Let a person move every joint and press every cuff; return the findings.
 
     Parameters
     ----------
@@ -69,31 +69,29 @@ async def by_hand(
         Samples a second, in lockstep.
     """
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
-    await operator.ready(
-        "Hold the leg: its drives are disabled now, and stay so. Nobody is in the machine."
-    )
+    await operator.ready("Hold the leg: its drives are now disabled. The machine must be empty.")
     for probe in probes:
         await probe.read()
         if isinstance(probe.part, Drive):
-            await probe.part.disable(probe.last()["angle"])
+            await disable(probe.part, probe.last()["angle"])
     findings: list[Finding] = []
     for probe in drives:
         motion, sign = MOTIONS[probe.place]
         await operator.ready(f"{probe.place}: {motion}.")
         moved = await _watch(drives, lambda p: np.array([p.last()["angle"]]), SWING_RAD[0] / 2)
-        findings += _judge_motion(probe, sign, moved, rate_hz)
+        findings += _check_motion(probe, sign, moved, rate_hz)
     for probe in sensors:
         front = probe.place.endswith("front")
         inside = "forward" if front else "backward"
         await operator.ready(
-            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg would, and"
+            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg does, and"
             " let go."
         )
         least = PUSH_SHARE * rig.safety.cuff_force_n
         pressed = await _watch(
             sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives
         )
-        findings += _judge_push(probe, -1.0 if front else 1.0, pressed, least)
+        findings += _check_push(probe, -1.0 if front else 1.0, pressed, least)
     return findings
 
 
@@ -103,14 +101,13 @@ async def _watch(
     least: float,
     also: Sequence[Probe] = (),
 ) -> dict[Probe, Series]:
-    """Keep reading until something has moved by ``least`` and come back, or patience ends; return
-    what was read.
+    """Read devices until a value has moved by ``least`` and come back, or for ``PATIENCE_S``.
 
-    In lockstep all drives must go on for any device to do so: those of ``also`` do too.
+    Return the answers of each probe. Probes of ``also`` are only advanced: in lockstep no device goes on without all drives.
     """
     for probe in probes:
         await probe.step()
-        probe.taken()
+        probe.take()
     rest = np.concatenate([value(probe) for probe in probes])
     largest, still_since, began = np.zeros_like(rest), time.monotonic(), time.monotonic()
     while (now := time.monotonic()) - began < PATIENCE_S:
@@ -124,23 +121,24 @@ async def _watch(
             break
         await asyncio.sleep(LOOK_S)
     for probe in also:
-        probe.taken()
-    return {probe: probe.taken() for probe in probes}
+        probe.take()
+    return {probe: probe.take() for probe in probes}
 
 
 def _peak(values: NDArray) -> float:
-    """Return the largest deviation of values (n,) from the first, with its sign."""
+    """Return the largest deviation of values (n,) from the first one, with its sign."""
     away = values - values[0]
     return float(away[np.argmax(np.abs(away))])
 
 
-def _judge_motion(
+def _check_motion(
     asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None
 ) -> Iterator[Finding]:
+    """Yield findings about the drive whose joint a person was asked to move."""
     peaks = {probe: _peak(series.of("angle")) for probe, series in moved.items()}
-    joint_moved = max(peaks, key=lambda probe: abs(peaks[probe]))
-    peak, where, register = peaks[asked], f"{asked.map_path}.read", asked.block.registers["angle"]
-    if abs(peaks[joint_moved]) < HARDLY_RAD:
+    largest = max(peaks, key=lambda probe: abs(peaks[probe]))
+    peak, where = peaks[asked], f"{asked.map_path}.read"
+    if abs(peaks[largest]) < HARDLY_RAD:
         yield Finding(
             asked.name,
             f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is"
@@ -148,11 +146,11 @@ def _judge_motion(
             "angle",
         )
         return
-    if joint_moved is not asked and abs(peaks[joint_moved]) > CLEAR * abs(peak):
+    if largest is not asked and abs(peaks[largest]) > CLEAR * abs(peak):
         yield Finding(
             asked.name,
-            f"the {asked.place} was moved, but the angle of {joint_moved.name} changed, by"
-            f" {peaks[joint_moved]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
+            f"the {asked.place} was moved, but the angle of {largest.name} changed, by"
+            f" {peaks[largest]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
             " exchange host, port and unit of the two in the rig file",
             "angle",
         )
@@ -162,58 +160,47 @@ def _judge_motion(
             asked.name,
             f"its angle went {'down' if peak < 0 else 'up'} ({peak:+.3g} rad) when the"
             f" {asked.place} went {'forward' if asked.place == 'hip' else 'into flexion'}; expected"
-            f" {'up' if sign > 0 else 'down'}: turn the sign of {where}.angle.scale, and of"
-            f" velocity, current and write.reference with it{_shared(asked, moved)}",
+            f" {'up' if sign > 0 else 'down'}: change the sign of {where}.angle.scale, and of"
+            f" velocity, current and write.reference{_shared(asked, moved)}",
             "angle",
         )
     if not SWING_RAD[0] / 2 <= abs(peak) <= 1.5 * SWING_RAD[1]:
-        units = [
-            unit
-            for unit in DIMENSION["angle"]
-            if SWING_RAD[0] <= abs(peak) * UNITS[unit] / UNITS[register.unit] <= SWING_RAD[1]
+        unit = asked.block.registers["angle"].unit
+        plausible = [
+            other
+            for other in DIMENSION["angle"]
+            if SWING_RAD[0] <= abs(peak) * UNITS[other] / UNITS[unit] <= SWING_RAD[1]
         ]
-        mended = (
-            f'with unit = "{units[0]}" it would be plausible: correct'
-            if units
-            else "compare the manual with"
-        )
+        remedy = "compare the manual with"
+        if plausible:
+            remedy = f'with unit = "{plausible[0]}" it would be plausible: correct'
         yield Finding(
             asked.name,
             f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected"
-            f" {SWING_RAD[0]:g} to {SWING_RAD[1]:g} rad of 10 to 40 degrees; {mended}"
+            f" {SWING_RAD[0]:g} to {SWING_RAD[1]:g} rad of 10 to 40 degrees; {remedy}"
             f" {where}.angle",
             "angle",
         )
-    velocity = asked.block.registers.get("velocity")
-    if velocity:
-        series = moved[asked]
-        fresh = series.fresh
-        t = (
-            np.arange(len(fresh)) / rate_hz
-            if asked.in_lockstep and rate_hz
-            else series.answered[fresh]
-        )
-        yield from check_velocity(
-            asked.name, where, velocity, t, series.of("angle")[fresh], series.of("velocity")[fresh]
-        )
+    yield from check_velocity(asked, moved[asked], rate_hz)
 
 
 def _shared(asked: Probe, moved: dict[Probe, Series]) -> str:
     others = [
         probe.name for probe in moved if probe is not asked and probe.map_path == asked.map_path
     ]
-    return f" (in a map of its own where {others[0]} is right)" if others else ""
+    return f" (in a map of its own if {others[0]} is right)" if others else ""
 
 
-def _judge_push(
+def _check_push(
     asked: Probe, sign: float, pressed: dict[Probe, Series], least: float
 ) -> Iterator[Finding]:
+    """Yield findings about the sensor whose cuff a person was asked to press."""
     peaks = {
         (probe, axis): _peak(series.of(axis)[series.fresh])
         for probe, series in pressed.items()
         for axis in AXES
     }
-    (pushed, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
+    (largest, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
     where = f"{asked.map_path}.read"
     if abs(peak) < least:
         yield Finding(
@@ -222,17 +209,17 @@ def _judge_push(
             f" be pressed, expected {least:g} N and more; was it? Else compare scale and unit in"
             f" {where} with the manual",
         )
-    elif pushed is not asked:
+    elif largest is not asked:
         yield Finding(
             asked.name,
-            f"{asked.place} was pressed, but {pushed.name} felt it ({axis} {peak:+.3g} N): the two"
-            " are swapped; exchange host, port and unit of the two in the rig file",
+            f"{asked.place} was pressed, but {largest.name} measured it ({axis} {peak:+.3g} N): the"
+            " two are swapped; exchange host, port and unit of the two in the rig file",
         )
     elif axis != "force_y":
         yield Finding(
             asked.name,
-            f"the push was felt in {axis} ({peak:+.3g} N), expected force_y, the segment's forward"
-            f" axis: exchange the addresses in {where}",
+            f"the push was measured in {axis} ({peak:+.3g} N), expected force_y, the segment's"
+            f" forward axis: exchange the addresses in {where}",
             axis,
         )
     elif peak * sign < 0:
@@ -240,6 +227,6 @@ def _judge_push(
             asked.name,
             f"force_y went {'up' if peak > 0 else 'down'} ({peak:+.3g} N), expected"
             f" {'up' if sign > 0 else 'down'}: it is the force of the exoskeleton on the leg,"
-            f" forward positive; turn the sign of {where}.force_y.scale",
+            f" forward positive; change the sign of {where}.force_y.scale",
             axis,
         )

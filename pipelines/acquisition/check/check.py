@@ -1,4 +1,4 @@
-"""The whole check of a rig file, from its devices' connections to what is wrong in words."""
+"""The whole check of a rig file, from the connections to the findings."""
 
 import asyncio
 import logging
@@ -7,17 +7,17 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
 
+from pipelines.acquisition.check.by_drives import move_by_drives, refuse_far_from_zero
 from pipelines.acquisition.check.by_hand import Operator, by_hand
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
-from pipelines.acquisition.check.look import RigReport, look, probes_of
+from pipelines.acquisition.check.survey import RigReport, probes_of, survey
 from pipelines.acquisition.machine.embedded_rig import embedded
 from pipelines.acquisition.machine.machine import Machine
-from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.pacing import urgent
-from pipelines.acquisition.preconditions.feasible_rate import refusals
-from pipelines.acquisition.preconditions.human_interlock import refuse_seldom_read
-from pipelines.acquisition.preconditions.set_point_scale import misplaced_set_points
+from pipelines.acquisition.preconditions.feasible_rate import rate_checks
+from pipelines.acquisition.preconditions.human_interlock import refuse_rare_readings
+from pipelines.acquisition.preconditions.set_point_scale import set_point_contradictions
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
@@ -31,28 +31,28 @@ def check_rig(
     *,
     move: bool = False,
 ) -> RigReport:
-    """Ask every device of a rig and say what is wrong; move nothing unless asked to.
+    """Check every device of a rig against its file; move nothing unless ``move`` is set.
 
     Parameters
     ----------
     path : Path
-        The rig's description. An embedded rig is started first.
+        The rig file. An embedded rig is started first.
     rate_hz : float, optional
-        Samples a second that an experiment asks for; else a virtual rig's own, and of a real one
-        what it has.
+        Samples a second of the experiment; by default a virtual rig's own, or the measured ones of
+        a real rig.
     run : str
-        Whether somebody is in the machine: only an empty one shows its sensors' zeros.
+        Whether a person is in the machine: sensors' zeros are only checked in an empty one.
     operator : Operator, optional
-        Who moves the joints and presses the cuffs, if all devices answer.
+        Asks a person to move the joints and press the cuffs, if all devices answer.
     move : bool
-        Whether the drives shall move the joints a little, once nothing else is wrong.
+        Whether the drives move the joints a little, if there is no finding.
 
     Raises
     ------
     SettingsError
-        Where no rate is told, and the rig records by itself.
+        ``move`` is set without a rate, and the drives record by themselves.
     DeviceError
-        Where another process holds one of the lines: nothing is connected then.
+        Another process holds one of the lines; nothing is connected then.
     """
     if run == "with_human":
         refuse_to_move_a_person(by_hand=operator is not None, move=move)
@@ -61,66 +61,66 @@ def check_rig(
         rate_hz = rig.plant.sample_rate_hz
     if move and rate_hz is None and rig.sampling == "recorder":
         raise SettingsError(
-            "--rate-hz: missing; of a rig that records by itself it is not known how often it is"
-            " told"
+            "--rate-hz: missing; give the rate of set-points, which cannot be measured on drives that"
+            " record by themselves"
         )
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        # Who only asks loads the devices too, and would judge what another run makes of them. The
-        # movement holds the lines itself.
-        with alone(present):
+        # Reading alone would already slow down another run, whose motion would give wrong findings.
+        # The movement holds the lines itself.
+        with exclusive_access(present):
             report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
         if move and not report.findings:
             try:
                 if not report.by_hand:
                     refuse_far_from_zero(start)
-                report.answers, report.findings = guided(
-                    present, start, rate_hz or _counted(report), run
+                report.answers, report.findings = move_by_drives(
+                    present, start, rate_hz or _measured_rate(report), run
                 )
-            except InputError as error:  # what was found out before must not be lost with it
+            except InputError as error:  # the report so far must not be lost
                 report.findings.append(Finding("rig", str(error)))
         return report
 
 
 def refuse_to_move_a_person(*, by_hand: bool, move: bool) -> None:
-    """Refuse to move a leg of unverified signs with somebody in it, or to take its torque away."""
+    """Refuse to move or disable a leg of unverified signs while a person is in it."""
     for option, given in (("--by-hand", by_hand), ("--move", move)):
         if given:
             raise InputError(
-                f"{option} wants nobody in the machine, but --run with_human says that somebody is;"
-                " drop one"
+                f"{option} needs an empty machine, but --run with_human means that a person is in"
+                " it; drop one"
             )
 
 
-def unfit(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
-    """Yield why no run would begin with this rig file at a rate, whatever its devices answer."""
+def rate_findings(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
+    """Yield why every run at a rate is refused with this rig file."""
     if rate_hz is None or rig.clock == "lockstep":
         return
-    for refuse in (*refusals(with_sensors=True), refuse_seldom_read):
+    for refuse in (*rate_checks(with_sensors=True), refuse_rare_readings):
         try:
             refuse(rig, rate_hz)
         except SettingsError as error:
             yield Finding("rig", str(error))
 
 
-def _counted(report: RigReport) -> float:
-    """Return the rate at which the first drive was found to sample."""
+def _measured_rate(report: RigReport) -> float:
+    """Return the measured rate of the first drive's samples, Hz."""
     clock = report.devices[0].clock
-    assert clock and clock.counter_hz  # else there were findings
+    assert clock and clock.counter_hz  # else there are findings
     return clock.counter_hz
 
 
 async def _check(
-    rig: RigSettings, rate_hz: float | None, alone: bool, operator: Operator | None
+    rig: RigSettings, rate_hz: float | None, is_empty: bool, operator: Operator | None
 ) -> tuple[RigReport, list[float]]:
-    """Return what was found, and where the leg stands at the end of it, rad."""
+    """Return the report, and the leg's angles (J,) rad at its end if there is no finding."""
     machine = Machine(rig, with_sensors=True)
     try:
-        report = await look(machine, rate_hz, alone=alone)
-        report.findings += unfit(rig, rate_hz)
-        report.findings += [Finding("rig", why) for why in misplaced_set_points(rig)]
+        report = await survey(machine, rate_hz, is_empty=is_empty)
+        report.findings += rate_findings(rig, rate_hz)
+        report.findings += [Finding("rig", why) for why in set_point_contradictions(rig)]
         if operator and all(device.latency for device in report.devices):
             report.by_hand = True
             try:

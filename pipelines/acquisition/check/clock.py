@@ -1,5 +1,4 @@
-"""Whether the sample counter counts, and the device's clock tells the time of its counter and of
-the host."""
+"""Whether a device's sample counter and clock run at the expected rates."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,26 +13,25 @@ from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 RATES_HZ = (0.5, 1e5)
-"""Sample rates that a device may have, where none is known."""
+"""Range of credible sample rates, where none is known."""
 OFTEN = 3.0
-"""Answers for each step of the counter from which on a step of more than one is a step of the
-device's own."""
+"""Answers per change of the counter that prove that its steps are the device's own."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """How a device counts samples and time."""
+    """Rates of a device's counter and clock."""
 
     counter_hz: float | None
-    """Samples a second of the host's clock; None in lockstep, and where it stands still."""
+    """Samples a second of the host's clock; None in lockstep, and if it stands still."""
     clock_rate: float | None
-    """Seconds of the device's clock in a second; None where it has none."""
+    """Seconds of the device's clock in a second; None without a clock."""
     step: float
     """Typical step of the counter."""
 
 
 def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
-    """Sum up counter and clock over ``seconds``, the time from the first answer to the last."""
+    """Measure counter and clock over ``seconds``, from the first answer to the last."""
     counter = series.counted("sequence")
     steps = np.diff(counter)
     steps = steps[steps != 0]
@@ -52,24 +50,24 @@ def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
 def check_clock(
     probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the counter, else what is wrong with the clock.
+    """Yield findings about the counter, or about the clock if the counter is right.
 
     Parameters
     ----------
     series : Series
         Answers over a second or more, several of each sample where the line is fast enough.
     seconds : float
-        From the first answer to the last: the host's, in lockstep the samples' own.
+        Time from the first answer to the last; in lockstep that of the samples.
     rate_hz : float, optional
-        Samples a second that the device is to have; in lockstep one a step.
+        Expected samples a second; in lockstep each step is one.
     """
-    wrong = list(_counter(probe, series, clock, seconds, rate_hz))
-    yield from wrong
-    if not wrong and "time" in series.block.registers:
-        yield from _time(probe, series, clock, seconds)
+    findings = list(_check_counter(probe, series, clock, seconds, rate_hz))
+    yield from findings
+    if not findings and "time" in series.block.registers:
+        yield from _check_time(probe, series, clock, seconds)
 
 
-def _counter(
+def _check_counter(
     probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
 ) -> Iterator[Finding]:
     counter, where = series.counted("sequence"), f"{probe.map_path}.read.sequence"
@@ -109,10 +107,8 @@ def _counter(
             f" {counter[1:][steps < 0][0]:g}; compare {where} with the device's manual",
         )
     else:
-        measured, expected = (
-            (counter[-1] - counter[0]) / seconds,
-            f"{rate_hz:g}" if rate_hz else "a sample rate",
-        )
+        measured = (counter[-1] - counter[0]) / seconds
+        expected = f"{rate_hz:g}" if rate_hz else "a sample rate"
         yield Finding(
             probe.name,
             f"its counter goes up by {measured:.4g} a second, expected {expected}; set the device's"
@@ -121,7 +117,7 @@ def _counter(
 
 
 def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
-    """Tell whether a counter (n,) goes up, at the rate that is known."""
+    """Return whether a counter (n,) increases, at the expected rate if one is known."""
     if not np.isfinite(counter).all() or (np.diff(counter) < 0).any():
         return False
     measured = (counter[-1] - counter[0]) / seconds
@@ -131,7 +127,7 @@ def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
     return bool(abs(measured - rate_hz) <= RATE_TOLERANCE * rate_hz + 2.0 / seconds)
 
 
-def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
+def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
     time, where = series.counted("time"), f"{probe.map_path}.read.time"
     if _keeps_time(time, seconds):
         return
@@ -167,17 +163,19 @@ def _keeps_time(time: NDArray, seconds: float) -> bool:
 
 
 def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
-    """Yield a finding where registers change while the counter does not: they are not latched at
-    one instant."""
-    if len(series.fresh) < 2:  # a counter that stands still says nothing of a latch
+    """Yield a finding if registers that are not latched change while the counter does not."""
+    if len(series.fresh) < 2:  # this needs a counter that counts
         return
     same = np.diff(series.words[:, _places(series, "sequence")], axis=0) == 0
     latched = [name for name in series.block.names if name not in ("sequence", "status")]
-    kept = same.all(axis=1)
+    is_same_sample = same.all(axis=1)
     torn = [
         name
         for name in latched
-        if (kept & (np.diff(series.words[:, _places(series, name)], axis=0) != 0).any(axis=1)).any()
+        if (
+            is_same_sample
+            & (np.diff(series.words[:, _places(series, name)], axis=0) != 0).any(axis=1)
+        ).any()
     ]
     if torn:
         yield Finding(

@@ -1,5 +1,4 @@
-"""Other meanings of the same bits: what a value would be if its register were described another
-way."""
+"""Other interpretations of a register: its values with another type, order, unit or scale."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,18 +18,18 @@ _COST = {"word_order": 1, "type": 2}
 
 @dataclass(frozen=True)
 class Interpretation:
-    """A register as it might have to be described."""
+    """Another description of a register."""
 
     register: Register
     bytes_swapped: bool
     change: str
-    """What differs from the rig file, as one would write it there."""
+    """The changes of the rig file, as they are written there."""
     cost: int
-    """How far it is from the rig file: slips of the pen come before another kind of number."""
+    """Number of errors that it assumes in the rig file, weighted by how unlikely they are."""
 
 
 def interpretations(name: str, block: Block) -> Iterator[Interpretation]:
-    """Yield every other description of a register, the likeliest slips first."""
+    """Yield every other description of a register, the likeliest first."""
     results = [Interpretation(*key) for key in _all(name, block)]
     return iter(sorted((one for one in results if one.cost), key=lambda one: one.cost))
 
@@ -60,7 +59,7 @@ def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
             + (REGISTERS[kind] != REGISTERS[was.type])
         )
         if kind.startswith("float") and not was.type.startswith("float") and was.scale != 1.0:
-            update["scale"] = 1.0  # a float needs no counts: it comes in its unit
+            update["scale"] = 1.0  # a float is in its unit, not in counts
         yield was.model_copy(update=update), swapped, _written(update, swapped), cost
     for unit in DIMENSION[name]:
         if unit != was.unit:
@@ -84,19 +83,18 @@ def remedy(
     *,
     counts: bool = False,
 ) -> str | None:
-    """Say which other description of a register would be plausible, and what to correct; None where
-    none is.
+    """Return in words which other description of a register is plausible; None for none.
 
     Parameters
     ----------
     unit : str
-        SI unit of the quantity, for the sentence.
+        SI unit of the quantity, for the text.
     where : str
-        The register in the rig file.
+        Name of the register in the rig file.
     plausible : callable
-        Given values (n,), tells whether they can be true.
+        Returns whether values (n,) are possible.
     counts : bool
-        Whether values are to be carried on where their register wraps.
+        Whether the register is a counter or clock, which wraps around.
     """
     best: list[tuple[Interpretation, float]] = []
     for one in interpretations(name, series.block):
@@ -105,7 +103,7 @@ def remedy(
         values = (series.counted if counts else series.of)(
             name, one.register, bytes_swapped=one.bytes_swapped
         )
-        # A row of zeros can always be true, and explains nothing.
+        # Zeros are always possible, and so no evidence.
         if values.any() and plausible(values):
             best.append((one, float(values[-1])))
     if not best:

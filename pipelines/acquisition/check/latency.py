@@ -1,4 +1,4 @@
-"""How long answers take."""
+"""Statistics of the time that answers take."""
 
 from dataclasses import dataclass
 
@@ -18,12 +18,11 @@ class Latency:
     p99: float
     most: float
     histogram: tuple[int, ...]
-    """How many fall into each of ``BINS`` equal steps from least to most, on a logarithmic
-    scale."""
+    """Counts in ``BINS`` equal steps from least to most, on a logarithmic scale."""
 
     @classmethod
     def of(cls, durations: NDArray) -> "Latency":
-        """Sum durations (n,) up."""
+        """Summarize durations (n,), s."""
         least, median, p99, most = np.quantile(durations, [0.0, 0.5, 0.99, 1.0])
         counts, _ = np.histogram(np.log(durations), BINS, (np.log(least), np.log(most) + 1e-12))
         return cls(
@@ -36,7 +35,7 @@ class Latency:
         )
 
     def as_json(self) -> dict:
-        """Return the numbers in milliseconds."""
+        """Return the statistics in milliseconds."""
         return {
             "count": self.count,
             "min_ms": self.least * 1e3,

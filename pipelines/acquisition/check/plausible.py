@@ -1,4 +1,4 @@
-"""Whether what a register says can be true of a leg that nobody moves."""
+"""Whether registers have possible values for a leg at rest."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from pipelines.settings.rig.devices import DriveSettings
 
 TEMPERATURE_C = (-20.0, 150.0)
 TORQUE_AT_REST = 0.1
-"""Share of a joint's torque limit that its current may tell while its drive is disabled."""
+"""Largest current of a disabled drive, as a share of its joint's torque limit."""
 SPEED_AT_REST = 2.0
-"""Share of a joint's speed limit that a leg which swings out may have."""
+"""Largest speed of a leg that swings freely, as a multiple of its joint's limit."""
 STEP_RAD = 0.01
-"""What an encoder may do between two samples at rest, beyond what the speed limit allows."""
+"""Change of an angle between two samples that is allowed in addition to the speed limit."""
 TURN_RAD = np.pi
-"""An angle further from zero is not of a leg that stands outside its limits."""
+"""Largest angle of a leg outside its limits; beyond it, the register is misread."""
 TINY, HUGE = 1e-20, 1e20
-"""No device tells anything smaller or greater: such floats are misread words."""
+"""Range of credible magnitudes; other floats are misread words."""
 SI = {
     "angle": " rad",
     "reference": " rad",
@@ -35,27 +35,25 @@ SI = {
 
 @dataclass(frozen=True)
 class Expectation:
-    """What a register may hold at rest."""
+    """The possible values of a register at rest."""
 
     low: float = -HUGE
     high: float = HUGE
     words: str = ""
     """The range, as a clause of a sentence."""
     otherwise: str = "compare {where} with the device's manual"
-    """What to do where no other description of the register explains its values."""
+    """Remedy where no other description of the register explains its values."""
     fastest: float = np.inf
-    """Greatest change a second."""
+    """Largest change a second."""
 
     def holds(self, values: NDArray) -> NDArray:
-        """Mark the values (n,) that can be true."""
-        return natural(values) & (values >= self.low) & (values <= self.high)
+        """Mark the values (n,) that are possible."""
+        return has_plausible_size(values) & (values >= self.low) & (values <= self.high)
 
     def leaps(self, values: NDArray, seconds: NDArray, period_s: float) -> bool:
-        """Tell whether values (n,) change faster than anything that moves, asked for at instants
-        (n,) s.
+        """Return whether values (n,) read at instants (n,) s change faster than possible.
 
-        Two answers that come soon after each other may be of neighbouring samples, a ``period_s``
-        apart.
+        Two answers that come soon after each other may be a ``period_s`` apart.
         """
         with np.errstate(invalid="ignore", over="ignore"):
             return bool(
@@ -67,41 +65,38 @@ class Expectation:
 
 
 def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
-    """Yield what cannot be true of any register but counter and clock; ``series`` holds at least
-    one answer."""
+    """Yield findings about all registers except counter and clock, from one answer or more."""
     if isinstance(probe.part, Drive):
-        yield from _faults(probe, probe.part, series)
+        yield from _check_faults(probe, probe.part, series)
         expected = _of_drive(probe.part.settings, probe.in_lockstep)
     else:
         expected = _of_sensor(rig)
     for name in series.block.names:
         if name not in ("sequence", "time", "status"):
-            yield from _judged(probe, name, series, expected.get(name, Expectation()))
+            yield from _check_register(probe, name, series, expected.get(name, Expectation()))
 
 
-def natural(values: NDArray) -> NDArray:
-    """Mark the values (n,) that are numbers of a size that nature has."""
+def has_plausible_size(values: NDArray) -> NDArray:
+    """Mark the values (n,) that are finite and of a credible magnitude."""
     size = np.abs(values)
     return np.isfinite(values) & ((size == 0.0) | ((size > TINY) & (size < HUGE)))
 
 
 def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]:
     low, high = drive.angle_rad
-    speed, current = (
-        SPEED_AT_REST * drive.speed_rad_s,
-        TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere,
-    )
+    speed = SPEED_AT_REST * drive.speed_rad_s
+    current = TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere
     return {
         "angle": Expectation(
             low,
             high,
             f"outside its limits {low:g} to {high:g} rad",
             "move the leg within its limits, or correct the encoder's zero ({where}.offset)",
-            # The host's clock tells nothing of a leg in lockstep.
+            # In lockstep the host's clock is not that of the leg.
             fastest=np.inf if in_lockstep else speed,
         ),
         "velocity": Expectation(
-            -speed, speed, f"expected less than {speed:g} rad/s of a leg that nobody moves"
+            -speed, speed, f"expected less than {speed:g} rad/s of a leg at rest"
         ),
         "current": Expectation(
             -current,
@@ -120,11 +115,13 @@ def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]
 
 def _of_sensor(rig: RigSettings) -> dict[str, Expectation]:
     limit = rig.safety.cuff_force_n
-    words = f"expected less than safety.cuff_force_n, {limit:g} N, of a cuff that nobody presses"
+    words = f"expected less than safety.cuff_force_n, {limit:g} N, of an unloaded cuff"
     return dict.fromkeys(("force_x", "force_y", "force_z"), Expectation(-limit, limit, words))
 
 
-def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> Iterator[Finding]:
+def _check_register(
+    probe: Probe, name: str, series: Series, expected: Expectation
+) -> Iterator[Finding]:
     values, seconds = series.of(name), series.answered
     came = np.diff(seconds[series.fresh])
     period_s = float(np.median(came)) if len(came) else 0.0
@@ -134,9 +131,9 @@ def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> I
     value = float(values[~good][0]) if not good.all() else float(values[-1])
     unit, where = SI.get(name, " N"), f"{probe.map_path}.read.{name}"
     why = expected.words if not good.all() else "and leaps from one reading to the next"
-    if not natural(values).all():
-        why = "which no device means"
-    # A leg that stands a little outside its limits is not a register misread.
+    if not has_plausible_size(values).all():
+        why = "which is not a credible value"
+    # A leg may stand a little outside its limits; that is no misread register.
     misread = name != "angle" or leaps or abs(value) > TURN_RAD or not np.isfinite(value)
     mended = None
     if misread:
@@ -151,7 +148,7 @@ def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> I
     yield Finding(probe.name, f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
 
 
-def _faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
+def _check_faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
     if "status" not in series.block.registers:
         return
     status = int(series.of("status")[-1])

@@ -1,4 +1,4 @@
-"""One device under check: asked, but not believed. What it answers is kept as words."""
+"""One device under check, whose answers are kept as raw words."""
 
 import time
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
-from pipelines.acquisition.modbus.wraparound import Counter
+from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.block import registers_of
@@ -16,7 +16,7 @@ from pipelines.settings.rig.block import registers_of
 
 @dataclass(frozen=True)
 class Series:
-    """Answers of one device, each with when it was asked for and when it came (host's clock, s)."""
+    """Answers of one device, with the instants of request and answer (host's clock)."""
 
     block: Block
     asked: NDArray
@@ -29,8 +29,7 @@ class Series:
     def of(
         self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
     ) -> NDArray:
-        """Return a quantity's values (n,) in SI units; read as another ``register`` would, where
-        one is given."""
+        """Return a quantity's values (n,) in SI units, decoded as another ``register`` if given."""
         register = register or self.block.registers[name]
         one = Block({name: register})
         start = register.address - self.block.address
@@ -42,11 +41,10 @@ class Series:
     def counted(
         self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
     ) -> NDArray:
-        """Return the values (n,) of a counter or clock, carried on where its register wraps."""
-        on = Counter(Block({name: register or self.block.registers[name]}).span(name))
-        return np.array(
-            [on(value) for value in self.of(name, register, bytes_swapped=bytes_swapped)]
-        )
+        """Return the values (n,) of a counter or clock without wraparounds, SI units."""
+        unwrapped = Unwrapper(Block({name: register or self.block.registers[name]}).span(name))
+        values = self.of(name, register, bytes_swapped=bytes_swapped)
+        return np.array([unwrapped(value) for value in values])
 
     @property
     def fresh(self) -> NDArray:
@@ -58,7 +56,7 @@ class Series:
 
 
 class Probe:
-    """A drive or sensor of the rig, as the check asks it."""
+    """A drive or sensor of the rig, with its recent answers."""
 
     def __init__(self, part: Drive | Sensor, in_lockstep: bool) -> None:
         self.part = part
@@ -79,17 +77,16 @@ class Probe:
         self._last = [0] * self.block.count
 
     def is_due(self, cycle: int) -> bool:
-        """Tell whether a run reads it in a cycle."""
+        """Return whether a run reads the device in a cycle."""
         return isinstance(self.part, Drive) or self.part.is_due(cycle)
 
     async def read(self) -> None:
-        """Read the block and keep the answer; moves nothing."""
+        """Read the block and keep the answer."""
         asked = time.perf_counter()
         self._keep(asked, await self.part.device.read(self.block.address, self.block.count))
 
     async def step(self) -> None:
-        """Let a drive in lockstep go on to its next sample, its torque away; read any other
-        device."""
+        """Advance a disabled drive in lockstep to its next sample; read any other device."""
         if not (self.in_lockstep and isinstance(self.part, Drive)):
             return await self.read()
         asked = time.perf_counter()
@@ -105,11 +102,11 @@ class Probe:
         await self.part.device.read(counter.address, counter.registers)
 
     def last(self) -> dict[str, float]:
-        """Return the values that were read last, SI units."""
+        """Return the last answer's values, SI units."""
         return self.block.decode(self._last)
 
-    def taken(self) -> Series:
-        """Return what was kept since the last time, and forget it."""
+    def take(self) -> Series:
+        """Return the answers since the last call, and forget them."""
         answers, self._answers = self._answers, []
         asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
         shaped = np.array(words, dtype=np.int64).reshape(len(answers), self.block.count)

@@ -1,4 +1,4 @@
-"""How many samples a second the line carries: devices asked as in a run, nothing sent."""
+"""The highest rate of cycles, measured by reading all devices as in a run."""
 
 import asyncio
 import time
@@ -12,35 +12,35 @@ from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.probe import Probe
 
 MOST_LATE = 0.05
-"""Share of cycles that may take longer than a sample; a run would miss as many."""
+"""Largest allowed share of cycles that take longer than a sample: a run misses those."""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """Cycles that were made, one after the other without a pause."""
+    """Statistics of cycles without pauses."""
 
     cycles_hz: float
     cycle: Latency
     late: float
-    """Share of cycles longer than a sample; 0 where no rate is known."""
+    """Share of cycles that are longer than a sample; 0 where no rate is known."""
 
 
 async def cycles(
     probes: Sequence[Probe], seconds: float, rate_hz: float | None, fewest: int = 20
 ) -> Rate:
-    """Ask devices as a cycle of a run does, over and over; each probe keeps its answers.
+    """Read devices in cycles as in a run; each probe keeps its answers.
 
-    In real time nothing is written. In lockstep each cycle lets the drives go on by a sample, their
-    torque away.
+    In real time nothing is written. In lockstep each cycle advances the disabled drives by a
+    sample.
 
     Parameters
     ----------
     probes : sequence of Probe
         Drives first.
     seconds : float
-        How long, but for ``fewest`` cycles at least.
+        Duration, unless ``fewest`` cycles take longer.
     rate_hz : float, optional
-        The rate that is wanted.
+        The rate of the experiment.
     """
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
     durations: list[float] = []
@@ -63,8 +63,7 @@ async def cycles(
 
 
 def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
-    """Yield whether the line is too slow for the experiment, all devices asked or the drives
-    alone."""
+    """Yield a finding where the lines are too slow for the experiment's rate."""
     if rate.cycles_hz >= rate_hz and rate.late <= MOST_LATE:
         return
     enough = drives.cycles_hz >= rate_hz and drives.late <= MOST_LATE

@@ -1,5 +1,4 @@
-"""Whether a drive's own record brings every sample, and tells of it what the block of registers
-does."""
+"""Whether a drive's own record has every sample, in agreement with its registers."""
 
 import asyncio
 import time
@@ -8,6 +7,7 @@ from collections.abc import Sequence
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.drive_protocol import empty_recorder
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.safety.record_agreement import RecordAgreement
 from pipelines.acquisition.safety.sample_stream import SampleStream
@@ -15,32 +15,30 @@ from pipelines.acquisition.safety.set_point_history import SetPointHistory
 from pipelines.errors import DeviceError, ExoidError
 
 DRAINS = 40
-"""How often each record is drained, once a cycle."""
+"""Drains of each record, one a cycle."""
 
 
 async def check_rings(
     machine: Machine, probes: Sequence[Probe], rate_hz: float | None
 ) -> list[Finding]:
-    """Drain every drive's record for a while, and judge it as a run does; in lockstep the drives go
-    on by cycles.
+    """Drain every drive's record for a while, and check it as in a run.
 
     Parameters
     ----------
     machine : Machine
         Connected.
     probes : sequence of Probe
-        Of the devices that answer.
+        Those of the devices that answer.
     rate_hz : float, optional
-        Set-points a second that are wanted.
+        Set-points a second of the experiment.
     """
     findings = []
     cycle_hz = rate_hz or machine.rig.record_rate_hz
-    assert cycle_hz  # a rig file that asks for recorders has one
+    assert cycle_hz  # the rig file is checked: recorders have a rate
+    drive_probes = [probe for probe in probes if probe.is_drive]
     for j, drive in enumerate(machine.drives):
         try:
-            why = await _judged(
-                machine, j, drive, [probe for probe in probes if probe.is_drive], cycle_hz
-            )
+            why = await _fault(machine, j, drive, drive_probes, cycle_hz)
         except ExoidError as error:
             why = str(error).removeprefix(f"{drive.device.label}: ")
         if why:
@@ -48,14 +46,14 @@ async def check_rings(
     return findings
 
 
-async def _judged(
+async def _fault(
     machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float
 ) -> str | None:
-    """Return what is wrong with one drive's record."""
+    """Return what is wrong with one drive's record; None for nothing."""
     history, begun = SetPointHistory(), False
     stream = SampleStream(machine.rig, j, cycle_hz, history)
     agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
-    await drive.empty_record()
+    await empty_recorder(drive)
     for _ in range(DRAINS):
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
@@ -68,12 +66,12 @@ async def _judged(
                 " manual"
             )
         for record in records:
-            history.add(record.sequence, record.reference)  # nobody sends any
+            history.add(record.sequence, record.reference)  # none is sent: the drive's own
             agreement.check(record)
             begun |= stream.check(record, time.monotonic())
         await asyncio.sleep(0.0 if drive.in_lockstep else 1.0 / cycle_hz)
     for probe in drives:
-        probe.taken()
+        probe.take()
     if not begun:
         return (
             f"its record brought no sample in {DRAINS} cycles; compare {_where(drive)} with the"

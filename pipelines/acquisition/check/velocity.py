@@ -1,36 +1,40 @@
-"""Whether a drive's own velocity says what its angle does."""
+"""Whether a drive's own velocity agrees with its angle."""
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 MOVED_RAD = 0.02
-"""Travel from which on the two can be compared."""
+"""Least travel for a comparison."""
 TOLERANCE = 0.25
 CORRELATED = 0.9
 STANDING_RAD = 0.05
-"""What the velocity may add up to while the angle stands."""
+"""Largest integral of the velocity while the angle is constant."""
 
 
-def check_velocity(
-    device: str, where: str, register: Register, t: NDArray, q: NDArray, dq: NDArray
-) -> Iterator[Finding]:
-    """Compare the integral of the velocity with the angle.
+def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
+    """Compare the integral of a drive's velocity, if it has one, with its angle.
 
     Parameters
     ----------
-    device, where : str
-        Name of the drive; its read block in the rig file.
-    register : Register
-        The velocity's.
-    t, q, dq : (n,) arrays
-        Instants of the samples (s), angle (rad), velocity (rad/s).
+    series : Series
+        Answers of the drive.
+    rate_hz : float, optional
+        Samples a second in lockstep; else the instants of the answers are used.
     """
+    register = series.block.registers.get("velocity")
+    if register is None:
+        return
+    device, where, fresh = probe.name, f"{probe.map_path}.read", series.fresh
+    t = series.answered[fresh]
+    if probe.in_lockstep and rate_hz:
+        t = np.arange(len(fresh)) / rate_hz
+    q, dq = series.of("angle")[fresh], series.of("velocity")[fresh]
     if len(t) < 3:
         return
     travel = np.r_[0.0, np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(t))]
@@ -60,7 +64,7 @@ def check_velocity(
         yield Finding(
             device,
             f"velocity is negative where the angle grows ({ratio:.3g} of its rate of change,"
-            f" expected 1); turn the sign of {where}.velocity.scale",
+            f" expected 1); change the sign of {where}.velocity.scale",
         )
     elif abs(ratio - 1.0) > TOLERANCE:
         yield Finding(

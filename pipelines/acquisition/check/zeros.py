@@ -1,4 +1,4 @@
-"""What a force sensor says while nobody presses it: its zero, its noise, whether it lives."""
+"""Checks of an unloaded force sensor: its zero, its noise, and whether it is connected."""
 
 from collections.abc import Iterator
 
@@ -6,30 +6,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.check.plausible import natural
+from pipelines.acquisition.check.plausible import has_plausible_size
 from pipelines.acquisition.check.probe import Probe, Series
 
 AXES = ("force_x", "force_y", "force_z")
 ZERO_SHARE = 0.05
-"""Share of ``safety.cuff_force_n`` that a zero may eat up."""
+"""Largest allowed zero, as a share of ``safety.cuff_force_n``."""
 ENOUGH = 20
-"""Fresh samples from which on a sensor without noise is not believed."""
+"""New samples without any noise that mean a disconnected sensor."""
 NEAR_END = 0.999
 
 
-def check_zeros(probe: Probe, series: Series, limit_n: float, *, alone: bool) -> Iterator[Finding]:
-    """Yield what is wrong with a sensor's zeros.
+def check_zeros(
+    probe: Probe, series: Series, limit_n: float, *, is_empty: bool
+) -> Iterator[Finding]:
+    """Yield findings about a sensor's zeros.
 
     Parameters
     ----------
     limit_n : float
-        Highest force that a cuff may have.
-    alone : bool
-        Whether nobody is in the machine; else the forces' means are no zeros.
+        Limit of the force on a cuff, N.
+    is_empty : bool
+        Whether no person is in the machine; else the mean forces are not zeros.
     """
     forces = fresh_forces(series)
-    if not all(natural(forces[:, i]).all() for i in range(len(AXES))):
-        return  # the registers are to be mended first
+    if not all(has_plausible_size(forces[:, i]).all() for i in range(len(AXES))):
+        return  # the registers have to be corrected first
     where = f"{probe.map_path}.read"
     for i, axis in enumerate(AXES):
         mean, full = float(forces[:, i].mean()), series.block.registers[axis].counts
@@ -40,7 +42,7 @@ def check_zeros(probe: Probe, series: Series, limit_n: float, *, alone: bool) ->
                 f"{axis} is saturated at {mean:.4g} N, the end of its register; check the sensor's"
                 f" cable and amplifier, or compare {where}.{axis} with its manual",
             )
-        elif alone and abs(mean) > ZERO_SHARE * limit_n:
+        elif is_empty and abs(mean) > ZERO_SHARE * limit_n:
             most = ZERO_SHARE * limit_n
             yield Finding(
                 probe.name,

@@ -1,11 +1,10 @@
-"""Clocks that drift: how far one drive's samples have run ahead of the first drive's, seen through
-the host's clock.
+"""Drifting clocks: how far each drive's samples run ahead of the first drive's.
 
-A reply tells which sample is a drive's newest, so that sample was latched before the reply came,
-and the next one after the request was sent. Each reply thus bounds from both sides when a drive
-took its samples; the narrowest bounds of a short time say it to a fraction of the line's latency,
-however late single replies are. Both drives' bounds lie on the host's clock, which drops out of
-their difference.
+A reply names a drive's newest sample, so that sample was latched before the reply came, and the
+next one after the request was sent. Each reply thus bounds from both sides when the drive samples.
+The narrowest bounds within a short time give that instant to a fraction of the line's latency,
+however late single replies are. Both drives' bounds are on the host's clock, which cancels in their
+difference.
 """
 
 from dataclasses import dataclass
@@ -15,17 +14,18 @@ import numpy as np
 BUCKET_S = 0.5
 """Time within which a drift may be neglected: 50 ppm are 25 us then."""
 FLOOR = 0.01
-"""Share of a sample below which bounds are not believed to be narrow: the way out and the way back
-differ."""
+"""Smallest credible width of bounds, in samples: request and reply take different times."""
 MEMORY_S = 300.0
-"""Time after which bounds count no longer for much: a quartz goes with its temperature."""
+"""Time constant with which old bounds are forgotten: a quartz depends on its temperature."""
 USUAL = 200e-6
-"""Standard deviation of what is believed of two clocks' rates before they have been watched."""
+"""Prior standard deviation of the relative difference of two clocks' rates."""
 
 
 class Bounds:
-    """When a drive takes its samples, by the host's clock: sample n at ``origin`` + n periods, for
-    a short while."""
+    """Bounds of a drive's sampling instants: sample n at ``origin`` + n periods, host's clock.
+
+    They are collected over a time that is too short for a drift.
+    """
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -33,13 +33,12 @@ class Bounds:
         self._last: tuple[float, float] | None = None
 
     def add(self, sequence: int, sent: float, received: float) -> None:
-        """Note that a request sent and answered then (s) found this sample the newest."""
+        """Add a request sent and answered at these times (s), with its newest sample's number."""
         self._latest = min(self._latest, received - sequence * self._period_s)
         self._earliest = max(self._earliest, sent - (sequence + 1) * self._period_s)
 
     def close(self) -> tuple[float, float] | None:
-        """Return the origin and the width of its bounds (s), and begin anew; None where nothing was
-        told."""
+        """Return origin and width of the bounds (s), None without replies; then start again."""
         if not np.isfinite(self._latest):
             return None
         self._last = self.now()
@@ -47,13 +46,12 @@ class Bounds:
         return self._last
 
     def now(self) -> tuple[float, float]:
-        """Return the origin and the width of its bounds (s) as far as they are known."""
-        # In a longer while a drift can bring the bounds past each other.
+        """Return origin and width of the bounds (s) so far."""
+        # Over a longer time a drift can bring the bounds past each other.
         return (self._latest + self._earliest) / 2, max(self._latest - self._earliest, 0.0)
 
-    def ahead(self, now: float) -> float | None:
-        """Return how long it is until the drive's next sample (s); None where that is not known
-        yet."""
+    def until_next_sample(self, now: float) -> float | None:
+        """Return the time until the drive's next sample (s); None while that is unknown."""
         if self._last is None:
             return None
         return (self._last[0] - now) % self._period_s
@@ -61,8 +59,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A drive's lead over the first one: at the first's sample n it is at its own n + ``lead`` +
-    ``rate`` (n - at)."""
+    """A drive's lead: at sample n of the first drive it is at n + ``lead`` + ``rate`` (n - at)."""
 
     lead: float
     """Samples."""
@@ -72,15 +69,15 @@ class Estimate:
     """Sample of the first drive to which the lead belongs."""
     lead_error: float
     rate_error: float
-    """Standard errors, on the safe side."""
+    """Standard errors, estimated conservatively."""
 
     def position(self, sequence: int) -> float:
-        """Return where the drive is in its own samples at a sample of the first one."""
+        """Return the drive's own fractional sample number at a sample of the first drive."""
         return sequence + self.lead + self.rate * (sequence - self.at)
 
 
 class Drift:
-    """A straight line through what the bounds say of a drive's lead, older ones counting less."""
+    """A straight line through a drive's leads, fitted with exponentially fading weights."""
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -92,33 +89,31 @@ class Drift:
         self.estimate: Estimate | None = None
 
     def add(self, sequence: int, first: tuple[float, float], other: tuple[float, float]) -> None:
-        """Take in what both drives' bounds say, about when the first took a sample."""
+        """Add both drives' bounds (origin, width; s) near a sample of the first drive."""
         lead = (first[0] - other[0]) * self._rate_hz
         width = np.hypot(first[1], other[1]) * self._rate_hz
         if self._origin is None:
             self._origin = sequence, lead
-        # The truth is evenly likely anywhere between bounds: their width is sqrt(12) standard
-        # deviations.
+        # Uniform between the bounds: their width is sqrt(12) standard deviations.
         weight = 12.0 / (width**2 + 12.0 * FLOOR**2)
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
-        kept = np.exp(-BUCKET_S / MEMORY_S)
-        self._sums = kept * self._sums + weight * np.outer(row, row)
-        self._moment = kept * self._moment + weight * row * (lead - self._origin[1])
-        self._buckets = kept * self._buckets + 1.0
-        self.estimate = self._solved(sequence)
+        memory = np.exp(-BUCKET_S / MEMORY_S)
+        self._sums = memory * self._sums + weight * np.outer(row, row)
+        self._moment = memory * self._moment + weight * row * (lead - self._origin[1])
+        self._buckets = memory * self._buckets + 1.0
+        self.estimate = self._solve(sequence)
 
-    def _solved(self, sequence: int) -> Estimate:
-        assert self._origin is not None  # something was added
+    def _solve(self, sequence: int) -> Estimate:
+        assert self._origin is not None  # set by the first bounds
         covariance = np.linalg.inv(self._sums + self._prior)
         lead, slope = covariance @ self._moment
-        # Requests keep their phase for long, so that one bucket's error is much like the next
-        # one's.
-        alike = self._buckets * covariance
+        # Requests keep their phase for long, so the errors of neighbouring buckets are correlated.
+        correlated = self._buckets * covariance
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
         return Estimate(
             lead=float(self._origin[1] + lead + slope * row[1]),
             rate=float(slope / self._rate_hz),
             at=sequence,
-            lead_error=float(np.sqrt(row @ alike @ row)),
-            rate_error=float(np.sqrt(alike[1, 1]) / self._rate_hz),
+            lead_error=float(np.sqrt(row @ correlated @ row)),
+            rate_error=float(np.sqrt(correlated[1, 1]) / self._rate_hz),
         )

@@ -1,4 +1,4 @@
-"""The embedded rig: a virtual rig in a process of its own, for as long as a run lasts."""
+"""The embedded rig: a virtual rig in a process of its own, for the duration of a run."""
 
 import queue
 import subprocess
@@ -16,9 +16,10 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.line import TcpLine
 
 START_S = 180.0
-"""Longest start; the very first one compiles the plant."""
+"""Longest start; the first one on a computer compiles the plant."""
 END_S = 3.0
-# Ctrl-C is for whoever moves the leg, the rig must live to be stopped safely.
+"""Longest end before the process is killed."""
+# Ctrl-C must not reach the rig, which has to live until its drives are disabled.
 _ON_ITS_OWN: dict[str, Any] = (
     {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     if hasattr(subprocess, "CREATE_NEW_PROCESS_GROUP")
@@ -30,8 +31,7 @@ _ON_ITS_OWN: dict[str, Any] = (
 def embedded(
     rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float
 ) -> Iterator[RigSettings]:
-    """Run the virtual rig of a file; yields the rig's settings with the places where its devices
-    are."""
+    """Run the virtual rig of a file; yield the rig's settings with the addresses of its devices."""
     command = [
         sys.executable,
         "-m",
@@ -49,43 +49,45 @@ def embedded(
         "0",
         "--until-input-ends",
     ]
-    with tempfile.TemporaryFile() as complaints:
-        # It ends with its input, which the system closes even where this process is killed.
+    with tempfile.TemporaryFile() as errors:
+        # The rig ends with its input, which the system closes even if this process is killed.
         process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=complaints,
+            stderr=errors,
             bufsize=0,
             **_ON_ITS_OWN,
         )
         output = ProcessOutput(process)
         try:
             lines = len({device.line for device in (*rig.drive, *rig.sensor)})
-            yield _at(rig, dict(_place(output, path, complaints) for _ in range(lines)))
+            yield _at(rig, dict(_place(output, path, errors) for _ in range(lines)))
         finally:
             output.end()
 
 
 class ProcessOutput:
-    """What a process says, line by line; a thread listens, for not every system can wait for a
-    pipe."""
+    """The output of a process, line by line.
+
+    A thread reads it, since not every system can wait for a pipe.
+    """
 
     def __init__(self, process: subprocess.Popen) -> None:
         self.process = process
         self._lines = queue.SimpleQueue[bytes]()
-        self._thread = threading.Thread(target=self._listen, name="embedded rig", daemon=True)
+        self._thread = threading.Thread(target=self._read, name="embedded rig", daemon=True)
         self._thread.start()
 
     def line(self, longest_s: float) -> str:
-        """Return the next line; nothing where the process has ended, or took too long."""
+        """Return the next line; an empty one where the process has ended or took too long."""
         with suppress(queue.Empty):
             return self._lines.get(timeout=longest_s).decode().strip()
         return ""
 
     def end(self) -> None:
-        """End the process, in good order if it is able to."""
-        assert self.process.stdin is not None  # it was asked for
+        """End the process by closing its input; kill it if that takes too long."""
+        assert self.process.stdin is not None  # a pipe
         self.process.stdin.close()
         try:
             self.process.wait(END_S)
@@ -94,41 +96,43 @@ class ProcessOutput:
             self.process.wait()
         self._thread.join(END_S)
 
-    def _listen(self) -> None:
-        assert self.process.stdout is not None  # it was asked for
+    def _read(self) -> None:
+        assert self.process.stdout is not None  # a pipe
         with self.process.stdout as pipe:
             for line in pipe:
                 self._lines.put(line)
         self._lines.put(b"")
 
 
-def _place(output: ProcessOutput, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
-    """Wait until the rig says where a line is; return its name, None for that of devices on none,
-    and the place."""
+def _place(output: ProcessOutput, path: Path, errors: IO[bytes]) -> tuple[str | None, str]:
+    """Wait for the rig's address of a line; return name and address.
+
+    The name is None for devices that are on no line of the rig file.
+    """
     if line := output.line(START_S):
         name, _, place = line.rpartition(" ")
         return name or None, place
     output.end()
-    complaints.seek(0)
-    words = complaints.read().decode(errors="replace").strip()
+    errors.seek(0)
+    words = errors.read().decode(errors="replace").strip()
     if not words:
         raise DeviceError(
             f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}`"
             " to see why"
         )
-    # What the rig could not use is the user's to mend here as there.
+    # A settings error of the rig's process is one of this command too.
     kind = SettingsError if output.process.returncode == SettingsError.exit_code else DeviceError
     raise kind(words.splitlines()[-1].removeprefix("exoid: "))
 
 
 def _at(rig: RigSettings, places: dict[str | None, str]) -> RigSettings:
-    """Return the rig with every device where it is found on this machine."""
+    """Return the rig with the address of every device on this computer."""
     update: dict[str, Any] = {
         "line": {name: line.at(places[name]) for name, line in rig.line.items()}
     }
     if None in places:
-        alone = TcpLine().at(places[None]).model_dump(include={"host", "port"})
+        on_no_line = TcpLine().at(places[None]).model_dump(include={"host", "port"})
         for kind in ("drive", "sensor"):
             devices = getattr(rig, kind)
-            update[kind] = tuple(d if d.line else d.model_copy(update=alone) for d in devices)
+            update[kind] = tuple(d if d.line else d.model_copy(update=on_no_line) for d in devices)
     return rig.model_copy(update=update)

@@ -5,7 +5,7 @@ from math import inf
 
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
-from pipelines.acquisition.modbus.wraparound import Counter
+from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
@@ -14,9 +14,9 @@ from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import SensorSettings
 
 SETTLED_S = 0.5
-"""Time after which it is known how fast a sensor counts."""
+"""Time from which on the rate of a sensor's counter is known."""
 LEAP = 2.0
-"""How many times as fast it may count all at once, and that many samples more."""
+"""Factor by which a counter may exceed its rate between two samples, and samples added to that."""
 
 
 class Sensor:
@@ -30,26 +30,25 @@ class Sensor:
         self._turn = rig.turn_of(settings)
         self._watchdog = Watchdog(rig.safety.watchdog_s)
         self._in_lockstep, self._reply_s = rig.clock == "lockstep", rig.safety.longest_reply_s
-        self._counter = Counter(self.block.span("sequence"))
+        self._counter = Unwrapper(self.block.span("sequence"))
         self._first: tuple[float, float] | None = None
-        """Its first sample, and when that was told, host's clock, s."""
+        """Count of its first sample, and when it came, host's clock, s."""
         self._last: tuple[float, float] | None = None
-        """Its last one."""
-        self._owes = False
-        """Whether an answer of it may still come that another request's would be taken for."""
+        """The same of its newest sample."""
+        self._awaits_late_reply = False
+        """Whether a late answer may still come that would be taken for the next request's."""
 
     def is_due(self, cycle: int) -> bool:
-        """Tell whether it is read in a cycle."""
+        """Return whether the sensor is read in a cycle."""
         return cycle % self.settings.every == self._turn
 
     async def look(self) -> tuple[float, float, float] | None:
-        """Return the force (N), or None where the sensor has no new sample or, for once, does not
-        answer.
+        """Read the force (N); None without a new sample, or without an answer for a short time.
 
         Raises
         ------
         DeviceError
-            It has not answered for too long; never Unanswered, which is survived.
+            The sensor has not answered for too long, or its counter went back or leapt.
         """
         self._watchdog.waited(time.monotonic())
         try:
@@ -59,18 +58,17 @@ class Sensor:
         except Unanswered as error:
             if self._watchdog.has_expired(time.monotonic()):
                 raise DeviceError(str(error)) from error
-            self._owes = not self.device.line.has_transaction_ids
+            self._awaits_late_reply = not self.device.line.has_transaction_ids
             return None
         now = time.monotonic()
         self._watchdog.reset(now)
-        owed, self._owes = self._owes, False
-        if owed or not self._goes_on(self._counter(values["sequence"]), now):
+        late_reply, self._awaits_late_reply = self._awaits_late_reply, False
+        if late_reply or not self._goes_on(self._counter(values["sequence"]), now):
             return None
         return values["force_x"], values["force_y"], values["force_z"]
 
     def _goes_on(self, count: float, now: float) -> bool:
-        """Tell whether a sample is a new one; raise DeviceError where its counter went back or
-        leapt."""
+        """Return whether a sample is new; raise DeviceError if its counter went back or leapt."""
         if self._first is None or self._last is None:
             self._first = self._last = count, now
             return True
@@ -88,12 +86,11 @@ class Sensor:
         return True
 
     def _most(self, now: float) -> float:
-        """Return how many samples it may have taken since its last new one, by how fast it counted
-        until then.
+        """Return the most samples since the last new one that agree with the rate so far.
 
-        In lockstep no time passes, and until it has counted for a while, nobody knows.
+        Unlimited in lockstep, where no time passes, and until the rate is known.
         """
-        assert self._first and self._last  # one came before
+        assert self._first and self._last  # this is not the first sample
         (first, since), (last, until) = self._first, self._last
         if self._in_lockstep or until - since < SETTLED_S:
             return inf

@@ -1,5 +1,4 @@
-"""The rig as acquisition sees it: drives and force sensors that together deliver one row a
-cycle."""
+"""All drives and force sensors of a rig, which together deliver one row a cycle."""
 
 import asyncio
 import time
@@ -11,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.clock_offset import Bounds
-from pipelines.acquisition.machine.drive import Drive, Reading, Send
+from pipelines.acquisition.machine.drive import Drive, Send
+from pipelines.acquisition.machine.drive_protocol import (
+    empty_recorder,
+    is_driven,
+    make_idle,
+    refuse_other_rate,
+    reset_fault,
+)
 from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.modbus.line import lines_of
 from pipelines.errors import DeviceError, Unanswered
@@ -20,14 +27,13 @@ from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 
 LAG_PAUSE_S = 0.0002
-"""Before a drive is asked again that has not latched its sample yet."""
-
+"""Pause before a drive is read again that has not latched the cycle's sample yet."""
 LOOKS = 9
-"""Readings from which the distance between the drives' counters is taken."""
+"""Readings from which the offset between the drives' counters is determined."""
 SAME_TIME = 0.1
-"""Share of a sample within which the clocks of drives that sample together tell the same time."""
+"""Largest difference, in samples, between clocks that count as showing the same time."""
 MOST_LOOKS = 200
-"""How many it may take where samples come faster than replies."""
+"""Most readings for the offset where samples come faster than replies."""
 
 Answer = TypeVar("Answer")
 
@@ -36,66 +42,79 @@ class Machine:
     """All devices of a rig."""
 
     def __init__(self, rig: RigSettings, *, with_sensors: bool, samples_per_cycle: int = 1) -> None:
-        """Take the devices of a rig; drives take so many samples from one set-point to the next."""
+        """Create the devices of a rig, with so many samples from one set-point to the next."""
         self.rig = rig
         line_of = lines_of(rig)
         self.drives = [
             Drive(rig, settings, line_of(settings), samples_per_cycle) for settings in rig.drive
         ]
-        self.sensors = (
-            [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor]
-            if with_sensors
-            else []
-        )
+        sensors = rig.sensor if with_sensors else ()
+        self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in sensors]
         self.samples_per_cycle = samples_per_cycle
         self.latches = rig.sampling == "cyclic" and rig.clocks == "common"
         """Whether a cycle brings one sample that all drives latched at the same instant."""
         self._parts: list[Drive | Sensor] = [*self.drives, *self.sensors]
         self.no_force = np.full((len(CUFFS), 3), np.nan)
         self.leads = [0 for _ in self.drives]
-        """How far each drive's counter is ahead of the first one's at the same sample."""
+        """Samples by which each drive's counter is ahead of the first one's."""
         self.leads_are_vague = False
-        """Whether a slow line hides by how many samples."""
-        self._counted = 0
-        """At which count all drives were at the end of the last cycle."""
+        """Whether the lines are too slow to determine the leads."""
+        self._last_count = 0
+        """Count of all drives at the end of the last cycle."""
 
     async def connect(self) -> None:
-        """Open every line and make sure who is at its end."""
+        """Open every line and check the identity of every device."""
         for part in self._parts:
             await part.device.line.connect()
             await part.device.check_identity(part.map.identity)
 
     async def refuse_driven(self) -> None:
-        """Refuse to write anything to a rig that somebody else drives."""
-        driven = await all_answers(drive.is_driven() for drive in self.drives)
-        if labels := [
+        """Refuse to write to a rig that another program drives.
+
+        Raises
+        ------
+        DeviceError
+            Names the drives.
+        """
+        driven = await all_answers(is_driven(drive) for drive in self.drives)
+        labels = [
             drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so
-        ]:
+        ]
+        if labels:
             raise DeviceError(
-                f"{' and '.join(labels)}: driven by somebody else, since angle or set-point change"
-                " while exoid sends nothing; end the other program, or hold the leg still; nothing"
-                " was sent"
+                f"{' and '.join(labels)}: driven by another program, since angle or set-point"
+                " change while exoid sends nothing; end that program, or hold the leg still;"
+                " nothing was sent"
             )
 
     async def reset_faults(self) -> None:
         """Clear the faults that drives report."""
         for drive in self.drives:
-            await drive.reset_fault()
+            await reset_fault(drive)
 
     async def make_idle(self) -> None:
-        """Disable every drive before a run; refuse to go on where one was enabled: nobody knows
-        what moved the leg."""
-        enabled = [drive.device.label for drive in self.drives if await drive.make_idle()]
+        """Disable every drive before a run; refuse to go on where one was enabled.
+
+        Raises
+        ------
+        DeviceError
+            Names the drives that were enabled, since it is unknown what moved the leg.
+        """
+        enabled = [drive.device.label for drive in self.drives if await make_idle(drive)]
         if enabled:
             raise DeviceError(
-                f"{' and '.join(enabled)}: enabled before the run began, by one that was killed"
-                " perhaps; disabled now; see to the leg, and to what else moves it, and start"
-                " again"
+                f"{' and '.join(enabled)}: enabled before the run began, perhaps by one that was"
+                " killed; disabled now; check the leg and what else moves it, then start again"
             )
 
     async def refuse_other_rate(self, cycle_hz: float) -> None:
-        """Refuse drives that do not sample at the rate that is wanted; in lockstep each exchange is
-        a sample."""
+        """Refuse drives that do not sample at the rate of the run; in lockstep all do.
+
+        Raises
+        ------
+        DeviceError
+            Names a drive and its rate.
+        """
         if self.rig.clock == "lockstep":
             return
         setting = (
@@ -104,16 +123,14 @@ class Machine:
             else "record_rate_hz in the rig file"
         )
         rate_hz = cycle_hz * self.samples_per_cycle
-        await all_answers(drive.refuse_other_rate(rate_hz, setting) for drive in self.drives)
+        await all_answers(refuse_other_rate(drive, rate_hz, setting) for drive in self.drives)
 
     async def empty_records(self) -> None:
-        """Let go what the drives' own records have kept so far: a queue that nobody read is full of
-        what is past."""
-        await all_answers(drive.empty_record() for drive in self.drives)
+        """Discard what the drives recorded before the run."""
+        await all_answers(empty_recorder(drive) for drive in self.drives)
 
     async def forget_records(self) -> None:
-        """Let go what has come to the drives' own records, without a pause for long; what is left
-        waits."""
+        """Discard what the drives recorded, at most one drain each; the rest waits."""
         with suppress(Unanswered):
             await all_answers(drive.forget_records() for drive in self.drives)
 
@@ -123,14 +140,14 @@ class Machine:
             part.device.line.close()
 
     async def look(self) -> Row:
-        """Read every device once, moving nothing.
+        """Read every device without moving anything, and determine the drives' leads.
 
         Raises
         ------
         DeviceError
-            Where a drive reports a fault.
+            A drive reports a fault.
         """
-        # Several looks: between two requests of one of them a drive may go on to its next sample.
+        # Several times: between two requests a drive may go on to its next sample.
         looks = [
             await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)
         ]
@@ -141,31 +158,27 @@ class Machine:
             [[reading.sequence - look[0].sequence for reading in look] for look in looks]
         )
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
-        if (
-            self.rig.sampling == "recorder"
-            and self.rig.clock == "real_time"
-            and self.rig.clocks == "common"
-        ):
+        rig = self.rig
+        if rig.sampling == "recorder" and rig.clock == "real_time" and rig.clocks == "common":
             await self._find_leads()
-        self._counted = looks[-1][0].sequence
+        self._last_count = looks[-1][0].sequence
         return Row(tuple(looks[-1]), await self.cuff_forces(), self.samples_per_cycle)
 
     async def _find_leads(self) -> None:
-        """Find out how far the counters are apart though they go on while one drive after the other
-        is asked.
+        """Determine the leads of counters that go on while one drive after the other is read.
 
-        Replies bound it. Where the drives' clocks tell a distance within these bounds, they show
-        the same time, and it is that; else the bounds must be narrow enough to leave one.
+        Each reply bounds them. Where the drives' clocks give a lead within these bounds, they show
+        the same time, and it is that one; else the bounds must leave a single whole number.
         """
         rate_hz = self.rig.record_rate_hz
-        assert rate_hz  # a rig file that asks for recorders has it
-        bounds = [Bounds(1.0 / rate_hz) for _ in self.drives]
-        for drive, its in zip(self.drives, bounds, strict=True):
-            drive.bounds = its
+        assert rate_hz  # the rig file is checked: recorders have a rate
+        all_bounds = [Bounds(1.0 / rate_hz) for _ in self.drives]
+        for drive, bounds in zip(self.drives, all_bounds, strict=True):
+            drive.bounds = bounds
         try:
             for _ in range(MOST_LOOKS):
                 readings = await asyncio.gather(*(drive.look() for drive in self.drives))
-                (origin, width), *others = [its.now() for its in bounds]
+                (origin, width), *others = [bounds.now() for bounds in all_bounds]
                 leads = [
                     _lead(
                         (origin - other[0]) * rate_hz,
@@ -189,91 +202,91 @@ class Machine:
         return await self.drives[0].count() // self.samples_per_cycle
 
     async def cycle(self, number: int, send: Send) -> Answers:
-        """Send all drives at once; return what came: the sample that all devices latched, or of
-        each its newest.
+        """Send to all drives at once; return the answers, and their common sample if latched.
 
-        In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time
-        the drives tell when a new sample begins, so sensors are read after it. Nothing is sent
-        twice, for a set-point that comes late is no set-point.
+        In lockstep the exchange with the drives ends a sample, so sensors are read before it. In
+        real time the drives report when a new sample begins, so sensors are read after it. Nothing
+        is sent twice, since a set-point that comes late is wrong by then.
         """
         if self.rig.clock == "lockstep":
             forces = await self.cuff_forces(number)
-            answers = await answers_or_silence(map(send, self.drives))
+            answers = await answers_or_timeouts(map(send, self.drives))
         else:
-            answers = await answers_or_silence(map(send, self.drives))
+            answers = await answers_or_timeouts(map(send, self.drives))
             forces = await self.cuff_forces(number)
         readings = [answer for answer in answers if isinstance(answer, Reading)]
-        whole = len(readings) == len(answers)
-        if whole and self.latches:
-            whole = await self._latch(readings)
+        is_whole = len(readings) == len(answers)
+        if is_whole and self.latches:
+            is_whole = await self._latch(readings)
             answers = list(readings)
-        row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
+        row = Row(tuple(readings), forces, self.samples_per_cycle) if is_whole else None
         return Answers(tuple(answers), forces, row)
 
     async def cuff_forces(self, cycle: int | None = None) -> NDArray:
-        """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of
-        all."""
+        """Read the sensors that are due in a cycle, or all of them without one.
+
+        Returns
+        -------
+        (4, 3) array
+            Force on each cuff, N; NaN where no sensor was read or had a new sample.
+        """
         due = [sensor for sensor in self.sensors if cycle is None or sensor.is_due(cycle)]
         if not due:
             return self.no_force
         forces = self.no_force.copy()
-        for sensor, force in zip(
-            due, await all_answers(sensor.look() for sensor in due), strict=True
-        ):
+        answers = await all_answers(sensor.look() for sensor in due)
+        for sensor, force in zip(due, answers, strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
 
     async def _latch(self, readings: list[Reading]) -> bool:
-        """Ask those drives again that have not latched the others' sample yet.
+        """Read drives again until all have latched the newest sample; replace their ``readings``.
 
-        Returns whether all have latched it in the end; not, where one does not answer.
+        Return False where one of them does not answer.
         """
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
             counts = [
-                reading.sequence - ahead
-                for reading, ahead in zip(readings, self.leads, strict=True)
+                reading.sequence - lead for reading, lead in zip(readings, self.leads, strict=True)
             ]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
             if not late:
-                self._counted = max(counts)
+                self._last_count = max(counts)
                 return True
             if time.monotonic() > until:
                 raise DeviceError(self._out_of_step(readings, counts))
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
-                # Not told again: what is due by then is another set-point.
+                # Read only, not sent again: by then another set-point is due.
                 try:
                     readings[j] = await self.drives[j].look(in_motion=True)
                 except Unanswered:
                     return False
 
     def _out_of_step(self, readings: Sequence[Reading], counts: Sequence[int]) -> str:
-        """Return in words which drive's counter has parted from the others', and how."""
+        """Return in words which drive's counter differs from the others', and how."""
         slow, fast = int(np.argmin(counts)), int(np.argmax(counts))
-        gained = [count - self._counted for count in counts]
-        # Whichever goes on as before is right.
+        gained = [count - self._last_count for count in counts]
+        # The counter that goes on as before is right.
         j, other = (fast, slow) if gained[slow] > 0 else (slow, fast)
         what = "leapt" if gained[slow] > 0 else "went back" if gained[slow] < 0 else "stands still"
         return (
             f"{self.drives[j].device.label}: its sample counter {what}"
-            f" ({readings[j].sequence - gained[j]}, then "
-            f"{readings[j].sequence}) while that of drive {self.rig.drive[other].joint} went on by"
-            f" {gained[other]} in "
-            f'{self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the rig'
-            " file, if each drive "
-            "has a clock of its own"
+            f" ({readings[j].sequence - gained[j]}, then {readings[j].sequence}) while that of"
+            f" drive {self.rig.drive[other].joint} went on by {gained[other]} in"
+            f' {self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the'
+            " rig file, if each drive has a clock of its own"
         )
 
 
-async def answers_or_silence(asked: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
-    """Return each answer, or the error that says that there was none in time, once that is known of
-    all.
+async def answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
+    """Wait for all requests; return each answer, or the error of one that came too late.
 
-    None shall be left for the next request to find. What is worse than silence is raised.
+    All are awaited, so that no late answer is taken for that of a later request. Any other error
+    is raised.
     """
-    answers = await asyncio.gather(*asked, return_exceptions=True)
+    answers = await asyncio.gather(*requests, return_exceptions=True)
     results: list[Answer | Unanswered] = []
     for answer in answers:
         if isinstance(answer, BaseException) and not isinstance(answer, Unanswered):
@@ -282,10 +295,10 @@ async def answers_or_silence(asked: Iterable[Awaitable[Answer]]) -> list[Answer 
     return results
 
 
-async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
-    """Return all answers, once there are all; raise where one is missing."""
+async def all_answers(requests: Iterable[Awaitable[Answer]]) -> list[Answer]:
+    """Wait for all requests and return their answers; raise where one is missing."""
     answers: list[Answer] = []
-    for answer in await answers_or_silence(asked):
+    for answer in await answers_or_timeouts(requests):
         if isinstance(answer, Unanswered):
             raise answer
         answers.append(answer)
@@ -295,12 +308,12 @@ async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
 def _lead(
     bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float
 ) -> int | None:
-    """Return how many samples a drive is ahead, by its replies ``bounded`` give or take ``margin``;
-    None if unclear."""
+    """Return the samples by which a drive is ahead, replies saying ``bounded`` ± ``margin``.
+
+    None where more than one number is possible.
+    """
     by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
-    if (
-        abs(by_clock - round(by_clock)) < SAME_TIME
-        and abs(round(by_clock) - bounded) <= margin + 0.5
-    ):
-        return round(by_clock)
+    nearest = round(by_clock)
+    if abs(by_clock - nearest) < SAME_TIME and abs(nearest - bounded) <= margin + 0.5:
+        return nearest
     return round(bounded) if margin <= 0.5 else None

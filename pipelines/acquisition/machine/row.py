@@ -1,10 +1,10 @@
-"""What one cycle brings of the whole machine."""
+"""Samples of the whole machine."""
 
 from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.errors import Unanswered
 
 
@@ -14,17 +14,17 @@ class Row:
 
     drives: tuple[Reading, ...]
     forces: NDArray
-    """(4, 3) N; NaN where a sensor was not read or had nothing new."""
+    """(4, 3) N; NaN where a sensor was not read or had no new sample."""
     samples_per_cycle: int = 1
 
     @property
     def sequence(self) -> int:
-        """The cycle it belongs to: the first drive's sample counter is the machine's."""
+        """Number of the cycle, by the first drive's sample counter."""
         return self.drives[0].sequence // self.samples_per_cycle
 
     @property
     def time(self) -> float:
-        """The first drive's clock: the machine's, s."""
+        """The first drive's clock, which is the machine's, s."""
         return self.drives[0].time
 
     @property
@@ -35,11 +35,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Answers:
-    """What one cycle brought, whole or not."""
+    """The answers of one cycle, complete or not."""
 
     drives: tuple[Reading | Unanswered, ...]
-    """Of a drive that did not answer in time, the error that says so."""
+    """For a drive that did not answer in time, the error."""
     forces: NDArray
-    """(4, 3) N; NaN where a sensor was not read or had nothing new."""
+    """(4, 3) N; NaN where a sensor was not read or had no new sample."""
     row: Row | None
-    """The sample of the whole machine; None where a drive's is missing."""
+    """The sample of the whole machine; None where a drive's sample is missing."""

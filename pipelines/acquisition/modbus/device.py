@@ -1,4 +1,4 @@
-"""A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
+"""A Modbus device: its requests, and every failure in one sentence."""
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from contextlib import AbstractAsyncContextManager
@@ -9,7 +9,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.line import Line
-from pipelines.acquisition.modbus.reply import NoReply
+from pipelines.acquisition.modbus.reply import InvalidReply
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig.register_map import Identity
@@ -36,39 +36,46 @@ REMEDY: dict[int, str] = {
 }
 
 
-class Wait(NamedTuple):
-    """How long a reply is awaited, and what in a rig file's ``safety`` sets that."""
+class TimeOut(NamedTuple):
+    """How long a reply is awaited, and the key in a rig file's ``safety`` that sets it."""
 
     seconds: float
     setting: str
 
 
 class Device:
-    """One device on a line. Several may be asked side by side; those on one line are answered one
-    after the other."""
+    """One device on a line.
+
+    Requests to several devices may be concurrent; those on one line are sent one after the other.
+    """
 
     def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
-        """Join a line; a rig's safety settings tell how long a reply is awaited."""
+        """Join a line; a rig's safety settings give the time-outs."""
         self.label = line.join(name, unit)
         self.line = line
         self._client = line.client
         self._unit = unit
-        self._at_rest = Wait(safety.connect_s, "connect_s")
-        self._in_motion = Wait(safety.longest_reply_s, "reply_s or watchdog_s")
-        self._write_wait = Wait(safety.watchdog_s, "watchdog_s")
+        self._at_rest = TimeOut(safety.connect_s, "connect_s")
+        self._in_motion = TimeOut(safety.longest_reply_s, "reply_s or watchdog_s")
+        self._write = TimeOut(safety.watchdog_s, "watchdog_s")
 
     @property
     def awaited_s(self) -> float:
-        """For how long it has not answered what it was asked, s; 0 where it has."""
+        """For how long its answer has been awaited, s; 0 where none is awaited."""
         return self.line.awaited_s(self._unit)
 
     def turn(self) -> AbstractAsyncContextManager[None]:
-        """Wait until it is its turn on the line, and keep it for all that this task asks it
-        within."""
+        """Wait for the device's turn on the line, and keep it for all requests of the block."""
         return self.line.turn(self._unit)
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
-        """Refuse a device that is not the one that the rig file describes."""
+        """Refuse a device that is not the one that the rig file describes.
+
+        Raises
+        ------
+        DeviceError
+            Names the identity register, its value and the expected one.
+        """
         for entry in identity:
             (value,) = await self.read(entry.address, 1)
             if value != entry.value:
@@ -79,19 +86,19 @@ class Device:
                 )
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
-        """Return words read by FC03."""
+        """Read words by FC03; ``in_motion`` with the short time-out of a moving leg."""
         what = f"reading registers {address} to {address + count - 1}"
-        wait = self._in_motion if in_motion else self._at_rest
+        time_out = self._in_motion if in_motion else self._at_rest
         request = self._client.read_holding_registers
-        return await self._ask(what, count, wait, request, address=address, count=count)
+        return await self._ask(what, count, time_out, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
-        """Return what a queue holds, read by FC24: whole records of so many words, or nothing.
+        """Read the words of a queue by FC24, whole records of ``words`` each.
 
         Raises
         ------
         DeviceError
-            Where what it holds are no whole records.
+            The answer is not made of whole records.
         """
         what = f"reading the queue at register {address}"
         response = await self._request(
@@ -106,11 +113,11 @@ class Device:
         return registers
 
     async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
-        """Write a block by FC16."""
+        """Write a block by FC16; ``in_motion`` with the short time-out of a moving leg."""
         what = f"writing registers {_range(block)}"
-        wait = self._in_motion if in_motion else self._write_wait
+        time_out = self._in_motion if in_motion else self._write
         request = self._client.write_registers
-        await self._ask(what, None, wait, request, address=block.address, values=list(words))
+        await self._ask(what, None, time_out, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
@@ -130,13 +137,12 @@ class Device:
         self,
         what: str,
         words: int | None,
-        wait: Wait,
+        time_out: TimeOut,
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
     ) -> list[int]:
-        """Send a request and return the words of the answer, ``words`` of them where it is to bring
-        any."""
-        response = await self._request(what, wait, request, **arguments)
+        """Send a request and return the words of its answer, ``words`` of them if given."""
+        response = await self._request(what, time_out, request, **arguments)
         if words is not None and len(response.registers) != words:
             raise DeviceError(
                 f"{self.label}: answered {what} with {len(response.registers)} registers, expected"
@@ -145,24 +151,27 @@ class Device:
         return list(response.registers)
 
     async def _request(
-        self, what: str, wait: Wait, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+        self,
+        what: str,
+        time_out: TimeOut,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        **arguments: Any,
     ) -> ModbusPDU:
-        """Send a request and return its answer; raise DeviceError where there is none, or a
-        refusal."""
+        """Send a request and return its answer; raise DeviceError for none or a refusal."""
         try:
-            response = await self.line.ask(self._unit, wait.seconds, request, **arguments)
+            response = await self.line.ask(self._unit, time_out.seconds, request, **arguments)
         except (ModbusException, OSError) as error:
-            silent = Unanswered if self._client.connected else DeviceError
-            raise silent(
-                f"{self.label}: did not answer {what} within {wait.seconds:.3g} s; check cable and"
-                f" power, or raise safety.{wait.setting} in the rig file"
+            kind = Unanswered if self._client.connected else DeviceError
+            raise kind(
+                f"{self.label}: did not answer {what} within {time_out.seconds:.3g} s; check cable"
+                f" and power, or raise safety.{time_out.setting} in the rig file"
             ) from error
-        if isinstance(response, NoReply):
+        if isinstance(response, InvalidReply):
             raise DeviceError(
-                f"{self.label}: answered {what} with {response.found}; check that it speaks Modbus,"
-                " and the line"
+                f"{self.label}: answered {what} with {response.reason}; check that it speaks"
+                " Modbus, and the line"
             )
-        # An exception reply is an answer like any other to pymodbus: nothing is raised.
+        # pymodbus does not raise an exception for an exception reply.
         if response.isError():
             code = int(getattr(response, "exception_code", 0))
             meaning = f": {MEANING[code]}" if code in MEANING else ""

@@ -1,5 +1,4 @@
-"""The lines to a rig, each held by one exoid of this computer at a time while it may move or
-release a leg."""
+"""Exclusive access to the lines of a rig, for one exoid of this computer at a time."""
 
 import os
 import socket
@@ -17,15 +16,15 @@ from pipelines.settings.rig.line import LineSettings, RtuLine
 
 
 @contextmanager
-def alone(rig: RigSettings) -> Iterator[None]:
-    """Hold the lines of a rig for as long as the block lasts.
+def exclusive_access(rig: RigSettings) -> Iterator[None]:
+    """Hold the lines of a rig for the duration of the block.
 
     Raises
     ------
     DeviceError
-        Where another process holds one of them.
+        Another process holds one of them.
     """
-    if rig.embedded:  # nobody else knows where it is
+    if rig.embedded:  # its ports are free ones that no other process knows
         yield
         return
     lines = {line.place: line for line in map(rig.line_of, (*rig.drive, *rig.sensor))}
@@ -36,11 +35,10 @@ def alone(rig: RigSettings) -> Iterator[None]:
 
 
 def _names(line: LineSettings) -> set[str]:
-    """Return what a line is called however a rig file writes it: a port's own path, a host's
-    addresses."""
+    """Return the unique names of a line: a serial port's real path, or a host's addresses."""
     if isinstance(line, RtuLine):
         return {os.path.realpath(line.place)}
-    with suppress(OSError):  # a host that nobody knows will not be reached either
+    with suppress(OSError):  # an unknown host cannot be reached either
         addresses = socket.getaddrinfo(line.host, line.port, type=socket.SOCK_STREAM)
         return {f"{address[0]}:{line.port}" for *_, address in addresses}
     return {line.place}
@@ -56,7 +54,7 @@ def _held(name: str) -> Iterator[None]:
         try:
             yield
         finally:
-            with suppress(OSError):  # Windows removes no file that is open
+            with suppress(OSError):  # Windows cannot remove an open file
                 path.unlink()
 
 
@@ -67,8 +65,8 @@ def _locked(path: Path, name: str) -> IO[bytes]:
             file = os.fdopen(_opened(path), "rb+", buffering=0)
         except OSError as error:
             raise DeviceError(
-                f"{path}: cannot be opened ({error.strerror}), and so nobody knows whether another"
-                f" exoid uses {name}; see to this file, or set TMPDIR to a folder that every user"
+                f"{path}: cannot be opened ({error.strerror}), so it is unknown whether another"
+                f" exoid uses {name}; repair this file, or set TMPDIR to a folder that every user"
                 " of the rig may write in; nothing was moved"
             ) from error
         if not take(file, wait=False):
@@ -81,15 +79,15 @@ def _locked(path: Path, name: str) -> IO[bytes]:
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), os.stat(path)):
                 return file
-        file.close()  # whoever held it has removed it meanwhile
+        file.close()  # its former holder has removed it meanwhile
 
 
 def _opened(path: Path) -> int:
-    """Return a descriptor of a file that every user may lock, made where there is none."""
+    """Open a file that every user may lock; create it where there is none."""
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
     while True:
-        # Not made and opened at once: in a folder of everybody's, Linux refuses that with another
-        # user's file.
+        # In two steps: in a folder that all users share, Linux refuses to open another user's file
+        # with O_CREAT.
         with suppress(FileNotFoundError):
             return os.open(path, flags)
         with suppress(FileExistsError):

@@ -1,4 +1,4 @@
-"""A file's lock, which the system takes away whatever becomes of the process that holds it."""
+"""A lock on a file, which the system releases when the process that holds it ends or is killed."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,13 +12,11 @@ except ImportError:  # on Windows
     fcntl = None  # type: ignore[assignment]
 
 FAR = 1 << 40
-"""Place of the byte that Windows locks, where nothing ever stands: it keeps others from reading
-what is locked."""
+"""Offset of the byte that Windows locks, beyond any content: no one else can read locked bytes."""
 
 
 def take(file: IO[bytes], *, wait: bool) -> bool:
-    """Take the lock of an open file; return False where another process holds it, unless told to
-    wait for it."""
+    """Lock an open file; return False, or ``wait``, where another process holds the lock."""
     if fcntl is None:
         return _take_a_byte(file, wait=wait)
     try:
@@ -29,7 +27,7 @@ def take(file: IO[bytes], *, wait: bool) -> bool:
 
 
 def _take_a_byte(file: IO[bytes], *, wait: bool) -> bool:
-    import msvcrt  # mypy knows its contents on Windows only
+    import msvcrt  # its contents are known to mypy only on Windows
 
     place = file.tell()
     file.seek(FAR)
@@ -45,22 +43,22 @@ def _take_a_byte(file: IO[bytes], *, wait: bool) -> bool:
 
 @dataclass(frozen=True)
 class Lock:
-    """The lock of a file, as far as it could be had."""
+    """An attempt to lock a file."""
 
     path: Path
     free: bool
-    """Whether it could; if not, another process holds it."""
+    """Whether it succeeded; if not, another process holds the lock."""
     _file: IO[bytes]
 
     def remove(self) -> None:
-        """Remove the file, as the last that is done while it is locked."""
+        """Remove the file; nothing may use the lock after this."""
         if fcntl is None:
-            self._file.close()  # Windows removes no file that is open
+            self._file.close()  # Windows cannot remove an open file
         self.path.unlink()
 
 
 @contextmanager
 def locked(path: Path) -> Iterator[Lock]:
-    """Hold a file's lock for as long as the block lasts."""
+    """Try to lock a file for the duration of the block."""
     with open(path, "rb") as file:
         yield Lock(path, take(file, wait=False), file)

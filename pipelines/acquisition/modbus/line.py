@@ -1,5 +1,4 @@
-"""A line to devices: one connection, one request at a time however many devices are on it, and
-quiet in between."""
+"""A line to devices: one connection, with one request at a time and pauses in between."""
 
 import asyncio
 import errno
@@ -19,7 +18,7 @@ from pymodbus.framer import FramerSocket, FramerType
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from serial.tools import list_ports
 
-from pipelines.acquisition.modbus.reply import NoReply, check_replies
+from pipelines.acquisition.modbus.reply import InvalidReply, check_replies
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DeviceSettings
@@ -33,8 +32,8 @@ from pipelines.settings.rig.line import (
 )
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
-"""What a serial port that cannot be set up as told is refused with."""
-with suppress(ImportError):  # Windows has another way with ports
+"""Errors of a serial port that cannot be set up as the rig file says."""
+with suppress(ImportError):  # not on Windows
     import termios
 
     BAD_SETTINGS += (termios.error,)
@@ -44,51 +43,48 @@ CERTIFICATE_ADVICE = {
     9: "set the clocks of this computer and of the rig, or wait until it is valid",
     10: "renew it at the rig, or set this computer's clock if that is wrong",
 }
-"""What to do about a certificate that OpenSSL refuses by a code of its own, where it is no matter
-of whom to trust."""
+"""Remedies for certificates that are not valid now, by OpenSSL's error code."""
 
 
-class Owed:
-    """An answer that did not come in time, and may still come."""
+class LateReply:
+    """A reply that did not come in time, and may still come."""
 
     def __init__(self, within_s: float) -> None:
         self._until = asyncio.get_running_loop().time() + within_s
         self.came = asyncio.Event()
 
-    async def pass_by(self) -> None:
-        """Wait until it has come, or comes no more."""
+    async def wait(self) -> None:
+        """Wait until it has come, or can come no more."""
         with suppress(TimeoutError):
             async with asyncio.timeout_at(self._until):
                 await self.came.wait()
 
 
 class Line:
-    """A connection and whoever is on it."""
+    """A connection and the devices on it."""
 
     def __init__(self, settings: LineSettings, timeout_s: float, name: str | None = None) -> None:
         self.place = settings.place
-        # Once: files are read, and a lost connection is no time for that.
+        # Only once: it reads files, which must not delay a new connection.
         self._tls = _tls_context(settings) if isinstance(settings, TlsLine) else None
         self.client = _client(settings, self._tls, timeout_s, self._note_connection)
-        # The watchdog decides for how long silence is borne.
+        # Else pymodbus closes the connection after some missing replies; the watchdog decides that.
         self.client.set_max_no_responses(sys.maxsize)
         check_replies(self.client, self._note_reply)
         self.devices: list[str] = []
-        """Who is on it."""
+        """Names of the devices on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
         self._holder: asyncio.Task | None = None
-        """Whose turn it is."""
+        """Task that has the turn."""
         self._used = False
-        """Whether anything was asked in it."""
+        """Whether it has sent a request in its turn."""
         self._asking = self._failed = self._has_answered = False
-        """Whether a request is under way, whether the last one was not answered, and whether any
-        ever was."""
+        """Whether a request is under way, the last one was not answered, any ever was answered."""
         self._asked: dict[int, float] = {}
-        """Units that have not answered yet, or are waiting for their turn, and since when; the
-        event loop's time, s."""
-        self._owed: dict[int, Owed] = {}
-        """What units may still answer that were not waited for any longer."""
+        """Event loop's time, s, since when a unit waits for its turn or its reply."""
+        self._late: dict[int, LateReply] = {}
+        """Replies that units may still send after their time-out."""
         self._quiet_since = 0.0
 
     @property
@@ -97,13 +93,13 @@ class Line:
         return self._settings.has_transaction_ids
 
     def join(self, name: str, unit: int) -> str:
-        """Add a device; return what errors call it."""
+        """Add a device; return its label in errors."""
         label = f"{name} ({self.place}, unit {unit})"
         self.devices.append(f"{name} (unit {unit})" if self._name else label)
         return label
 
     async def connect(self) -> None:
-        """Open the connection; nothing happens where there is one."""
+        """Open the connection, if it is not open."""
         async with self._turn:
             await self._open()
 
@@ -123,18 +119,16 @@ class Line:
             ) from error
 
     def close(self) -> None:
-        """Close the connection; nothing happens where there is none."""
+        """Close the connection, if it is open."""
         if self.client.ctx.transport:
-            # At once: TLS would wait for the other end to say goodbye, and that may be gone.
+            # Without the closing handshake of TLS: the other end may be gone.
             cast(asyncio.Transport, self.client.ctx.transport).abort()
         self.client.close()
 
     async def renew(self) -> None:
-        """Open another connection where this one did not answer last, once whoever is asking has
-        been answered.
+        """Open a new connection where the last request on this one was not answered.
 
-        Nobody's turn comes in between: whoever else is on the line is asked on the old connection
-        or the new one.
+        It waits for the request that is under way, and no device's turn comes in between.
         """
         async with self._turn:
             if not self._failed:
@@ -142,13 +136,13 @@ class Line:
             self.close()
             await self._open()
             self._failed = False
-            for owed in self._owed.values():
-                owed.came.set()
-            self._owed.clear()
+            for late in self._late.values():
+                late.came.set()
+            self._late.clear()
 
     @asynccontextmanager
     async def turn(self, unit: int) -> AsyncIterator[None]:
-        """Wait until it is a unit's turn, and keep it for all that this task asks within."""
+        """Wait for a unit's turn, and keep it for all requests of this task within the block."""
         waits = unit not in self._asked
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         await self._take_turn(unit)
@@ -168,15 +162,14 @@ class Line:
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
     ) -> ModbusPDU:
-        """Send a unit a request of the client's when it is its turn, and return the answer, awaited
-        for ``within_s``.
+        """Send a request to a unit in its turn, and return the reply, awaited for ``within_s``.
 
         Raises
         ------
         DeviceError
             The line is lost.
         ModbusException, OSError
-            The device did not answer; the line stands.
+            The device did not answer, but the line is open.
         """
         if self._holder is asyncio.current_task():
             return await self._ask(unit, within_s, request, arguments)
@@ -193,15 +186,14 @@ class Line:
         self._used = True
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
-            await self._quiet()
-            # The one place where pymodbus looks for how long to wait, be it for a connection or for
-            # an answer.
+            await self._pause()
+            # pymodbus uses this one setting as time-out of connections and replies alike.
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
             answer = await request(**arguments, device_id=unit)
-            # What answers another request is no silence; but who asks again is to do so on another
+            # The reply to another request counts as an answer, but the next try needs a new
             # connection.
-            self._failed, self._has_answered = isinstance(answer, NoReply), True
+            self._failed, self._has_answered = isinstance(answer, InvalidReply), True
             self._asked.pop(unit, None)
             return answer
         except (ModbusException, OSError) as error:
@@ -212,67 +204,67 @@ class Line:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
                 if unit in self._asked and (len(self.devices) > 1 or not self.has_transaction_ids):
-                    self._owed[unit] = Owed(within_s)
+                    self._late[unit] = LateReply(within_s)
             self._asking = False
 
     def awaited_s(self, unit: int) -> float:
-        """Return for how long a unit has not answered what it is to be asked, s; 0 where it has."""
+        """Return for how long a unit's reply, or its turn, has been awaited, s; 0 for none."""
         now = asyncio.get_running_loop().time()
         return now - self._asked.get(unit, now)
 
     async def _take_turn(self, unit: int) -> None:
-        """Wait until a unit may be asked.
+        """Wait for a unit's turn.
 
-        After one that did not answer come the others on the line, for as long as it was waited for:
-        one that is dead must not keep them from being told where to go. A serial line does not say
-        which request a reply answers: a late one has come by then.
+        A unit that did not answer waits for another time-out, in which the other units on the line
+        take their turns: a dead device must not keep them from getting set-points. By then a late
+        reply has come, which on a serial line could be taken for that of the next request.
         """
         while True:
-            if owed := self._owed.get(unit):
-                await owed.pass_by()
-                if self._owed.get(unit) is owed:
-                    del self._owed[unit]
+            late = self._late.get(unit)
+            if late:
+                await late.wait()
+                if self._late.get(unit) is late:
+                    del self._late[unit]
             await self._turn.acquire()
-            if unit not in self._owed:
+            if unit not in self._late:
                 return
             self._turn.release()
 
     def _note_reply(self, unit: int) -> None:
         """Note that a unit has replied, in time or not."""
         self._quiet_since = asyncio.get_running_loop().time()
-        if owed := self._owed.get(unit):
-            owed.came.set()
+        if unit in self._late:
+            self._late[unit].came.set()
 
     @property
     def _label(self) -> str:
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
 
-    async def _quiet(self) -> None:
-        """Wait until nothing has been on the line for as long as its devices need to tell frames
-        apart."""
+    async def _pause(self) -> None:
+        """Wait for the pause that separates two frames on the line."""
         if self._settings.quiet_s:
             loop = asyncio.get_running_loop()
             await asyncio.sleep(max(0.0, self._quiet_since + self._settings.quiet_s - loop.time()))
 
     def _note_connection(self, connected: bool) -> None:
-        """End the request that is under way when the connection ends: its answer will not come."""
+        """End the request that is under way when the connection ends: no reply will come."""
         answer = self.client.ctx.response_future
         if self._asking and not connected and not answer.done():
             answer.set_exception(ConnectionException("lost"))
 
     def _loss(self) -> str:
-        """Return what became of the connection, and for whom."""
+        """Return in words how the connection was lost, and for which devices."""
         others = f", and with it {', '.join(self.devices)}" if self._name else ""
-        # Under TLS 1.3 a client is turned away only once it takes the connection for made.
+        # With TLS 1.3 a client is refused only after its connection seems complete.
         if isinstance(self._settings, TlsLine) and not self._has_answered:
             return (
                 f"the other end closed the line before its first answer{others}; it does not trust"
-                " what certificate and key in the rig file show, or has stopped"
+                " the certificate in the rig file, or has stopped"
             )
         return f"the line is lost{others}; check cable and power"
 
     async def _refusal(self) -> str:
-        """Return why there is no connection; the client tells its log alone."""
+        """Return why there is no connection, which pymodbus only logs."""
         try:
             if isinstance(self._settings, NetworkLine):
                 await asyncio.get_running_loop().getaddrinfo(
@@ -292,8 +284,7 @@ class Line:
 
 
 def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
-    """Return what finds the line that a device of a rig is on, the same one for all devices that
-    share it."""
+    """Return a function from a device's settings to its line, one for all devices that share it."""
     timeout_s = rig.safety.connect_s
     shared = {name: Line(settings, timeout_s, name) for name, settings in rig.line.items()}
     return lambda device: (
@@ -308,8 +299,7 @@ def _client(
     note: Callable[[bool], None],
 ) -> ModbusBaseClient:
     """Return the client of a line, not yet connected."""
-    # Never a second try: a set-point that comes late is no set-point, and an exchange may move the
-    # leg.
+    # Without retries: a set-point that comes late is wrong by then.
     common: Mapping[str, Any] = {
         "timeout": timeout_s,
         "retries": 0,
@@ -325,10 +315,9 @@ def _client(
             **common,
         )
     if isinstance(settings, TlsLine):
-        assert tls  # such a line has one
+        assert tls  # a TLS line has a context
         client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
-        # pymodbus takes each record for one whole frame, whatever length the frame tells; records
-        # do not promise that.
+        # pymodbus takes each TLS record for one whole frame, which TLS does not guarantee.
         client.ctx.framer = FramerSocket(DecodePDU(False))
         return client
     framer = FramerType.RTU if isinstance(settings, RtuOverTcpLine) else FramerType.SOCKET
@@ -336,7 +325,7 @@ def _client(
 
 
 def _tls_context(settings: TlsLine) -> ssl.SSLContext:
-    """Return what a line shows and what it trusts."""
+    """Return the certificate of a line and the authorities that it trusts, as a TLS context."""
     file: Path | None = settings.ca
     try:
         context = ssl.create_default_context(cafile=settings.ca)
@@ -354,17 +343,15 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
 
 
 def _explained(error: OSError) -> str:
-    """Return a failure to connect in words, with what to do."""
+    """Return a failure to connect in words, with a remedy."""
     if isinstance(error, socket.gaierror):
         return f"no such host ({error.strerror}); correct host in the rig file, or give its address"
     if isinstance(error, ssl.SSLCertVerificationError):
         advice = CERTIFICATE_ADVICE.get(
             error.verify_code,
-            "name in ca whoever signed it, and in host the name that it is made out to",
+            "set ca to its issuer's certificate, and host to the name in it",
         )
-        return (
-            f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); {advice}"
-        )
+        return f"its certificate is not trusted ({error.verify_message.rstrip('.')}); {advice}"
     if isinstance(error, TimeoutError):
         return (
             "no TLS connection within safety.connect_s; check that the rig is on, and that the port"
@@ -384,7 +371,7 @@ def _explained(error: OSError) -> str:
     if error.errno in (errno.EACCES, errno.EPERM):
         return (
             "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout"
-            " $USER), log in anew"
+            " $USER), log in again"
         )
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         return "the serial port is busy; end the other program that uses it"

@@ -1,5 +1,4 @@
-"""How often a line can carry what a cycle asks of it: a serial line takes its time for every
-character."""
+"""The highest sample rate that the lines can carry, by the time that each character takes."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -15,12 +14,12 @@ from pipelines.settings.rig.register_map import DriveMap, SensorMap
 
 
 def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
-    """Refuse a sample rate that the lines cannot keep up with even where devices answer at once.
+    """Refuse a sample rate that is too high for the lines even if devices answer at once.
 
     Raises
     ------
     SettingsError
-        Tells the line that takes longest, and the highest rate.
+        Names the slowest line and the highest rate.
     """
     highest, slowest = highest_rate(rig, with_sensors=with_sensors)
     if slowest is not None and sample_rate_hz > highest:
@@ -32,11 +31,11 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
 
 
 def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
-    """Return the most samples a second, Hz, and the line that a sample waits for longest.
+    """Return the highest sample rate, Hz, and the line that limits it.
 
-    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors that
-    are due and, where drives record themselves, drains each. Lines work side by side, devices on
-    one line take turns. Infinity and None where the speed of no line is known.
+    A cycle reads the first drive's counter, exchanges with all drives, then reads the sensors that
+    are due and drains drives that record themselves. Lines work concurrently, devices on one line
+    take turns. Infinity and None where no line's speed is known.
     """
     first = rig.drive[0]
     look = rig.line_of(first).exchange_s(
@@ -48,7 +47,7 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
             exchange_characters(rig.map.drive[drive.map])
         )
         if rig.sampling == "recorder":
-            assert rig.record_rate_hz  # as its drives have rings
+            assert rig.record_rate_hz  # the rig file is checked: recorders have a rate
             took_s, brings = drain(rig.line_of(drive), rig.map.drive[drive.map])
             drains[drive.line] += took_s
             records[drive.line] += took_s / brings * rig.record_rate_hz
@@ -58,7 +57,7 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
     longest = max(
         cycle + max(drains.values(), default=0.0),
         cycle / share if share > 0.0 else float("inf"),
-        # An answer later than this share of a sample is too old to build on: see PhaseLock.
+        # PhaseLock cannot use an answer that is later than this share of a sample.
         look / SLOW,
     )
     busy = {
@@ -69,11 +68,9 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
 
 
 def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
-    """Return how long each line carries the sensors that are read in one cycle, s, where that is
-    longest.
+    """Return each line's longest time for the sensors of one cycle, s.
 
-    Sensors that are read equally seldom take turns; of those that are not, the longest turns come
-    together some time.
+    Sensors with equal ``every`` take turns; the longest turns of different ones coincide at times.
     """
     turns = defaultdict[tuple[str | None, int], defaultdict[int, float]](lambda: defaultdict(float))
     for sensor in rig.sensor:
@@ -86,10 +83,9 @@ def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
 
 
 def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
-    """Return how long a line carries one full read of a drive's own record, s, and how many samples
-    that brings."""
+    """Return the time of one full read of a drive's own record, s, and its number of samples."""
     ring = registers.ring
-    assert ring  # a rig file that asks for recorders has one for every drive
+    assert ring  # the rig file is checked: with recorders, every drive has one
     brings = ring.records_per_read
     if ring.newest is None:
         return line.exchange_s(queue_characters(brings * ring.words)), brings
@@ -98,20 +94,17 @@ def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
 
 
 def exchange_characters(registers: DriveMap) -> int:
-    """Return how many characters an FC23 exchange takes as RTU frames, request and reply
-    together."""
+    """Return the characters of an FC23 exchange, request and reply as RTU frames."""
     return 13 + 2 * Block(registers_of(registers.write)).count + 5 + 2 * _count(registers)
 
 
 def read_characters(registers: int) -> int:
-    """Return how many characters an FC03 reading takes as RTU frames, request and reply
-    together."""
+    """Return the characters of an FC03 reading, request and reply as RTU frames."""
     return 8 + 5 + 2 * registers
 
 
 def queue_characters(registers: int) -> int:
-    """Return how many characters an FC24 reading takes as RTU frames, request and reply
-    together."""
+    """Return the characters of an FC24 reading, request and reply as RTU frames."""
     return 6 + 8 + 2 * registers
 
 

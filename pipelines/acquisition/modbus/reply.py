@@ -1,9 +1,8 @@
-"""What counts as a reply: a whole frame, well formed, that answers what was asked. Everything else
-is none.
+"""Strict checks of replies: only a complete, well-formed frame that answers the request counts.
 
-pymodbus is lenient: it takes transaction id 0 for any, a reply to another function, a byte count
-that does not fit the frame; and what it cannot decode it raises within asyncio, where nobody waits
-for it. Numbers move a leg here.
+pymodbus is lenient: it accepts transaction id 0 for any, a reply to another function, and a byte
+count that does not fit the frame. What it cannot decode it raises within asyncio, where no caller
+can catch it. Wrong numbers would move a leg, so every frame is checked here.
 """
 
 from collections.abc import Callable
@@ -17,49 +16,47 @@ READ_HOLDING, WRITE_MULTIPLE, READ_FIFO, READ_WRITE = 3, 16, 24, 23
 ASKED_FOR = (READ_HOLDING, WRITE_MULTIPLE, READ_FIFO, READ_WRITE)
 
 
-class NoReply(ModbusPDU):
-    """A frame that answers nothing, and what is wrong with it."""
+class InvalidReply(ModbusPDU):
+    """A frame that does not answer the request, with the reason."""
 
-    def __init__(self, found: str) -> None:
+    def __init__(self, reason: str) -> None:
         super().__init__()
-        self.found = found
+        self.reason = reason
 
 
 class FifoReply(ReadFifoQueueResponse):
-    """What FC24 brings; pymodbus 3.16 takes its frame on a serial line for two bytes shorter than
-    it is."""
+    """A reply to FC24; pymodbus 3.16 computes two bytes too few for its frame on a serial line."""
 
     @classmethod
     def calculateRtuFrameSize(cls, data: bytes) -> int:
-        """Return how long a frame is that begins like this: unit, function, two counts, what they
-        count, CRC."""
+        """Return the length of a frame in bytes: unit, function, two counts, content and CRC."""
         return 6 + int.from_bytes(data[2:4], "big")
 
 
 class ReplyDecoder(DecodePDU):
-    """Decodes what follows the head of a reply's frame; never raises."""
+    """Decodes the content of a reply's frame; never raises."""
 
     def __init__(self) -> None:
         super().__init__(False)
 
     def lookupPduClass(self, data: bytes) -> type[ModbusPDU] | None:
-        """Return what a frame on a serial line would be; None for what exoid never asks for."""
+        """Return the class of a serial line's frame; None for functions that exoid never uses."""
         if data[1] == READ_FIFO:
             return FifoReply
         return super().lookupPduClass(data) if data[1] & ERROR or data[1] in ASKED_FOR else None
 
     def decode(self, frame: bytes) -> ModbusPDU:
-        """Return the reply, or what it is instead of one."""
+        """Return the reply, or an InvalidReply."""
         function = frame[0]
         if function > ERROR:
             whole = len(frame) == 2
         elif function in ASKED_FOR:
             whole = _is_whole(function, frame)
         else:
-            return NoReply(f"function {function}, which was not asked for")
+            return InvalidReply(f"function {function}, which was not asked for")
         if not whole:
-            return NoReply(f"{len(frame)} bytes that do not fit function {function}")
-        # Not by pymodbus's own: that writes every reply out for its log, wanted or not.
+            return InvalidReply(f"{len(frame)} bytes that do not fit function {function}")
+        # Not by pymodbus's own method: that formats every reply for its log, even if it is off.
         reply = (
             ExceptionResponse(function & ~ERROR)
             if function > ERROR
@@ -70,7 +67,7 @@ class ReplyDecoder(DecodePDU):
 
 
 def _is_whole(function: int, frame: bytes) -> bool:
-    """Tell whether a reply is as long as its function and its own counts say."""
+    """Return whether a reply has the length of its function and counts."""
     if function == WRITE_MULTIPLE:
         return len(frame) == 5
     if function == READ_FIFO:
@@ -79,23 +76,23 @@ def _is_whole(function: int, frame: bytes) -> bool:
     return len(frame) > 1 and frame[1] % 2 == 0 and len(frame) == 2 + frame[1]
 
 
-class Conversation:
-    """Requests and replies of one connection, one after the other."""
+class ReplyCheck:
+    """Compares each reply of a connection with the request before it."""
 
-    def __init__(self, note: Callable[[int], None]) -> None:
+    def __init__(self, note_reply: Callable[[int], None]) -> None:
         self._asked = ModbusPDU()
-        self._note = note
+        self._note_reply = note_reply
 
     def __call__(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
-        """Remember a request; return a reply, or what is wrong with it."""
+        """Remember a request; return a reply, or an InvalidReply in its place."""
         if sending:
             self._asked = pdu
             return pdu
-        self._note(pdu.dev_id)
-        wrong = None if isinstance(pdu, NoReply) else self._wrong(pdu)
-        return pdu if wrong is None else _instead(pdu, wrong)
+        self._note_reply(pdu.dev_id)
+        reason = None if isinstance(pdu, InvalidReply) else self._mismatch(pdu)
+        return pdu if reason is None else _invalid(pdu, reason)
 
-    def _wrong(self, reply: ModbusPDU) -> str | None:
+    def _mismatch(self, reply: ModbusPDU) -> str | None:
         asked = self._asked
         if reply.transaction_id != asked.transaction_id:
             return f"transaction {reply.transaction_id}, expected {asked.transaction_id}"
@@ -111,16 +108,16 @@ class Conversation:
         return None
 
 
-def _instead(reply: ModbusPDU, wrong: str) -> NoReply:
-    none = NoReply(wrong)
-    none.dev_id, none.transaction_id = reply.dev_id, reply.transaction_id
-    return none
+def _invalid(reply: ModbusPDU, reason: str) -> InvalidReply:
+    invalid = InvalidReply(reason)
+    invalid.dev_id, invalid.transaction_id = reply.dev_id, reply.transaction_id
+    return invalid
 
 
-def check_replies(client: ModbusBaseClient, note: Callable[[int], None]) -> None:
-    """Have a client hand out nothing but replies, and a NoReply for what came instead of one.
+def check_replies(client: ModbusBaseClient, note_reply: Callable[[int], None]) -> None:
+    """Let a client return only checked replies, and an InvalidReply for any other frame.
 
-    ``heard`` is told the unit of each that comes, wanted or not.
+    ``note_reply`` is called with the unit of every frame that comes, awaited or not.
     """
     client.ctx.framer.decoder = ReplyDecoder()
-    client.ctx.trace_pdu = Conversation(note)
+    client.ctx.trace_pdu = ReplyCheck(note_reply)

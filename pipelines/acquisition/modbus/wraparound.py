@@ -1,32 +1,32 @@
-"""A device's counter and clock: carried on beyond the width of their registers, and held against
-each other."""
+"""Counters and clocks of devices: without wraparound, and compared with each other."""
 
 RATE_TOLERANCE = 0.05
-"""How far a device's clock may be from the rate that was asked for, as a share of it."""
+"""Largest relative difference between a device's rate and the expected one."""
 CLOCK_SAMPLES = 0.5
-"""How far it may be from its counter between two samples beside that, in samples."""
+"""Further difference allowed between clock and counter of two samples, in samples."""
 
 
-def carried(value: float, near: float, span: float) -> float:
-    """Return what a register of a span held, with as many turns of it added as bring it near to a
-    known count."""
-    # What is less than half a span away is a turn; anything else is a step of the device's own.
+def unwrap(value: float, near: float, span: float) -> float:
+    """Return a value plus the multiple of its register's ``span`` that is closest to ``near``.
+
+    A ``span`` of 0 is that of a register without wraparound.
+    """
     return value + span * round((near - value) / span) if span else value
 
 
-class Counter:
-    """Carries value after value on, forwards or, for an older one, backwards."""
+class Unwrapper:
+    """Removes the wraparounds of successive values, which may go forwards or backwards."""
 
     def __init__(self, span: float) -> None:
         self._span = span
         self._last: float | None = None
 
     def __call__(self, value: float) -> float:
-        """Return the value with every turn of the register added."""
-        self._last = value if self._last is None else carried(value, self._last, self._span)
+        """Return the next value without wraparound."""
+        self._last = value if self._last is None else unwrap(value, self._last, self._span)
         return self._last
 
 
 def keeps_time(samples: float, seconds: float, rate_hz: float) -> bool:
-    """Tell whether a clock went on as its counter did."""
+    """Return whether a clock advanced by as much as its sample counter."""
     return abs(seconds * rate_hz - samples) <= CLOCK_SAMPLES + RATE_TOLERANCE * abs(samples)

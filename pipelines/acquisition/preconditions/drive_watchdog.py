@@ -1,5 +1,4 @@
-"""How long a lost reply leaves a drive without a set-point, against how long its own watchdog waits
-for one."""
+"""Whether the drives' own watchdogs tolerate a lost reply, which delays the next set-point."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
@@ -7,14 +6,14 @@ from pipelines.settings.rig.devices import DriveSettings
 
 
 def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
-    """Refuse drives that would let go of the leg because of one lost reply, which a run survives.
+    """Refuse drives whose watchdog would let go of the leg after a single lost reply.
 
-    Nothing is refused where it is not known how long their watchdogs wait.
+    Nothing is refused where the time-outs of their watchdogs are unknown.
 
     Raises
     ------
     SettingsError
-        Tells the time-out, and how long it should be.
+        Names the time-out and its shortest allowed value.
     """
     key, heartbeat_s = rig.known_heartbeat_s
     for drive in rig.drive:
@@ -23,18 +22,18 @@ def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sens
         longest = waits * reply_s + 2.0 / sample_rate_hz
         if heartbeat_s is not None and heartbeat_s <= longest:
             raise SettingsError(
-                f"{key}: found {heartbeat_s:g}, expected more than {longest:.3g} s: for so long one"
+                f"{key}: found {heartbeat_s:g}, expected more than {longest:.3g} s, for which one"
                 f" lost reply leaves {rig.label_of(drive)} without a set-point ({waits} x reply_s"
-                f" of {reply_s:.3g} s, and two samples), and its own watchdog would let go of the"
-                " leg; lower safety.reply_s, or raise the time-out in the drive"
+                f" of {reply_s:.3g} s, and two samples); lower safety.reply_s, or raise the"
+                " time-out in the drive"
             )
 
 
 def replies_waited_for(rig: RigSettings, drive: DriveSettings, *, with_sensors: bool) -> int:
-    """Return how many replies' time goes by until a drive is told again whose reply was lost.
+    """Return the time-outs that pass until a drive is sent something after a lost reply.
 
-    Where others are on its line, or its reply could be taken for another's, it is left alone for as
-    long as it was waited for: see ``Line``.
+    A second one passes where other devices are on its line, or where its late reply could be taken
+    for that of the next request: see ``Line``.
     """
     on_line = [
         other

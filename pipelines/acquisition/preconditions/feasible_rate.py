@@ -1,4 +1,4 @@
-"""What no run in real time can do with a rig file at a rate, whatever its devices answer."""
+"""Checks of a sample rate in real time that need the rig file alone."""
 
 from collections.abc import Callable
 from functools import partial
@@ -9,9 +9,8 @@ from pipelines.acquisition.safety.watchdog import refuse_short_watchdog
 from pipelines.settings.rig import RigSettings
 
 
-def refusals(*, with_sensors: bool) -> tuple[Callable[[RigSettings, float], None], ...]:
-    """Return what refuses a rig at a sample rate, Hz, each by a SettingsError that tells the
-    key."""
+def rate_checks(*, with_sensors: bool) -> tuple[Callable[[RigSettings, float], None], ...]:
+    """Return functions that raise SettingsError where a rig is unfit for a sample rate, Hz."""
     return (
         refuse_short_watchdog,
         partial(refuse_slow_lines, with_sensors=with_sensors),

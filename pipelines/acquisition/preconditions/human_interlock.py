@@ -1,5 +1,4 @@
-"""What a rig must have before somebody is moved by it: limits of their own, and cuff forces that
-are watched."""
+"""What a rig must have before it moves a person: limits of their own, and watched cuff forces."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
@@ -7,13 +6,11 @@ from pipelines.settings.rig import RigSettings
 LIMITS = ("speed_rad_s", "torque_nm")
 
 
-def unnoticed(rig: RigSettings) -> list[str]:
-    """Return in words what nobody would notice on a rig while it moves somebody."""
-    missing = (
-        []
-        if rig.sensor
-        else ["the rig file has no [[sensor]]: nobody watches how hard the cuffs press"]
-    )
+def unmonitored(rig: RigSettings) -> list[str]:
+    """Return in words which dangers go unnoticed on a rig while it moves a person."""
+    missing = []
+    if not rig.sensor:
+        missing.append("the rig file has no [[sensor]]: the force on the cuffs is not watched")
     blind = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].enabled_mask]
     if blind:
         missing.append(
@@ -23,7 +20,8 @@ def unnoticed(rig: RigSettings) -> list[str]:
             f" ({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g}"
             " rad), and until then the leg leaps back by as much on its release"
         )
-    if deaf := [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]:
+    deaf = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]
+    if deaf:
         missing.append(
             f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it"
             " reports is noticed only once it says that it is no longer enabled, or the leg does"
@@ -33,15 +31,14 @@ def unnoticed(rig: RigSettings) -> list[str]:
 
 
 def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse to move somebody by a rig as its file describes it, whose limits would be those of an
-    empty machine.
+    """Refuse to move a person by a rig whose file has no limits of their own.
 
-    Nobody is in a virtual one.
+    A virtual rig is not refused: no person is in it.
 
     Raises
     ------
     SettingsError
-        Tells the key that is missing, or the sensor that is read too seldom.
+        Names the missing key, or a sensor that is read too seldom.
     """
     if rig.plant is not None:
         return
@@ -57,22 +54,21 @@ def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
             "safety.with_human.cuff_force_n: missing; a run with_human needs its own limit of the"
             f" force on a cuff, no higher than {rig.safety.cuff_force_n:g} N"
         )
-    refuse_seldom_read(rig, sample_rate_hz)
+    refuse_rare_readings(rig, sample_rate_hz)
 
 
-def refuse_seldom_read(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse sensors that are asked so seldom that no watchdog would hold.
+def refuse_rare_readings(rig: RigSettings, sample_rate_hz: float) -> None:
+    """Refuse sensors that are read less often than the watchdog's time.
 
     Raises
     ------
     SettingsError
-        Tells the sensor.
+        Names the sensor.
     """
     for i, sensor in enumerate(rig.sensor):
         if sensor.every > rig.safety.watchdog_s * sample_rate_hz:
             raise SettingsError(
                 f"sensor[{i}].every: found {sensor.every}, which is"
                 f" {sensor.every / sample_rate_hz:.3g} s at {sample_rate_hz:g} Hz; expected a force"
-                f" at least every {rig.safety.watchdog_s:g} s (safety.watchdog_s), or nobody"
-                " watches it; lower it"
+                f" at least every {rig.safety.watchdog_s:g} s (safety.watchdog_s); lower it"
             )

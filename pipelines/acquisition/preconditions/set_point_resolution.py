@@ -1,21 +1,19 @@
-"""How finely drives can be told set-points, against how far the leg moves from one to the next."""
+"""The resolution of set-points, compared with the leg's motion from one to the next."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
 FINEST_SHARE = 4
-"""Counts of a set-point's register in the longest step at least; rounding lengthens a step by one
-of them at most."""
+"""Fewest counts of a set-point's register in the longest step; rounding adds one at most."""
 
 
 def refuse_coarse_set_points(rig: RigSettings, sample_rate_hz: float) -> None:
-    """Refuse a drive whose set-points are rounded so coarsely that they leap though the motion is
-    smooth.
+    """Refuse a drive whose set-points are rounded so coarsely that a smooth motion becomes jerky.
 
     Raises
     ------
     SettingsError
-        Tells the register and the coarsest count, rad, that will do.
+        Names the register and its largest allowed count, rad.
     """
     for drive in rig.drive:
         count = rig.map.drive[drive.map].write.reference.step

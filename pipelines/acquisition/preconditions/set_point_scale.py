@@ -1,5 +1,4 @@
-"""Whether a drive is told angles as it tells them: where not, it leaps as it is enabled where the
-leg stands."""
+"""Whether a drive's set-point and angle have one scale; if not, it leaps when it is enabled."""
 
 from collections.abc import Iterator
 
@@ -8,27 +7,27 @@ from pipelines.settings.rig import Register, RigSettings
 from pipelines.settings.rig.register_map import DriveMap
 
 SAME_SCALE = 1e-3
-"""Up to which share two scales are one, written with more or fewer digits."""
+"""Relative difference of scales that are equal but for their number of digits."""
 
 
-def refuse_misplaced_set_points(rig: RigSettings) -> None:
-    """Refuse a rig with a drive that would be sent to another place than where it stands.
+def refuse_contradictory_set_points(rig: RigSettings) -> None:
+    """Refuse a rig with a drive that would leap from where it stands when it is enabled.
 
     Raises
     ------
     SettingsError
-        Tells both registers.
+        Names both registers.
     """
-    for why in misplaced_set_points(rig):
+    for why in set_point_contradictions(rig):
         raise SettingsError(why)
 
 
-def misplaced_set_points(rig: RigSettings) -> Iterator[str]:
-    """Yield of each make of drives whose set-point's register contradicts its angle's what is
-    wrong, and what to do."""
+def set_point_contradictions(rig: RigSettings) -> Iterator[str]:
+    """Yield, for each drive map whose set-point contradicts its angle, the error and a remedy."""
     for name in sorted({drive.map for drive in rig.drive}):
-        if what := _contradiction(rig.map.drive[name]):
-            yield f"map.drive.{name}.write.reference.{what}"
+        contradiction = _contradiction(rig.map.drive[name])
+        if contradiction:
+            yield f"map.drive.{name}.write.reference.{contradiction}"
 
 
 def _contradiction(map_: DriveMap) -> str | None:
@@ -37,21 +36,21 @@ def _contradiction(map_: DriveMap) -> str | None:
         return (
             f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign"
             " for both, or the drive leaps to the other side of zero as it is enabled; find out by"
-            " `exoid rig check --by-hand` which is wrong, and turn that"
+            " `exoid rig check --by-hand` which sign is wrong, and change that"
         )
-    if map_.own_scale or not (apart := _apart(written, read)):
+    difference = None if map_.own_scale else _difference(written, read)
+    if difference is None:
         return None
-    key, one, other = apart
+    key, one, other = difference
     return (
         f"{key}: found {one} with {other} of read.angle, expected the same, or the drive leaps by"
-        " the difference as it is enabled; correct one, or set own_scale = true beside `enable`"
+        " the difference as it is enabled; correct one, or set own_scale = true next to `enable`"
         " where the drive's manual says that both are right"
     )
 
 
-def _apart(written: Register, read: Register) -> tuple[str, str, str] | None:
-    """Return in which key two registers differ by which one angle is another count, with both
-    values, if in any."""
+def _difference(written: Register, read: Register) -> tuple[str, str, str] | None:
+    """Return a key in which two registers of an angle differ, with both values; None for none."""
     for key in ("type", "word_order", "byte_order"):
         one, other = getattr(written, key), getattr(read, key)
         if one != other and not (key == "word_order" and written.registers == 1):

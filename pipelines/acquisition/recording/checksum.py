@@ -1,36 +1,34 @@
-"""The checksum of a journal's batch, by which one that a disk has damaged is known from one that
-was written so.
+"""The checksum of a journal's batch, which distinguishes a damaged batch from a written one.
 
-It stands as text in the batch's own metadata, where other readers of Arrow pass over it, and covers
-every byte of the batch, the text's own digits taken as zeros, and the journal's head, without which
-no column has a name.
+It is text in the batch's own metadata, which other readers of Arrow ignore. It covers every byte of
+the batch, with the text's own digits as zeros, and the journal's head, which names the columns.
 """
 
 import re
 from zlib import crc32
 
 KEY = b"checksum"
-"""Key under which a batch's own metadata hold it."""
+"""Key of the checksum in a batch's own metadata."""
 BLANK = b"exoid-batch:00000000"
-"""How it stands there before it is known."""
-_STATED = re.compile(rb"exoid-batch:([0-9a-f]{8})")
+"""Its value while it is computed."""
+_CHECKSUM = re.compile(rb"exoid-batch:([0-9a-f]{8})")
 
 
 def with_checksum(batch: bytes, head: bytes) -> bytes:
-    """Return a batch as a stream has it, the checksum put in where it is ``BLANK``."""
+    """Return a batch of a stream with its checksum in place of ``BLANK``."""
     place = batch.index(BLANK) + len(BLANK) - 8
     return b"%b%08x%b" % (batch[:place], crc32(batch, crc32(head)), batch[place + 8 :])
 
 
 def fits(batch: bytes, head: bytes) -> bool:
-    """Return whether a batch is what was written after this head."""
-    stated = _STATED.search(batch)
-    if stated is None:
+    """Return whether a batch has the checksum of its bytes and this head."""
+    match = _CHECKSUM.search(batch)
+    if match is None:
         return False
-    begin, end = stated.span(1)
-    return crc32(batch[:begin] + b"00000000" + batch[end:], crc32(head)) == int(stated[1], 16)
+    begin, end = match.span(1)
+    return crc32(batch[:begin] + b"00000000" + batch[end:], crc32(head)) == int(match[1], 16)
 
 
 def has_any(content: bytes) -> bool:
-    """Return whether a part of a journal holds a checksum: those of an older exoid have none."""
-    return _STATED.search(content) is not None
+    """Return whether a part of a journal has a checksum; journals of an older exoid have none."""
+    return _CHECKSUM.search(content) is not None

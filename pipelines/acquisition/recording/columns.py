@@ -1,4 +1,4 @@
-"""A row of the machine as a line of a ``recording/1``."""
+"""The columns of a ``recording/1``, with their values in a row of the machine."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ QUANTITIES = ("angle", "torque", "reference", "velocity", "current", "temperatur
 
 
 def columns_of(machine: Machine) -> Columns:
-    """Return the recording's columns beside time, each with what it holds of a row."""
+    """Return the recording's columns except time, each with its value as a function of a row."""
     columns: Columns = {}
     for j, drive in enumerate(machine.drives):
         joint = Joint(drive.settings.joint)

@@ -1,5 +1,7 @@
-"""A recording made of a journal, whether its run has ended, was stopped or was killed; an hour
-takes no more memory."""
+"""A recording made of the journal of a run that has ended, was stopped or was killed.
+
+It is made in pieces, so that a long run takes no more memory than a short one.
+"""
 
 import json
 from dataclasses import dataclass, field
@@ -9,15 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.recording.journal import (
-    ABORT,
-    FOUND,
-    ROWS,
-    JournalFile,
-    field_of,
-    in_pieces,
-)
-from pipelines.acquisition.recording.valid_rows import sound_batches
+from pipelines.acquisition.recording.journal import ABORT, METADATA, ROWS, field_of
+from pipelines.acquisition.recording.journal_file import JournalFile, in_pieces
+from pipelines.acquisition.recording.valid_rows import valid_batches
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import aborted_of
 from pipelines.errors import ContractError
@@ -25,27 +21,27 @@ from pipelines.errors import ContractError
 PIECE_ROWS = 32768
 """Samples that are held in memory at once."""
 LARGEST = 1e9
-"""Beyond this no rate, Hz, and no duration, s, is one."""
+"""Largest credible rate, Hz, and duration, s."""
 
 
 @dataclass(frozen=True)
-class Account:
-    """What a journal holds of its run, and what is missing."""
+class JournalSummary:
+    """The samples of a journal, and those that are missing."""
 
     samples: int
     planned: int
-    """Samples that the run was to have."""
+    """Samples that the run should have had."""
     rate_hz: float
     gaps: list[tuple[float, int]]
-    """First missing time, s, and number of missing samples; what an early end left out is none."""
+    """First missing time, s, and number of missing samples, without those after an early end."""
     abort: str | None
     """Why the run was stopped early, None if it was not."""
-    found: dict[str, Any] = field(default_factory=dict)
-    """What else the run found out for its metadata."""
+    metadata: dict[str, Any] = field(default_factory=dict)
+    """Metadata that were not known before the run."""
     damaged: bool = False
-    """Whether the journal holds less than was written into it, or bytes that tell nothing."""
+    """Whether samples that were written are missing, or bytes have no meaning."""
     checked: bool = True
-    """Whether each sample was held against a checksum."""
+    """Whether the samples have checksums."""
 
     @property
     def missed(self) -> int:
@@ -58,14 +54,15 @@ class Account:
         return self.planned - self.samples - self.missed
 
 
-def account_of(journal: JournalFile) -> Account:
-    """Go through a journal and say what is there; the device's counter tells what is not."""
+def summarize(journal: JournalFile) -> JournalSummary:
+    """Count a journal's samples, and those that are missing according to the device's counter."""
     _refuse_other_columns(journal)
     rate_hz = _positive(journal, "sample_rate_hz")
     seconds = _positive(journal, "config", "run", "duration_s")
     planned, samples, reached = round(seconds * rate_hz), 0, 0
-    gaps, offset, last_words = list[tuple[float, int]](), None, None
-    for batch in sound_batches(journal):
+    gaps = list[tuple[float, int]]()
+    offset, last_words = None, None
+    for batch in valid_batches(journal):
         last_words = batch.last_words
         if not batch.rows.num_rows:
             continue
@@ -73,35 +70,35 @@ def account_of(journal: JournalFile) -> Account:
         if offset is None:
             offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
         index = sequence + offset
-        metadata, samples = (
-            _gaps(np.concatenate([[reached - 1], index]), rate_hz),
-            samples + len(index),
-        )
-        gaps, reached = gaps + metadata, int(index[-1]) + 1
+        gaps = gaps + _gaps(np.concatenate([[reached - 1], index]), rate_hz)
+        samples += len(index)
+        reached = int(index[-1]) + 1
     ending = None if last_words is None else _ending_of(last_words)
     if ending is None:
-        # A full disk takes the last words with it: nobody can tell the two apart.
+        # Neither a killed run nor one on a full disk can write its last words.
         why = (
             f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its"
             " disk was full"
         )
         damaged = journal.damaged > 0 or last_words is not None
-        why += ", or its last words are damaged" if damaged else ""
-        return Account(
+        if damaged:
+            why += ", or its last words are damaged"
+        return JournalSummary(
             samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked
         )
-    abort, found_out, rows = ending
+    abort, metadata, rows = ending
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
     damaged = journal.damaged > 0 or rows != journal.rows
-    return Account(samples, planned, rate_hz, gaps, abort, found_out, damaged, journal.checked)
+    return JournalSummary(
+        samples, planned, rate_hz, gaps, abort, metadata, damaged, journal.checked
+    )
 
 
 def _ending_of(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
-    """Return why a run stopped early, what else it found out, and its number of samples; None where
-    that is damaged."""
+    """Return why a run stopped early, more metadata and its samples; None where damaged."""
     try:
-        metadata = json.loads(last_words[FOUND])
+        metadata = json.loads(last_words[METADATA])
         ending = last_words[ABORT].decode() or None, metadata, int(last_words[ROWS])
     except (KeyError, ValueError):
         return None
@@ -109,7 +106,7 @@ def _ending_of(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, An
 
 
 def _refuse_other_columns(journal: JournalFile) -> None:
-    """Refuse a journal whose columns are none of a run's."""
+    """Refuse a journal whose columns cannot be those of a run."""
     fields = {field.name: field for field in journal.schema}
     for name in ("time_s", "sequence", *fields):
         stored, expected = fields.get(name), field_of(name)
@@ -122,7 +119,7 @@ def _refuse_other_columns(journal: JournalFile) -> None:
 
 
 def _positive(journal: JournalFile, *keys: str) -> float:
-    """Return a number of a journal's metadata that a recording cannot be made without."""
+    """Return a number of a journal's metadata that every recording needs."""
     value: Any = journal.metadata
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
@@ -136,25 +133,29 @@ def _positive(journal: JournalFile, *keys: str) -> float:
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
-    """Return what is missing between samples whose numbers (n,) count from the run's beginning."""
+    """Return time (s) and length of each gap between samples numbered (n,) from the run's begin."""
     before = np.flatnonzero(np.diff(index) > 1)
     return [((int(index[k]) + 1) / rate_hz, int(index[k + 1] - index[k]) - 1) for k in before]
 
 
-def write_recording(journal: JournalFile, path: Path, account: Account, **more: Any) -> None:
-    """Write what a journal holds as ``recording/1``; ``more`` goes into its metadata."""
-    abort = {"abort": account.abort} if account.abort else {}
-    unchecked = {} if account.checked else {"unchecked": True}
-    metadata = journal.metadata | account.found | {"gaps": account.gaps} | abort | unchecked | more
-    rows = (batch.rows for batch in sound_batches(journal))
+def write_recording(journal: JournalFile, path: Path, summary: JournalSummary, **more: Any) -> None:
+    """Write a journal's samples as ``recording/1``, with ``more`` in its metadata."""
+    metadata = journal.metadata | summary.metadata | {"gaps": summary.gaps}
+    if summary.abort:
+        metadata["abort"] = summary.abort
+    if not summary.checked:
+        metadata["unchecked"] = True
+    metadata |= more
+    rows = (batch.rows for batch in valid_batches(journal))
     RECORDING.write_pieces(path, in_pieces(rows, PIECE_ROWS), metadata)
 
 
-def place_for(output: Path, abort: str | None) -> Path:
-    """Return the name of a recording: of a stopped run one beside the output that is not taken.
+def recording_path(output: Path, abort: str | None) -> Path:
+    """Return the path of a recording: for a stopped run the first free ``.aborted`` name.
 
-    So nobody, make included, takes what a run left for all that it was to bring.
+    So that no one, make included, takes the recording of a stopped run for a complete one.
     """
     if not abort:
         return output
-    return next(path for number in count(1) if not (path := aborted_of(output, number)).exists())
+    names = (aborted_of(output, number) for number in count(1))
+    return next(path for path in names if not path.exists())

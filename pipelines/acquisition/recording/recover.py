@@ -1,14 +1,14 @@
-"""What a killed run left, made a whole recording."""
+"""A recording made of the journal that a killed run left."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.acquisition.modbus.file_lock import locked
-from pipelines.acquisition.recording.journal import JournalFile
+from pipelines.acquisition.recording.journal_file import JournalFile
 from pipelines.acquisition.recording.recording import (
-    Account,
-    account_of,
-    place_for,
+    JournalSummary,
+    recording_path,
+    summarize,
     write_recording,
 )
 from pipelines.contracts import RECORDING
@@ -18,41 +18,40 @@ from pipelines.validation.suggestion import similar_file
 
 
 @dataclass(frozen=True)
-class Recovered:
+class Recovery:
     """A recording that was made of a journal."""
 
     path: Path
-    account: Account
+    summary: JournalSummary
 
 
 def journals_in(place: Path) -> list[Path]:
-    """Return the journals below a folder, if there are any; a file stands for itself."""
+    """Return all journals below a folder, or the file itself."""
     return sorted(place.rglob(f"*{JOURNAL}")) if place.is_dir() else [place]
 
 
-def recover(path: Path, output: Path | None = None) -> Recovered:
-    """Make a recording of a journal, and remove the journal where every byte of it told something.
+def recover(path: Path, output: Path | None = None) -> Recovery:
+    """Make a recording of a journal, and remove the journal if it is undamaged.
 
     Parameters
     ----------
     path : Path
         The journal.
     output : Path, optional
-        The recording; else what `exoid acquire` would have called it, ``<run>.aborted.parquet`` for
-        a run that was killed. A file that is there is never overwritten.
+        The recording; by default the name that `exoid acquire` gives it, which for a killed run is
+        ``<run>.aborted.parquet``. No file is overwritten.
 
     Raises
     ------
     InputError
-        Where it is none, is still written to, or holds no sample, and where the output is there
-        already.
+        The file is not a journal, is still written to or has no sample, or the output exists.
     """
     if not path.exists():
         raise InputError(
             f"{path}: no such file;"
             f" {similar_file(path) or '`exoid recover` takes the journal that a killed run left'}"
         )
-    if not path.is_file():  # a pipe would be waited for
+    if not path.is_file():  # reading a pipe could wait for ever
         raise InputError(
             f"{path}: is no file, expected the journal that a killed run left; name another"
         )
@@ -62,23 +61,25 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
                 f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C"
             )
         journal = JournalFile(path)
-        account = account_of(journal)
-        if not account.samples:
-            raise InputError(f"{path}: {_why_no_sample(account)}")
-        output = output or place_for(path.with_name(path.name.removesuffix(JOURNAL)), account.abort)
+        summary = summarize(journal)
+        if not summary.samples:
+            raise InputError(f"{path}: {_why_no_sample(summary)}")
+        output = output or recording_path(
+            path.with_name(path.name.removesuffix(JOURNAL)), summary.abort
+        )
         if output.exists():
             raise InputError(
                 f"{output}: is there already and is not overwritten; name another file with -o"
             )
         RECORDING.refuse_place(output)
-        write_recording(journal, output, account, recovered=True)
-        if not account.damaged:
+        write_recording(journal, output, summary, recovered=True)
+        if not summary.damaged:
             lock.remove()
-    return Recovered(output, account)
+    return Recovery(output, summary)
 
 
-def _why_no_sample(account: Account) -> str:
-    if account.damaged:
+def _why_no_sample(summary: JournalSummary) -> str:
+    if summary.damaged:
         return (
             "no sample in it can be read, it is damaged; nothing was changed; keep it, and check"
             " the disk"

@@ -1,4 +1,4 @@
-"""Writes the samples of a run to its journal, and notes those that are missing."""
+"""The writer of a run's samples to its journal, which notes missing ones."""
 
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.row import Row

@@ -1,5 +1,4 @@
-"""Rows of a journal that can stand in a recording; what cannot is left out, so that it never costs
-the others."""
+"""The rows of a journal that a recording may hold; the others are left out as gaps."""
 
 from collections.abc import Iterator
 
@@ -8,54 +7,55 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipelines.acquisition.modbus.wraparound import keeps_time
-from pipelines.acquisition.recording.journal import Batch, JournalFile
+from pipelines.acquisition.recording.journal_file import Batch, JournalFile
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 
-MEASURED = ("_angle_rad", "_torque_nm")
-"""How the names of columns end that hold a number in every row."""
+ALWAYS_MEASURED = ("_angle_rad", "_torque_nm")
+"""Endings of the columns that hold a number in every row."""
 
 
-def sound_batches(journal: JournalFile) -> Iterator[Batch]:
-    """Yield a journal's batches without rows whose values are none, or whose counter and clock
-    part.
+def valid_batches(journal: JournalFile) -> Iterator[Batch]:
+    """Yield a journal's batches without rows of impossible values or with a wrong counter or clock.
 
-    Each row is held against the last one that was sound: a single row that is damaged is left out,
-    and the next one goes on.
+    Each row is compared with the last valid one, so that one damaged row does not cost the next.
     """
     rate_hz, last = journal.metadata["sample_rate_hz"], None
     for batch in journal.batches():
-        kept, last = _in_time(batch.rows, _are_numbers(batch.rows), rate_hz, last)
-        whole = bool(kept.all())
-        yield batch if whole else Batch(batch.rows.filter(pa.array(kept)), batch.last_words)
+        is_valid, last = _in_time(batch.rows, _are_possible(batch.rows), rate_hz, last)
+        if is_valid.all():
+            yield batch
+        else:
+            yield Batch(batch.rows.filter(pa.array(is_valid)), batch.last_words)
 
 
-def _are_numbers(rows: pa.RecordBatch) -> NDArray:
-    """Mark the rows (n,) all of whose values a recording may hold."""
-    fine = np.ones(rows.num_rows, bool)
+def _are_possible(rows: pa.RecordBatch) -> NDArray:
+    """Mark the rows (n,) that have only values which a recording may hold."""
+    possible = np.ones(rows.num_rows, bool)
     for name, column in zip(rows.schema.names, rows.columns, strict=True):
         values = column.to_numpy(zero_copy_only=False)
-        fine &= (
-            np.isfinite(values)
-            if name.endswith(MEASURED) or name == "time_s"
-            else ~np.isinf(values)
-        )
+        if name.endswith(ALWAYS_MEASURED) or name == "time_s":
+            possible &= np.isfinite(values)
+        else:
+            possible &= ~np.isinf(values)
         if name.endswith("_rad"):
-            fine &= ~(np.abs(values) > LARGEST_ANGLE_RAD)
-    return fine
+            possible &= ~(np.abs(values) > LARGEST_ANGLE_RAD)
+    return possible
 
 
 def _in_time(
-    rows: pa.RecordBatch, fine: NDArray, rate_hz: float, last: tuple[int, float] | None
+    rows: pa.RecordBatch, possible: NDArray, rate_hz: float, last: tuple[int, float] | None
 ) -> tuple[NDArray, tuple[int, float] | None]:
-    """Mark those of the ``fine`` rows (n,) that go on from the last one; return the new last one
-    too."""
-    kept = fine.copy()
+    """Mark the ``possible`` rows (n,) that follow the last valid one in counter and clock.
+
+    Return them and the new last valid row's (sequence, time in s).
+    """
+    is_valid = possible.copy()
     sequence, time = (rows.column(name).to_numpy() for name in ("sequence", "time_s"))
-    for k in np.flatnonzero(fine):
-        instant = int(sequence[k]), float(time[k])
+    for k in np.flatnonzero(possible):
+        current = int(sequence[k]), float(time[k])
         if last is not None:
-            samples, seconds = instant[0] - last[0], instant[1] - last[1]
-            kept[k] = samples > 0 and seconds > 0.0 and keeps_time(samples, seconds, rate_hz)
-        if kept[k]:
-            last = instant
-    return kept, last
+            samples, seconds = current[0] - last[0], current[1] - last[1]
+            is_valid[k] = samples > 0 and seconds > 0.0 and keeps_time(samples, seconds, rate_hz)
+        if is_valid[k]:
+            last = current
+    return is_valid, last

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pipelines.acquisition.machine.drive import Condition, Reading
+from pipelines.acquisition.machine.reading import DriveStatus, Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.errors import DeviceError
 
@@ -26,17 +26,17 @@ class EnableState:
         """
         return not self._has_dropped and self.enabled is not False
 
-    def update(self, condition: Condition) -> str | None:
+    def update(self, status: DriveStatus) -> str | None:
         """Note a report; return the reason to stop where the drive has a fault or dropped out.
 
         A drive with a fault counts as not enabled: it may be again as soon as the fault is cleared.
         """
-        dropped = bool(self.enabled) and condition.enabled is False
-        if condition.enabled is not None:
-            self.enabled = condition.enabled
-        self._has_dropped |= dropped or condition.fault is not None
-        if condition.fault or not dropped:
-            return condition.fault
+        dropped = bool(self.enabled) and status.enabled is False
+        if status.enabled is not None:
+            self.enabled = status.enabled
+        self._has_dropped |= dropped or status.fault is not None
+        if status.fault or not dropped:
+            return status.fault
         return (
             f"drive {self._joint}: its status word says that it is no longer enabled; was the"
             " emergency stop pressed?"

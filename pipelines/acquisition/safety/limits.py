@@ -5,7 +5,7 @@ from math import copysign, isfinite, isnan
 
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS

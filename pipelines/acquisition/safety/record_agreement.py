@@ -7,7 +7,7 @@ them is wrong; the numbers do not show which.
 from collections import OrderedDict
 from math import copysign, isfinite, sqrt
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 

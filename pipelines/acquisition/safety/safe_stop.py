@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.safety.enable_state import EnableState, refuse_any
 from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 from pipelines.acquisition.safety.sample_checks import SampleChecks

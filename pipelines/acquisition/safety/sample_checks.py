@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.safety.cuff_checks import CuffChecks
 from pipelines.acquisition.safety.limits import Limits

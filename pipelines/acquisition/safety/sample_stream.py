@@ -8,7 +8,7 @@ sent. An error that contradicts nothing passes; docs/faults.md says how large it
 
 from math import ceil, inf
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
 from pipelines.acquisition.safety.limits import sample_violation
 from pipelines.acquisition.safety.set_point_history import SetPointHistory

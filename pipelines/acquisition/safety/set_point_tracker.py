@@ -7,7 +7,7 @@ knows when a drive that was sent nothing for a while must be asked where it is.
 
 from math import isnan
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.acquisition.safety.limits import clamped, refuse_leap, slowed
 from pipelines.acquisition.safety.return_to_plan import (

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.drive import Condition, Reading
+from pipelines.acquisition.machine.reading import DriveStatus, Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.enable_state import EnableState, refuse_any, update_all
@@ -199,9 +199,9 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
-    def update_enabled(self, joint: int, condition: Condition) -> None:
+    def update_enabled(self, joint: int, status: DriveStatus) -> None:
         """Note a drive's report; raise DeviceError where it has a fault or is no longer enabled."""
-        refuse_any([self.enable_states[joint].update(condition)])
+        refuse_any([self.enable_states[joint].update(status)])
 
     def finish(self, complaints: Sequence[str]) -> None:
         """End the run; ``complaints`` are of drives that may not have taken it to disable.

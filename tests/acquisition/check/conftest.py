@@ -2,7 +2,7 @@ import socket
 
 import pytest
 
-from pipelines.acquisition.check import look
+from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.check import check_rig
 from pipelines.rig import server
 
@@ -27,8 +27,8 @@ def checked(rig_file, serve, monkeypatch):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
-        monkeypatch.setattr(look, "TOGETHER_S", 1.5 if shipped == "real_time" else 0.3)
-        monkeypatch.setattr(look, "DRIVES_S", 0.1)
+        monkeypatch.setattr(survey, "TOGETHER_S", 1.5 if shipped == "real_time" else 0.3)
+        monkeypatch.setattr(survey, "DRIVES_S", 0.1)
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]

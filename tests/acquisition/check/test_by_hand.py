@@ -89,7 +89,7 @@ def test_a_wrong_sign_is_told_by_the_way_it_goes(checked, hand):
     assert re.search(
         r"drive knee: its angle went up \(\+0\.[45]\d* rad\) when the knee went into flexion", said
     )
-    assert "turn the sign of map.drive.servo.read.angle.scale" in said
+    assert "change the sign of map.drive.servo.read.angle.scale" in said
     assert "velocity is negative where the angle grows" in said
 
 
@@ -111,8 +111,8 @@ def test_a_force_of_the_wrong_sign_and_swapped_cuffs_are_told_by_a_push(checked,
     }
     said = told(checked(options={"operator": hand}, believed=believed))
     assert "sensor thigh_front: force_y went up" in said
-    assert "turn the sign of map.sensor.force.read.force_y.scale" in said
-    assert "sensor shank_front: shank_front was pressed, but sensor shank_back felt it" in said
+    assert "change the sign of map.sensor.force.read.force_y.scale" in said
+    assert "sensor shank_front: shank_front was pressed, but sensor shank_back measured it" in said
 
 
 def test_a_leg_that_nobody_moves_is_not_waited_for_for_ever(checked, hand, monkeypatch):

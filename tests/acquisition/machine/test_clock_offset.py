@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.machine.clock_offset import BUCKET_S, Bounds, Drift
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.resampling import Alignment
 from pipelines.acquisition.machine.sampling import AIM, SECOND_LOOK
 from pipelines.contracts.table import Table
@@ -48,7 +48,7 @@ def watched(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s
     now, ends = 1000.0, 1000.0 + BUCKET_S
     while now < 1000.0 + duration_s:
         for clock, its in zip((first, other), bounds, strict=True):
-            aim = (its.ahead(now) or 0.0) + draw.gauss(0.0, AIM) / rate_hz
+            aim = (its.until_next_sample(now) or 0.0) + draw.gauss(0.0, AIM) / rate_hz
             for sent in (now + draw.uniform(0, 0.2) * cycle_s, now + min(max(aim, low), high)):
                 there = sent + way()
                 its.add(clock.newest(there), sent, there + way())

@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.check import check_rig
-from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.errors import DeviceError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
@@ -20,9 +20,9 @@ from tests.acquisition.conftest import free_port
 
 HOLD = """
 import sys, time
-from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.settings.rig import load_rig
-with alone(load_rig(sys.argv[1])):
+with exclusive_access(load_rig(sys.argv[1])):
     print("held", flush=True)
     time.sleep(600)
 """
@@ -46,7 +46,7 @@ def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first
 ):
     path = rig_file(port=free_port())
     settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
-    with alone(load_rig(path)), pytest.raises(DeviceError) as caught:
+    with exclusive_access(load_rig(path)), pytest.raises(DeviceError) as caught:
         # There is no rig to connect to.
         acquire(path, settings, excitation, tmp_path / "test.parquet")
     assert str(caught.value).endswith(
@@ -65,7 +65,7 @@ def test_a_check_beside_a_run_is_refused_before_it_connects(rig_file, monkeypatc
 
     monkeypatch.setattr("pipelines.acquisition.check.check._check", connect)
     with (
-        alone(load_rig(path)),
+        exclusive_access(load_rig(path)),
         pytest.raises(DeviceError, match=rf"another exoid \(process {os.getpid()}\) uses"),
     ):
         check_rig(path, 200.0, move=move)
@@ -78,12 +78,12 @@ def test_who_is_killed_holds_no_line_any_more(rig_file):
         assert holder.stdout.readline() == "held\n"
         with (
             pytest.raises(DeviceError, match=rf"another exoid \(process {holder.pid}\)"),
-            alone(load_rig(path)),
+            exclusive_access(load_rig(path)),
         ):
             raise AssertionError("the line is held")
         holder.kill()
         holder.wait()
-    with alone(load_rig(path)):
+    with exclusive_access(load_rig(path)):
         pass
 
 
@@ -102,7 +102,11 @@ def test_a_line_is_the_same_however_it_is_written(rig_file, tmp_path, kind):
         drives = [drive.model_copy(update={"line": "one"}) for drive in rig.drive]
         return rig.model_copy(update={"drive": tuple(drives), "sensor": (), "line": {"one": line}})
 
-    with alone(on(first)), pytest.raises(DeviceError, match="another exoid"), alone(on(second)):
+    with (
+        exclusive_access(on(first)),
+        pytest.raises(DeviceError, match="another exoid"),
+        exclusive_access(on(second)),
+    ):
         raise AssertionError("the line is held")
 
 
@@ -128,7 +132,7 @@ def test_a_drive_that_somebody_else_sends_set_points_is_told_nothing(
     served = []
     with pytest.raises(
         DeviceError,
-        match=r"^drive hip .* and drive knee .*: driven by somebody else, since angle or",
+        match=r"^drive hip .* and drive knee .*: driven by another program, since angle or",
     ):
         record(fault=goes_on, served_as=served, drop=drops)
     assert not told

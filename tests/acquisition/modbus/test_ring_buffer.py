@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.acquisition.modbus.ring_buffer import FEWEST_READS, Queue, Ring
-from pipelines.acquisition.modbus.wraparound import Counter
+from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.errors import SettingsError
 from pipelines.modbus.register_block import Block
 from pipelines.rig import ring as virtual
@@ -72,11 +72,11 @@ class Drive:
     async def read_fifo(self, address, words):
         assert address == QUEUE.fifo
         self.asked.append(31)
-        return self.ring.taken()
+        return self.ring.take()
 
 
 def numbered():
-    counter = Counter(65536)
+    counter = Unwrapper(65536)
     return lambda sequence, sent: int(counter(sequence))
 
 
@@ -96,7 +96,7 @@ def test_every_sample_comes_once_and_in_order_also_where_ring_and_counter_begin_
     drive.sample(1)
     ring, found, number = Ring(drive, RING, numbered()), [], numbered()
     number(began, None)
-    ring._numbered(began, None)
+    ring._note_newest(began, None)
     drained(ring, began)
     for _ in range(40):
         drive.sample(7)
@@ -175,7 +175,7 @@ def test_a_queue_is_emptied_and_what_it_lost_is_missing():
     drive.sample(8)
     assert drained(queue, 10) == truth(range(3, 11))
     drive.sample(2)
-    drive.ring.taken()  # an answer that never came
+    drive.ring.take()  # an answer that never came
     drive.sample(1)
     assert drained(queue, 13) == truth([13])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.check.check import unfit
+from pipelines.acquisition.check.check import rate_findings
 from pipelines.acquisition.preconditions.drive_watchdog import (
     refuse_short_heartbeat,
     replies_waited_for,
@@ -84,10 +84,9 @@ def test_a_drive_that_would_let_go_after_a_lost_reply_is_refused_before_anything
         acquire(path, run, excitation, tmp_path / "test.parquet")
     assert (
         str(caught.value)
-        == f"{path}: plant.heartbeat_s: found 0.5, expected more than 0.61 s: for so long one lost"
+        == f"{path}: plant.heartbeat_s: found 0.5, expected more than 0.61 s, for which one lost"
         " reply leaves drive hip (127.0.0.1:502, unit 1) without a set-point (2 x reply_s of"
-        " 0.3 s, and two samples), and its own watchdog would let go of the leg; lower"
-        " safety.reply_s, or raise the time-out in the drive"
+        " 0.3 s, and two samples); lower safety.reply_s, or raise the time-out in the drive"
     )
 
 
@@ -130,4 +129,4 @@ def test_a_watchdog_that_would_bite_between_two_samples_is_refused_before_anythi
         == f"{path}: safety.watchdog_s: found 0.01, expected at least 0.015, 3 samples at 200 Hz,"
         " or it stops every run; raise it"
     )
-    assert "watchdog_s: found 0.01" in str([*unfit(load_rig(path), 200.0)])
+    assert "watchdog_s: found 0.01" in str([*rate_findings(load_rig(path), 200.0)])

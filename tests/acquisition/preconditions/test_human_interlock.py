@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded, unnoticed
+from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded, unmonitored
 from pipelines.errors import SettingsError
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
@@ -51,8 +51,8 @@ def test_a_cuff_that_is_hardly_ever_read_is_refused(lab):
 
 
 def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
-    assert unnoticed(lab()) == []
-    (warning,) = unnoticed(
+    assert unmonitored(lab()) == []
+    (warning,) = unmonitored(
         lab(("enabled_mask = 0x006F", "enabled_mask = 0x0000"), ("enabled_value = 0x0027", ""))
     )
     assert "no enabled_mask for the drive of hip and knee" in warning
@@ -60,7 +60,7 @@ def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
 
 
 def test_a_drive_whose_faults_nobody_reads_is_warned_of(lab):
-    (warning,) = unnoticed(
+    (warning,) = unmonitored(
         lab(
             ("fault_mask = 0x0008", "fault_mask = 0x0000"),
             ('faults = { 3 = "fault, see the error code at register 30" }', ""),

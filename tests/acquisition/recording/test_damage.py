@@ -6,8 +6,9 @@ import pytest
 
 from pipelines.acquisition.acquire import _recorded
 from pipelines.acquisition.modbus.file_lock import locked
-from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
-from pipelines.acquisition.recording.recording import place_for
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
+from pipelines.acquisition.recording.recording import recording_path
 from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
@@ -64,13 +65,13 @@ class Written:
         output.unlink()
         found = frame["sequence"].to_numpy() - 7000
         assert np.array_equal(frame[COLUMNS].to_numpy(), [row(k) for k in found])
-        account = made.account
+        summary = made.summary
         assert (
             len(found)
-            == account.samples
-            == SAMPLES - account.missed - (account.cut_off - (200 - SAMPLES))
+            == summary.samples
+            == SAMPLES - summary.missed - (summary.cut_off - (200 - SAMPLES))
         )
-        if account.damaged:
+        if summary.damaged:
             assert self.path.read_bytes() == damaged
         else:
             assert not self.path.exists()
@@ -176,7 +177,7 @@ def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_an
     told = why or "the run is complete"
     with locked(written.path) as lock, pytest.raises(DeviceError) as raised:
         _recorded(output, lock, DeviceError, told, None)
-    place = place_for(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
+    place = recording_path(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
     left = "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
     assert (
         str(raised.value)

@@ -5,7 +5,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from pipelines.acquisition.recording.journal import FLUSH_S, Journal, JournalFile, refuse_leftover
+from pipelines.acquisition.recording.journal import FLUSH_S, Journal
+from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
 from pipelines.errors import ContractError, InputError
 from tests.acquisition.journals import read_journal
 
@@ -139,7 +140,7 @@ def test_a_disk_that_gives_an_error_is_no_end_of_a_journal(three_batches, monkey
             return self.file.read(count)
 
     journal = JournalFile(path)
-    monkeypatch.setattr("pipelines.acquisition.recording.journal.open", Failing, raising=False)
+    monkeypatch.setattr("pipelines.acquisition.recording.journal_file.open", Failing, raising=False)
     with pytest.raises(
         InputError, match=r"cannot be read \(Input/output error\); nothing was changed"
     ):

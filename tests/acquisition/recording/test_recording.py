@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.check.look import probes_of
 from pipelines.acquisition.check.rings import check_rings
-from pipelines.acquisition.machine import drive, sampling
+from pipelines.acquisition.check.survey import probes_of
+from pipelines.acquisition.machine import drive_protocol, sampling
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
@@ -105,7 +105,7 @@ def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_r
     whole = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP).frame.set_index(
         "sequence"
     )
-    rows, asleep = sampling.Streams.rows, []
+    rows, asleep = sampling.AlignedSampling.rows, []
 
     async def sleepy(streams, row):
         if 300 < row.sequence < 340:  # cycles of 5 samples: more than the 64 of the ring
@@ -113,7 +113,7 @@ def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_r
             return []
         return await rows(streams, row)
 
-    monkeypatch.setattr(sampling.Streams, "rows", sleepy)
+    monkeypatch.setattr(sampling.AlignedSampling, "rows", sleepy)
     table = record(
         shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | {"capacity = 2048": "capacity = 64"}
     )
@@ -306,8 +306,8 @@ def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_
     record, monkeypatch
 ):
     served = []
-    monkeypatch.setattr(drive, "EMPTYING_S", 0.2)
-    monkeypatch.setattr(Ring, "taken", lambda ring: [0] * 30)
+    monkeypatch.setattr(drive_protocol, "EMPTYING_S", 0.2)
+    monkeypatch.setattr(Ring, "take", lambda ring: [0] * 30)
     monkeypatch.setattr(Servo, "receive", lambda servo, reference, control: served.append(control))
     with pytest.raises(
         DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"
@@ -361,7 +361,7 @@ class SlowRecord:
 def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
     async def run():
         drive, brought = SlowRecord(), []
-        recorded = sampling.Recorded(drive)
+        recorded = sampling.RecorderSource(drive)
         for newest in range(0, 100, 10):
             brought += [
                 sample.sequence

@@ -8,7 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
 from pipelines.acquisition.recording.recover import journals_in, recover
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
@@ -59,7 +60,7 @@ def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path
     made = recover(killed)
     table = RECORDING.read(tmp_path / "one.aborted.parquet")
     assert made.path == table.path
-    assert (made.account.samples, made.account.missed, made.account.cut_off) == (147, 3, 50)
+    assert (made.summary.samples, made.summary.missed, made.summary.cut_off) == (147, 3, 50)
     assert table.frame["sequence"].tolist() == [7000 + k for k in (*range(40), *range(43, 150))]
     assert table.metadata["gaps"] == [[0.2, 3]]
     assert (
@@ -228,7 +229,7 @@ def test_a_damaged_journal_is_kept_beside_the_recording_of_all_that_can_be_read(
     whole = journal.path.read_bytes()
     journal.path.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
     made = recover(journal.path)
-    assert (made.path, made.account.damaged, made.account.gaps) == (output, True, [(0.5, 20)])
+    assert (made.path, made.summary.damaged, made.summary.gaps) == (output, True, [(0.5, 20)])
     assert len(RECORDING.read(output).frame) == 180
     assert journal.path.exists()
 
@@ -298,7 +299,7 @@ with Journal(journal_of(output), COLUMNS, METADATA) as journal:
         if index % 200 == 199:  # a fifth of a second at 1 kHz
             journal.flush()
 written = most_held()
-assert recover(journal_of(output), output).account.samples == samples
+assert recover(journal_of(output), output).summary.samples == samples
 print(most_held() - written)
 """
 
@@ -381,7 +382,7 @@ def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path,
     killed.write_bytes(content)
     if copies:
         made = recover(killed)
-        assert (made.account.samples, made.account.damaged) == (147, True)
+        assert (made.summary.samples, made.summary.damaged) == (147, True)
     else:
         for refuse in (recover, refuse_leftover):
             with pytest.raises(InputError) as refused:
@@ -471,6 +472,6 @@ def test_last_words_that_are_damaged_are_none_and_cost_no_sample(tmp_path, word,
     at = whole.rindex(word)
     journal.path.write_bytes(whole[:at] + instead + whole[at + len(word) :])
     made = recover(journal.path)
-    assert (made.account.samples, made.account.damaged) == (190, True)
-    assert "without a word" in made.account.abort
+    assert (made.summary.samples, made.summary.damaged) == (190, True)
+    assert "without a word" in made.summary.abort
     assert journal.path.exists()

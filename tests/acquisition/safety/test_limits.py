@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from pymodbus.constants import ExcCodes
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Row
 from pipelines.acquisition.modbus.device import Device as Line
 from pipelines.acquisition.plan import make_plan
-from pipelines.acquisition.preconditions.set_point_scale import refuse_misplaced_set_points
+from pipelines.acquisition.preconditions.set_point_scale import refuse_contradictory_set_points
 from pipelines.acquisition.safety.limits import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
@@ -577,13 +577,13 @@ def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_un
         SettingsError,
         match=f"map.drive.servo.write.reference.{found} of read.angle, expected the same",
     ):
-        refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))
+        refuse_contradictory_set_points(load_rig(rig_file(replace={WRITTEN: written})))
     meant = {WRITTEN: written, "enable = 0x000F": "own_scale = true\nenable = 0x000F"}
-    refuse_misplaced_set_points(load_rig(rig_file(replace=meant)))
+    refuse_contradictory_set_points(load_rig(rig_file(replace=meant)))
 
 
 def test_set_points_may_be_told_in_another_unit_than_angles_where_a_count_is_the_same_angle(
     rig_file,
 ):
     written = WRITTEN.replace("1e-6", "5.72957795e-5").replace('"rad"', '"deg"')
-    refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))
+    refuse_contradictory_set_points(load_rig(rig_file(replace={WRITTEN: written})))

@@ -4,7 +4,7 @@ each other."""
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.safety.record_agreement import COMPARED, RecordAgreement
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets

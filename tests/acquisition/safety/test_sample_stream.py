@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.safety.sample_stream import SampleStream
 from pipelines.acquisition.safety.set_point_history import SetPointHistory
 from pipelines.errors import DeviceError, Unanswered

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine.drive import Condition, Reading
+from pipelines.acquisition.machine.reading import DriveStatus, Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.supervisor import Supervisor
@@ -363,10 +363,10 @@ def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_i
 ):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    supervisor.update_enabled(0, Condition(enabled=True))
+    supervisor.update_enabled(0, DriveStatus(enabled=True))
     with pytest.raises(DeviceError, match=r"is no longer enabled|overheated"):
-        supervisor.update_enabled(0, Condition(**word))
-    supervisor.update_enabled(0, Condition(enabled=True))
+        supervisor.update_enabled(0, DriveStatus(**word))
+    supervisor.update_enabled(0, DriveStatus(enabled=True))
     assert supervisor.safe_stop.set_point(0, 10.2) is None
 
 

@@ -1,4 +1,4 @@
-"""A rig against its file: every device is asked, nothing is moved."""
+"""The comparison of a rig with its file by reading every device, without moving anything."""
 
 import asyncio
 from collections.abc import Iterator, Sequence
@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from pipelines.acquisition.check.by_drives import Answer
 from pipelines.acquisition.check.clock import Clock, check_clock, check_latch, measure_clock
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.check.guided import Answer
 from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.plausible import check_registers
 from pipelines.acquisition.check.probe import Probe, Series
@@ -27,15 +27,15 @@ from pipelines.settings.rig import RigSettings
 
 READS = 200
 READS_S = 2.0
-"""Readings of each device alone, and how long they may take."""
+"""Readings of each device alone, and their longest duration."""
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
-"""How long all devices are asked together, and the drives alone."""
+"""Durations of cycles with all devices, and with the drives alone."""
 
 
 @dataclass
 class DeviceReport:
-    """What was found out about one device."""
+    """The measurements of one device."""
 
     name: str
     label: str
@@ -56,17 +56,17 @@ class DeviceReport:
 
 @dataclass
 class RigReport:
-    """What was found out about a rig."""
+    """The measurements of a rig, and the findings."""
 
     rate_hz: float | None
-    """The rate that is wanted."""
+    """The rate of the experiment."""
     devices: list[DeviceReport] = field(default_factory=list)
     together: Rate | None = None
     drives_alone: Rate | None = None
     by_hand: bool = False
-    """Whether a person moved it."""
+    """Whether a person moved the leg."""
     answers: list[Answer] = field(default_factory=list)
-    """How the joints answered when they were moved."""
+    """Answers of the joints to their set-points."""
     findings: list[Finding] = field(default_factory=list)
 
     def as_json(self) -> dict:
@@ -99,17 +99,17 @@ def probes_of(machine: Machine) -> list[Probe]:
     return [Probe(part, machine.rig.clock == "lockstep") for part in parts]
 
 
-async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigReport:
-    """Ask every device of a rig and judge the answers; in real time nothing is written.
+async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> RigReport:
+    """Read every device of a rig and check the answers; in real time nothing is written.
 
     Parameters
     ----------
     machine : Machine
-        Not yet connected; left connected.
+        Not yet connected; it is connected afterwards.
     rate_hz : float, optional
-        Samples a second that are wanted.
-    alone : bool
-        Whether nobody is in the machine.
+        Samples a second of the experiment.
+    is_empty : bool
+        Whether no person is in the machine.
     """
     report = RigReport(rate_hz)
     present: dict[Probe, tuple[DeviceReport, Series]] = {}
@@ -125,35 +125,34 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
         if probe.part.device.line in lost:
             continue
         try:
-            await _meet(probe, device)
+            await _measure_device(probe, device)
         except DeviceError as error:
             finding = _finding_of(error, [probe])
-            if finding not in report.findings:  # a line that is lost says so of all its devices
+            if finding not in report.findings:  # a lost line gives one error for all its devices
                 report.findings.append(finding)
         else:
-            still = probe.taken()
+            still = probe.take()
             device.latency = Latency.of(still.answered - still.asked)
             present[probe] = device, still
-    # In lockstep the drives go on together or not at all.
+    # In lockstep the drives advance only together.
     if len(present) == len(report.devices) or machine.rig.clock == "real_time":
-        report.findings += await _ask_together(list(present), report)
+        report.findings += await _measure_cycles(list(present), report)
     for probe, (device, still) in present.items():
-        report.findings += _judged(
-            probe, device, still, probe.taken(), machine.rig, rate_hz, alone=alone
+        report.findings += _check_device(
+            probe, device, still, probe.take(), machine.rig, rate_hz, is_empty=is_empty
         )
-    report.findings += _counters_differ([device for device, _ in present.values()])
+    report.findings += _check_rates_equal([device for device, _ in present.values()])
     if machine.rig.sampling == "recorder" and not report.findings:
         report.findings += await check_rings(machine, list(present), rate_hz)
     return report
 
 
 async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
-    """Open all lines at once, as each may take its time to fail; return why those are not there
-    that are not."""
+    """Open all lines at once, since failures take time; return the errors of those that failed."""
     lines = list({probe.part.device.line: None for probe in probes})
-    ended = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
+    results = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
     lost = {}
-    for line, error in zip(lines, ended, strict=True):
+    for line, error in zip(lines, results, strict=True):
         if isinstance(error, DeviceError):
             lost[line] = error
         elif error is not None:
@@ -161,8 +160,8 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
     return lost
 
 
-async def _meet(probe: Probe, report: DeviceReport) -> None:
-    """Read the identity, and read one device many times."""
+async def _measure_device(probe: Probe, report: DeviceReport) -> None:
+    """Read a device's identity, then its block many times."""
     device, loop = probe.part.device, asyncio.get_running_loop()
     report.connected = True
     for entry in probe.part.map.identity:
@@ -176,8 +175,8 @@ async def _meet(probe: Probe, report: DeviceReport) -> None:
         await probe.read()
 
 
-async def _ask_together(present: Sequence[Probe], report: RigReport) -> list[Finding]:
-    """Time whole cycles, with all devices and with the drives alone."""
+async def _measure_cycles(present: Sequence[Probe], report: RigReport) -> list[Finding]:
+    """Measure cycles with all devices, and with the drives alone."""
     drives = [probe for probe in present if probe.is_drive]
     if not drives:
         return []
@@ -192,14 +191,14 @@ async def _ask_together(present: Sequence[Probe], report: RigReport) -> list[Fin
 
 
 def _finding_of(error: DeviceError, probes: Sequence[Probe]) -> Finding:
-    """Return the complaint of one of the devices as a finding."""
+    """Return an error as a finding about the device that it names."""
     for probe in probes:
         if str(error).startswith(probe.part.device.label):
             return Finding(probe.name, str(error).removeprefix(f"{probe.part.device.label}: "))
     return Finding("rig", str(error))
 
 
-def _judged(
+def _check_device(
     probe: Probe,
     report: DeviceReport,
     still: Series,
@@ -207,12 +206,11 @@ def _judged(
     rig: RigSettings,
     rate_hz: float | None,
     *,
-    alone: bool,
+    is_empty: bool,
 ) -> list[Finding]:
-    """Judge the answers of one device: those to itself alone, and those in cycles, sample after
-    sample."""
+    """Check the answers of one device: those of the readings alone, and those of the cycles."""
     findings: list[Finding] = []
-    # Of one answer alone no rate can be told.
+    # A rate needs more than one answer.
     series = together if len(together.asked) > 1 else still
     assert report.latency
     seconds = float(series.answered[-1] - series.answered[0])
@@ -235,30 +233,20 @@ def _judged(
         findings += check_clock(probe, series, report.clock, seconds, counts_hz)
     if not probe.in_lockstep:
         findings += check_latch(probe, series)
-    wrong = list(check_registers(probe, series, rig))
-    findings += wrong
+    misread = list(check_registers(probe, series, rig))
+    findings += misread
     if not probe.is_drive:
-        findings += check_zeros(probe, series, rig.safety.cuff_force_n, alone=alone)
-    elif not {finding.quantity for finding in wrong} & {"angle", "velocity"}:
-        findings += _velocity(probe, series, rate_hz)
+        findings += check_zeros(probe, series, rig.safety.cuff_force_n, is_empty=is_empty)
+    elif not {finding.quantity for finding in misread} & {"angle", "velocity"}:
+        findings += check_velocity(probe, series, rate_hz)
     for name in series.block.names:
         values = series.of(name)[series.fresh]
         report.values[name], report.noise[name] = float(np.mean(values)), float(np.std(values))
     return findings
 
 
-def _velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
-    register = series.block.registers.get("velocity")
-    if register is None:
-        return
-    fresh = series.fresh
-    t = np.arange(len(fresh)) / rate_hz if probe.in_lockstep and rate_hz else series.answered[fresh]
-    q, dq = series.of("angle")[fresh], series.of("velocity")[fresh]
-    yield from check_velocity(probe.name, f"{probe.map_path}.read", register, t, q, dq)
-
-
-def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
-    """Yield drives that do not sample as often as the first one: a run waits for all of them."""
+def _check_rates_equal(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
+    """Yield findings about drives that do not sample at the rate of the first one."""
     drives = [
         (d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock
     ]

@@ -1,5 +1,4 @@
-"""A small slow movement by the drives themselves, made and watched by the machinery that records
-every run."""
+"""A small slow movement by the drives, recorded and watched like every run."""
 
 import json
 import shutil
@@ -23,40 +22,44 @@ from pipelines.settings.rig import RigSettings
 
 AMPLITUDE_RAD = 0.05
 PERIOD_S = 4.0
-"""Of the hip; the knee moves twice as fast, so that each answer tells whose it is."""
+"""Period of the hip; the knee moves twice as fast, which distinguishes their answers."""
 ROOM_RAD = 0.1
-"""How far beyond the movement an angle may go before it is stopped, within the rig's own limits."""
+"""Distance beyond the movement at which it is stopped, within the rig's own limits."""
 SPEED_RAD_S = 1.0
 NEAR_ZERO_RAD = 0.1
-"""How far from zero a joint may stand: where a sign is wrong, its drive leaps by twice that when it
-is enabled."""
+"""Largest angle at the start: a drive of wrong sign leaps by twice that when it is enabled."""
 LONGEST_DELAY_S = 0.3
 GAIN = 0.25
-"""How far the angle's answer to the set-point may be from one."""
+"""Largest deviation of the ratio of angle and set-point from one."""
 LITTLE, MUCH = -GAIN, 2.0
-"""Answers between these may be those of a joint that lags behind as it begins to move."""
+"""Range of that ratio for a joint that lags behind as it begins to move."""
 SEEN_RAD = 0.002
-"""Movement of a set-point from which on an answer to it can be judged."""
-ALIKE = 0.2
-"""Correlation of torque and speed from which on the torque's sign is known."""
+"""Least movement of a set-point for a check of the answer."""
+LEAST_CORRELATION = 0.2
+"""Least correlation of torque and speed that shows the torque's sign."""
 JOINTS = ("hip", "knee")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """How a joint answers its set-point."""
+    """The answer of a joint to its set-points."""
 
     joint: str
     gain: float
-    """Angle per set-point."""
+    """Ratio of angle and set-point."""
     delay_s: float
     torque_with_speed: float
     """Correlation of torque with speed; friction makes it positive."""
 
 
 def refuse_far_from_zero(angles: Sequence[float]) -> None:
-    """Refuse to enable drives whose signs nobody has seen, where a wrong one would make them
-    leap."""
+    """Refuse to enable drives with untested signs away from zero, where a wrong sign is dangerous.
+
+    Raises
+    ------
+    SettingsError
+        Names a joint and its angle.
+    """
     for joint, angle in zip(JOINTS, angles, strict=True):
         if abs(angle) > NEAR_ZERO_RAD:
             raise SettingsError(
@@ -66,22 +69,22 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
             )
 
 
-def guided(
+def move_by_drives(
     rig: RigSettings, start: Sequence[float], rate_hz: float, run: str
 ) -> tuple[list[Answer], list[Finding]]:
-    """Move each joint a little to and fro about where it stands, and judge its answer.
+    """Move each joint a little to and fro, and check its answer.
 
     Parameters
     ----------
     rig : RigSettings
-        As it is reached; its limits are made tighter for this.
+        With the addresses of the devices; the movement has tighter limits.
     start : (J,) sequence
-        Where the leg stands, rad.
+        Angles of the leg, rad.
     run : str
         ``exo_alone`` or ``with_human``.
     """
     settings = RunSettings(name="guided", run=run, purpose="train", duration_s=2 * PERIOD_S)
-    seen: list[Progress] = []
+    progress: list[Progress] = []
     try:
         with _folder() as folder:
             rig_file, excitation, output = (
@@ -91,12 +94,12 @@ def guided(
             )
             rig_file.write_text(_toml_file(_tight(rig, start)))
             excitation.write_text(_toml_file(_motion(start)))
-            acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
+            acquire(rig_file, settings, excitation, output, rate_hz, report=progress.append)
             table = RECORDING.read(output)
     except DeviceError as error:
         return [], [
             Finding("rig", f"the guided movement was stopped: {error}"),
-            *_first_signs(rig, seen),
+            *_check_stopped(rig, progress),
         ]
     frame, recorded_hz = table.frame, table.metadata["sample_rate_hz"]
     reference = _sent(np.asarray(frame["time_s"], float), start)
@@ -110,20 +113,18 @@ def guided(
         speed = np.gradient(reference[:, j]) * recorded_hz * np.sign(gains[j])
         torque = float(np.corrcoef(columns["torque_nm"], speed)[0, 1])
         answers.append(Answer(drive.joint, float(gains[j]), delay, torque))
-        findings += _judged(rig, j, gains, torque)
+        findings += _check_answer(rig, j, gains, torque)
     return answers, findings
 
 
 @contextmanager
 def _folder() -> Iterator[Path]:
-    """Make a folder for as long as a block lasts; it stays where somebody may want what is in
-    it."""
+    """Make a folder for the duration of the block; it is kept if an error names a file in it."""
     folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
     try:
         yield folder
     except (ExoidError, KeyboardInterrupt) as error:
-        # Of what was refused nothing has moved; of what was stopped, the message names the samples,
-        # if there are any.
+        # A refused movement has no samples; the error of a stopped one names its samples, if any.
         if isinstance(error, InputError) or str(folder) not in str(error):
             shutil.rmtree(folder)
         raise
@@ -131,8 +132,7 @@ def _folder() -> Iterator[Path]:
 
 
 def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
-    """Return the rig's settings with limits about where the leg stands, within those with somebody
-    in the machine."""
+    """Return the rig's settings with limits around the start, within those with a person."""
     room, careful = AMPLITUDE_RAD + ROOM_RAD, rig.in_force("with_human")
     drives = tuple(
         drive.model_copy(
@@ -146,10 +146,10 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
         )
         for drive, angle in zip(careful.drive, start, strict=True)
     )
-    # The narrower file lies elsewhere, and what files it names would be looked for there.
+    # The file is written elsewhere, so relative paths in it must become absolute.
     lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
     tight = careful.model_copy(update={"drive": drives, "line": lines, "embedded": False})
-    # What was not set must not be: a host that nobody named contradicts a line.
+    # Without default values: a default host would contradict a line.
     return tight.model_dump(mode="json", exclude_unset=True, exclude_none=True)
 
 
@@ -164,10 +164,9 @@ def _motion(start: Sequence[float]) -> dict[str, Any]:
 
 
 def _sent(t: NDArray, start: Sequence[float]) -> NDArray:
-    """Return the set-points (n, J) at instants (n,) since the recording began, which is in phase
-    with the motion.
+    """Return the set-points (n, J) rad at instants (n,) s since the recording began.
 
-    Not those of the recording: they are the drive's own where it tells them, in a unit of its own.
+    Those of the recording may be the drive's own, whose scale may be wrong.
     """
     phase = 2 * np.pi / PERIOD_S * t
     return np.array(start) + AMPLITUDE_RAD * np.column_stack([np.sin(phase), np.sin(2 * phase)])
@@ -178,7 +177,7 @@ def _toml_file(settings: dict[str, Any]) -> str:
 
 
 def _toml(value: Any) -> str:
-    """Write a value on one line; what is no table is written as JSON is."""
+    """Return a value as TOML on one line, which equals JSON except for tables."""
     if isinstance(value, dict):
         return (
             "{" + ", ".join(f"{json.dumps(key)} = {_toml(one)}" for key, one in value.items()) + "}"
@@ -199,15 +198,11 @@ def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray
     return gains, lag / rate_hz
 
 
-def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator[Finding]:
+def _check_answer(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator[Finding]:
     drive, other = rig.drive[j], rig.drive[1 - j]
-    name, where, gain, across = (
-        f"drive {drive.joint}",
-        f"map.drive.{drive.map}",
-        gains[j],
-        gains[1 - j],
-    )
-    if abs(gain) < GAIN and abs(across) > 1.0 - GAIN:
+    name, where = f"drive {drive.joint}", f"map.drive.{drive.map}"
+    gain, cross_gain = gains[j], gains[1 - j]
+    if abs(gain) < GAIN and abs(cross_gain) > 1.0 - GAIN:
         yield Finding(
             name,
             f"its angle follows the set-point of drive {other.joint}: the angles are swapped;"
@@ -224,7 +219,7 @@ def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator
             name,
             f"its angle goes against its set-point ({gain:.2f} as far): the sign of"
             f" {where}.read.angle.scale or of {where}.write.reference.scale is wrong; --by-hand"
-            " tells which",
+            " shows which",
             "angle",
         )
     elif abs(gain - 1.0) > GAIN:
@@ -234,18 +229,18 @@ def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator
             f" {where}.read.angle and {where}.write.reference differ; correct the wrong one",
             "angle",
         )
-    if abs(gain) >= GAIN and torque < -ALIKE:
+    if abs(gain) >= GAIN and torque < -LEAST_CORRELATION:
         yield Finding(
             name,
-            f"its torque goes against its speed (correlation {torque:.2f}), as if friction drove"
-            f" it: turn the sign of {where}.read.current.scale",
+            f"its torque goes against its speed (correlation {torque:.2f}), opposite to friction;"
+            f" change the sign of {where}.read.current.scale",
             "current",
         )
 
 
-def _first_signs(rig: RigSettings, seen: Sequence[Progress]) -> Iterator[Finding]:
-    """Judge what was seen before a movement was stopped."""
-    rows = [progress.row for progress in seen if progress.row is not None]
+def _check_stopped(rig: RigSettings, progress: Sequence[Progress]) -> Iterator[Finding]:
+    """Check the answers before a movement was stopped."""
+    rows = [report.row for report in progress if report.row is not None]
     for j in range(len(rig.drive)):
         reference = np.array([row.drives[j].reference for row in rows])
         angle = np.array([row.drives[j].angle for row in rows])
@@ -255,4 +250,4 @@ def _first_signs(rig: RigSettings, seen: Sequence[Progress]) -> Iterator[Finding
         gains = np.zeros(len(rig.drive))
         gains[j] = away @ (angle - angle[0]) / (away @ away)
         if not LITTLE <= gains[j] <= MUCH:
-            yield from _judged(rig, j, gains, 0.0)
+            yield from _check_answer(rig, j, gains, 0.0)

@@ -5,7 +5,7 @@ import tempfile
 
 import pytest
 
-from pipelines.acquisition.check import guided
+from pipelines.acquisition.check import by_drives
 from pipelines.errors import DeviceError
 
 READ = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -18,7 +18,7 @@ MOVE = {"move": True}
 
 @pytest.fixture(autouse=True)
 def _short(monkeypatch):
-    monkeypatch.setattr(guided, "PERIOD_S", 2.0)
+    monkeypatch.setattr(by_drives, "PERIOD_S", 2.0)
 
 
 def told(report):
@@ -30,9 +30,9 @@ def test_a_right_rig_answers_its_set_points(checked):
     assert told(report) == ""
     assert [answer.joint for answer in report.answers] == ["hip", "knee"]
     for answer in report.answers:
-        assert answer.gain == pytest.approx(1.0, abs=guided.GAIN)
+        assert answer.gain == pytest.approx(1.0, abs=by_drives.GAIN)
         assert 0 <= answer.delay_s < 0.1
-        assert answer.torque_with_speed > guided.ALIKE
+        assert answer.torque_with_speed > by_drives.LEAST_CORRELATION
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(
         )
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(guided, "acquire", stopped)
+    monkeypatch.setattr(by_drives, "acquire", stopped)
     report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
     assert "rig: the guided movement was stopped: hip drive: no answer" in told(report)
     assert bool(list(tmp_path.glob("exoid-check-*"))) is named

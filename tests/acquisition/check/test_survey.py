@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from pipelines.acquisition.check import look
+from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.check import check_rig
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig import server
@@ -72,7 +72,7 @@ def test_a_record_that_is_not_as_the_file_says_is_found(checked, was, believed, 
 
 def test_a_rig_file_with_which_no_run_would_begin_is_found(checked):
     assert (
-        "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s: for so long one lost reply"
+        "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s, for which one lost reply"
         in told(checked("real_time"))
     )
     assert "heartbeat_s" not in told(checked("real_time", watchdog_s=1.0))
@@ -127,7 +127,7 @@ def test_nothing_is_written_to_a_real_rig(checked):
             VELOCITY.replace("1e-5", "-1e-5"),
             [
                 "velocity is negative where the angle grows",
-                "turn the sign of map.drive.servo.read.velocity.scale",
+                "change the sign of map.drive.servo.read.velocity.scale",
             ],
         ),
         (
@@ -305,7 +305,7 @@ def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, m
             "line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
         )
 
-    monkeypatch.setattr(look, "_meet", lost)
+    monkeypatch.setattr(survey, "_measure_device", lost)
     assert (
         told(checked())
         == "rig: line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
