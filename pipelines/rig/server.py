@@ -129,7 +129,7 @@ class Device:
         return None
 
     def takes(self, address: int, count: int) -> bool:
-        """Tell whether registers may be written; those that only tell something may not."""
+        """Return whether registers may be written; those that are only read may not."""
         return False
 
     def latched(self) -> Samples:
@@ -171,7 +171,7 @@ class Drive(Device):
         return super().spans() + (self.ring.spans if self.ring else ())
 
     def takes(self, address: int, count: int) -> bool:
-        """Tell whether registers may be written; those that only tell something may not."""
+        """Return whether registers may be written; those that are only read may not."""
         return (
             self.write.address <= address
             and address + count <= self.write.address + self.write.count

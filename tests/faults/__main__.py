@@ -39,8 +39,8 @@ def rows() -> Iterator[str]:
             ended = strike(Path(folder), blow, rows=40)
             journal = journal_of(ended.output)
             if journal.exists():
-                made = recover(journal)
-                missing, wrong = made.summary.missed, _wrong(made.path, ended.latched)
+                recovery = recover(journal)
+                missing, wrong = recovery.summary.missed, _wrong(recovery.path, ended.latched)
                 fate = (
                     "is killed, then `exoid recover`"
                     if ended.code < 0
@@ -48,13 +48,13 @@ def rows() -> Iterator[str]:
                 )
                 yield (
                     f"| TCP | {name} | {fate} | {missing} | {wrong} |"
-                    f" {_plain(ended.said) or made.summary.abort} |\n"
+                    f" {_plain(ended.error) or recovery.summary.abort} |\n"
                 )
             else:
                 kept = Path(folder) / "run.aborted.parquet"
                 yield (
                     f"| TCP | {name} | stops | 0 | {_wrong(kept, ended.latched)} |"
-                    f" {_plain(ended.said)} |\n"
+                    f" {_plain(ended.error)} |\n"
                 )
 
 

@@ -77,7 +77,7 @@ def another_function(frame: Frame, link: Link) -> list[bytes]:
 
 
 def garble(frame: Frame, link: Link) -> list[bytes]:
-    """Turn a bit on the line, which a checksum would tell."""
+    """Flip a bit on the line, which a checksum would detect."""
     middle = len(frame.raw) // 2
     return [frame.raw[:middle] + bytes([frame.raw[middle] ^ 4]) + frame.raw[middle + 1 :]]
 
@@ -128,8 +128,7 @@ def add(place: slice, counts: int) -> Fault:
 
 
 def another_master(away_rad: float) -> Fault:
-    """Let the set-point that a drive holds be another than what it was sent, as after a write of
-    somebody else's."""
+    """Let a drive hold another set-point than it was sent, as after another program's write."""
 
     def written_over(frame: Frame, link: Link) -> list[bytes]:
         if frame.function != EXCHANGE:
@@ -195,7 +194,7 @@ class Reorder:
 
 @dataclass
 class Restart:
-    """A device that loses its connections and begins to count and to clock anew."""
+    """A device that loses its connections and restarts its counter and its clock."""
 
     seen: list[int] = field(default_factory=list)
 
@@ -274,7 +273,7 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case(
             "a reply has another protocol id", From(head(2, b"\x12\x34")), gap=True, frames=TcpFrame
         ),
-        Case("a reply tells a wrong length", From(longer), gap=True, frames=TcpFrame),
+        Case("a reply has a wrong length", From(longer), gap=True, frames=TcpFrame),
         Case("a reply has another function", From(another_function), "function 3, expected 23"),
         Case("exception reply 4, device failure", From(refuse(4)), "Modbus exception 4: it failed"),
         Case(
@@ -316,7 +315,7 @@ def cases(frames: type[Frame]) -> list[Case]:
             run="with_human",
         ),
         Case(
-            "a cuff sensor begins to count anew",
+            "a cuff sensor restarts its counter",
             From(add(SEQUENCE, -100), unit=CUFF, times=ALWAYS),
             "its sample counter went back",
             run="with_human",

@@ -26,7 +26,7 @@ class Ended:
     """A process that has ended, and what the rig knows of it."""
 
     code: int
-    said: str
+    error: str
     output: Path
     latched: dict[int, Latched]
     struck_at: float
@@ -70,11 +70,11 @@ def strike(
             time.sleep(wait_s)
             blow(process, output)
             struck_at = time.monotonic()
-            _, said = process.communicate(timeout=PATIENCE_S)
+            _, error = process.communicate(timeout=PATIENCE_S)
         finally:
             process.kill()
             process.communicate()
-    return Ended(process.returncode, said.strip(), output, latched, struck_at, are_disabled(proxy))
+    return Ended(process.returncode, error.strip(), output, latched, struck_at, are_disabled(proxy))
 
 
 def send(number: signal.Signals) -> Callable[[subprocess.Popen, Path], None]:

@@ -84,7 +84,7 @@ class TcpFrame(Frame):
 
 
 class RtuFrame(Frame):
-    """A checksum behind the body; its function tells how long that is."""
+    """A checksum behind the body; its function determines the length."""
 
     HEAD, TAIL = 0, 2
 
@@ -138,7 +138,7 @@ class Proxy:
     def __init__(self, device_port: int, fault: Fault, frames: type[Frame] = TcpFrame) -> None:
         self.port = 0
         self.written: dict[int, list[int]] = {}
-        """Of each unit the words that it was told last."""
+        """Each unit's last written words."""
         self._device_port, self._fault, self._frames = device_port, fault, frames
         self._listening = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))

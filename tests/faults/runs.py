@@ -1,5 +1,4 @@
-"""A short run on a virtual rig behind the proxy, and how what it recorded stands beside what the
-rig latched."""
+"""A short run on a virtual rig behind the proxy, compared with the samples that the rig latched."""
 
 import asyncio
 import re
@@ -26,7 +25,7 @@ from tests.faults.faults import REPLY_S, WATCHDOG_S
 from tests.faults.proxy import Fault, Frame, Proxy, RtuFrame, TcpFrame
 
 CONTROL, DISABLE = 2, 0
-"""Which of the words that a drive is told is the control word, and which one takes the torque
+"""Which of a drive's written words is the control word, and which one takes the torque
 away."""
 RATE = 100.0
 SEED = 5
@@ -66,7 +65,7 @@ class Result:
     wrong_s: float
     """How long before its end the recording's first wrong sample is."""
     disabled: bool
-    """Whether the last that each drive was told is to take its torque away."""
+    """Whether the last word written to each drive takes its torque away."""
 
     @property
     def missing(self) -> int:
@@ -164,7 +163,7 @@ def run_through(
 
 
 def are_disabled(proxy: Proxy) -> bool:
-    """Tell whether the last that each drive was told is to take its torque away."""
+    """Return whether the last word written to each drive takes its torque away."""
     return {words[CONTROL] for words in proxy.written.values()} == {DISABLE}
 
 
@@ -175,8 +174,8 @@ def wrong_rows(frame: pd.DataFrame, latched: dict[int, Latched]) -> np.ndarray:
     wrong = np.abs(frame["time_s"].to_numpy() + began - [sample.time[0] for sample in truth]) > 3e-6
     for (quantity, unit), resolution in RESOLUTION.items():
         true = np.array([getattr(sample, quantity)[0] for sample in truth])
-        found = frame[[f"{joint}_{quantity}_{unit}" for joint in ("hip", "knee")]].to_numpy()
-        wrong |= (np.abs(found - true) > 0.6 * resolution).any(axis=1)
+        recorded = frame[[f"{joint}_{quantity}_{unit}" for joint in ("hip", "knee")]].to_numpy()
+        wrong |= (np.abs(recorded - true) > 0.6 * resolution).any(axis=1)
     for k, cuff in enumerate(CUFFS):
         columns = [f"{cuff}_force_{axis}_n" for axis in "xyz"]
         if columns[0] in frame:

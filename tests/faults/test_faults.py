@@ -1,4 +1,4 @@
-"""No fault brings a wrong number into a recording: a run goes on with a gap that is told, or stops
+"""No fault brings a wrong number into a recording: a run goes on with a stated gap, or stops
 and says why."""
 
 import re
@@ -10,10 +10,10 @@ from tests.faults.proxy import RtuFrame, TcpFrame
 from tests.faults.runs import RATE, run_through
 
 
-def told_s(why):
-    """Return for how long, by its reason, a run was told nothing that could be believed."""
-    found = re.search(r"for (\d+\.\d+) s", why or "")
-    return float(found[1]) if found else 0.0
+def silence_s(why):
+    """Return for how long, by its reason, a run got no credible answer."""
+    match = re.search(r"for (\d+\.\d+) s", why or "")
+    return float(match[1]) if match else 0.0
 
 
 EVERY_CASE = pytest.mark.parametrize(
@@ -36,19 +36,18 @@ EVERY_CASE = pytest.mark.parametrize(
 
 
 @EVERY_CASE
-def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(frames, case, tmp_path):
+def test_a_fault_leaves_a_stated_gap_or_stops_the_run_with_its_reason(frames, case, tmp_path):
     result = run_through(case.fault, tmp_path, case.run, frames=frames)
     # That is known only when others have moved on.
     assert result.wrong == 0 or "frozen" in str(result.why)
-    assert result.wrong_s <= told_s(result.why)
+    assert result.wrong_s <= silence_s(result.why)
     assert result.disabled or "could not be disabled" in str(result.why)
     between = (
         int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0])
         + 1
         - len(result.frame)
     )
-    # Of a run that went to its end, the last sample may be a busy computer's to miss: no other
-    # tells of it.
+    # A busy computer may miss the last sample of a complete run, which no later sample shows.
     assert between == result.missing or (result.why is None and between < result.missing)
     if case.stops is None or (case.either and result.why is None):
         assert result.why is None

@@ -87,12 +87,12 @@ def test_a_bad_line_leaves_gaps_and_nothing_else(recorded):
 
 def test_what_a_bad_line_brought_identifies_the_same_leg_within_its_intervals(recorded, tmp_path):
     bad, good = recorded["bad"], recorded["good"]
-    found, without_faults = parameters(bad, good), parameters(good, good)
+    with_faults, without_faults = parameters(bad, good), parameters(good, good)
     plant = load_rig(rig_file(tmp_path, 502)).plant
     truth = [
         *plant.exo_inertial,
         *np.column_stack([plant.coulomb_nm, plant.viscous_nm_s_rad]).ravel(),
     ]
-    low, high = found["ci95_low"].to_numpy(), found["ci95_high"].to_numpy()
+    low, high = with_faults["ci95_low"].to_numpy(), with_faults["ci95_high"].to_numpy()
     assert ((low <= without_faults["value"]) & (without_faults["value"] <= high)).all()
     assert ((low <= truth) & (truth <= high)).all()

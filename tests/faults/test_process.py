@@ -30,13 +30,13 @@ def test_a_signal_ends_the_run_with_all_that_was_exchanged(tmp_path, number, nam
 def test_a_full_disk_ends_the_run_and_what_was_written_before_is_recovered(tmp_path):
     ended = strike(tmp_path, fill_the_disk, rows=40)
     assert (ended.code, ended.disabled) == (3, True)
-    assert len(ended.said.splitlines()) == 1
+    assert len(ended.error.splitlines()) == 1
     assert re.search(
-        r"run.parquet.journal: cannot be written .*make room, then `exoid recover ", ended.said
+        r"run.parquet.journal: cannot be written .*make room, then `exoid recover ", ended.error
     )
-    made = recover(journal_of(ended.output))
-    frame = RECORDING.read(made.path).frame
-    assert made.summary.samples >= 40
+    recovery = recover(journal_of(ended.output))
+    frame = RECORDING.read(recovery.path).frame
+    assert recovery.summary.samples >= 40
     assert not wrong_rows(frame, ended.latched).any()
     assert (np.diff(frame["sequence"]) == 1).all()
 
@@ -49,8 +49,8 @@ def kill_and_compare(folder, generator):
         rows=int(generator.integers(1, 60)),
         wait_s=generator.uniform(0.0, 1.0),
     )
-    made = recover(journal_of(ended.output))
-    frame = RECORDING.read(made.path).frame
+    recovery = recover(journal_of(ended.output))
+    frame = RECORDING.read(recovery.path).frame
     assert not wrong_rows(frame, ended.latched).any()
     assert (np.diff(frame["sequence"]) == 1).all()
     last = int(frame["sequence"].iloc[-1])

@@ -66,7 +66,7 @@ class Outcome:
 
 
 def peak_mib(process: int | None = None) -> float:
-    """Return the most memory that a process has held, this one unless told another."""
+    """Return the most memory that a process has held, this one by default."""
     if process is None:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     status = Path(f"/proc/{process}/status").read_text()

@@ -33,7 +33,7 @@ RIGHT_SHARE = 0.7
 
 
 class Peer:
-    """A device that answers whatever it is told to; one port, any number of connections."""
+    """A device that answers as it is set to; one port, any number of connections."""
 
     def __init__(self, rig: RigSettings) -> None:
         self._rig = rig
@@ -60,7 +60,7 @@ class Peer:
         return [bytes(replace(request, length=None, body=self._body(request, None)))]
 
     def hostile(self, rng: Random, right_share: float) -> Callable[[Frame], Script]:
-        """Return what answers as a generator tells."""
+        """Return a function that answers as a generator decides."""
 
         def answer(request: Frame) -> Script:
             self.answered += 1
@@ -105,7 +105,7 @@ class Peer:
                 request = await (
                     self._rtu_request(reader) if self._rig.line else self._tcp_request(reader)
                 )
-                sending.cancel()  # who asks anew listens no more
+                sending.cancel()  # a client that asks again does not listen any more
                 sending = asyncio.ensure_future(self._send(writer, self.answer(request)))
         sending.cancel()
         self.open -= 1
@@ -150,7 +150,7 @@ class Client:
         """Connect a new machine, of which nothing is left of the last operation."""
         self.peer.answer = self.peer.honest
         until = time.monotonic() + PATIENCE_S
-        # A time-out this short is missed now and then, most of all beside another client's flood.
+        # A time-out this short is missed now and then, most of all during another client's flood.
         while True:
             try:
                 await self._connect_once()
@@ -182,7 +182,7 @@ class Client:
         self._connections = self.peer.open
 
     async def renew(self) -> None:
-        """Connect anew where a connection has ended."""
+        """Connect again where a connection has ended."""
         await asyncio.sleep(0)
         if self.peer.open < self._connections:
             await self._hang_up()
@@ -208,7 +208,7 @@ class Client:
             if single:
                 await self._single(rng)
             else:
-                operation = rng.choice((self._look, self._cycle, self._felt, self._count))
+                operation = rng.choice((self._look, self._cycle, self._forces, self._count))
                 await asyncio.wait_for(operation(rng), HANG_S)
         except DeviceError as error:
             if "\n" in str(error) or len(str(error)) > 1000:
@@ -223,16 +223,16 @@ class Client:
         device, unit = part.device, part.settings.unit
         if isinstance(part, Sensor) or rng.random() < 0.3:
             count = rng.randint(1, 125)
-            found = await asyncio.wait_for(device.read(100, count), HANG_S)
-            expected = bytes([3, 2 * count]) + b"".join(word.to_bytes(2, "big") for word in found)
+            words = await asyncio.wait_for(device.read(100, count), HANG_S)
+            expected = bytes([3, 2 * count]) + b"".join(word.to_bytes(2, "big") for word in words)
         elif rng.random() < 0.3:
             await asyncio.wait_for(device.write(part.write_block, [1, 2, 3]), HANG_S)
             expected = b"\x10\x00\xc8\x00\x03"
         else:
-            found = await asyncio.wait_for(
+            words = await asyncio.wait_for(
                 device.exchange(part.write_block, [1, 2, 3], part.read_block), HANG_S
             )
-            expected = b"\x17\x1c" + b"".join(word.to_bytes(2, "big") for word in found)
+            expected = b"\x17\x1c" + b"".join(word.to_bytes(2, "big") for word in words)
         if (
             bytes(replace(self.peer.asked, length=None, unit=unit, body=expected))
             not in self.peer.sent
@@ -246,7 +246,7 @@ class Client:
         for number in range(3):
             await self.machine.cycle(number, lambda drive: drive.exchange(0.1))
 
-    async def _felt(self, rng: Random) -> None:
+    async def _forces(self, rng: Random) -> None:
         await self.machine.cuff_forces()
 
     async def _count(self, rng: Random) -> None:
@@ -281,7 +281,7 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
     """Try so many replies, or as many as there is time for; ``only`` one operation to see it
     again."""
     outcome = Outcome("replies", seed)
-    said = _listen_to_asyncio()
+    errors = _listen_to_asyncio()
     rigs = hostile_rigs()
     clients = [
         Client(rigs[k % len(rigs)]) for k in range(SIDE_BY_SIDE if only is None else len(rigs))
@@ -300,10 +300,10 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
                 what = "failed"
                 outcome.fail(index, repr(error), client.peer.transcript)
             outcome.count(what, time.perf_counter() - began)
-            if said:
+            if errors:
                 outcome.fail(
                     index,
-                    f"within asyncio, of this input or one beside it: {said.pop()}",
+                    f"within asyncio, of this input or a concurrent one: {errors.pop()}",
                     client.peer.transcript,
                 )
             await client.renew()
@@ -321,11 +321,11 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
 def _listen_to_asyncio() -> list[str]:
     """Return where it is noted what nobody waited for: asyncio would print it to the user as a
     traceback."""
-    said: list[str] = []
+    errors: list[str] = []
 
     def note(loop: asyncio.AbstractEventLoop, context: dict) -> None:
-        said.append(f"{context['message']} {context.get('exception')!r}")
+        errors.append(f"{context['message']} {context.get('exception')!r}")
 
     asyncio.get_running_loop().set_exception_handler(note)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # as `exoid acquire` does
-    return said
+    return errors

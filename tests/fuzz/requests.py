@@ -68,17 +68,17 @@ class Rig:
         try:
             for unit in (1, 2):
                 if not self.ask(unit, struct.pack(">BHH", 3, 0, 2)).endswith(IDENTITY):
-                    return f"unit {unit} no longer tells its identity"
+                    return f"unit {unit} no longer reports its identity"
                 sample = self.ask(unit, struct.pack(">BHH", 3, 100, 14))[9:]
                 if len(sample) != 28:
-                    return f"unit {unit} no longer tells a sample: {sample.hex()}"
+                    return f"unit {unit} no longer reports a sample: {sample.hex()}"
                 if not np.isfinite(struct.unpack(">iififff", sample)[2]):
                     return f"unit {unit} stands at an angle that is no number"
         except OSError as error:
             return f"a polite client is not answered: {error!r}"
         self._complaints.seek(0)
-        said = self._complaints.read().decode(errors="replace").strip()
-        return f"the rig said {said[-300:]!r}" if said else None
+        errors = self._complaints.read().decode(errors="replace").strip()
+        return f"the rig said {errors[-300:]!r}" if errors else None
 
 
 @contextmanager
@@ -197,12 +197,12 @@ def _sent(rig: Rig, frame: Frame, name: str, script: Script) -> tuple[str, str |
     if name != "right" or not reply:
         rig.give_up()
         return "unanswered", None
-    found = parsed(reply)
-    kind = "refused" if found.body[0] & 0x80 else "answered"
+    reply_frame = parsed(reply)
+    kind = "refused" if reply_frame.body[0] & 0x80 else "answered"
     right = (frame.transaction, frame.unit, frame.body[0]) == (
-        found.transaction,
-        found.unit,
-        found.body[0] & 0x7F if frame.body[0] < 0x80 else found.body[0],
+        reply_frame.transaction,
+        reply_frame.unit,
+        reply_frame.body[0] & 0x7F if frame.body[0] < 0x80 else reply_frame.body[0],
     )
     return kind, None if right else f"{bytes(frame).hex()} was answered {reply.hex()}"
 
@@ -221,7 +221,7 @@ def _received(line: socket.socket, wait_s: float) -> bytes:
 
 
 def _flooded(rig: Rig) -> str | None:
-    """Ask for ever without fetching an answer, from one connection; then ask politely, beside many
+    """Ask for ever without fetching an answer, from one connection; then ask politely, with many
     that are idle."""
     idle = [rig.connect() for _ in range(100)]
     asked = bytes(Frame(1, 1, struct.pack(">BHH", 3, 100, 14)))

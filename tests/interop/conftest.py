@@ -29,9 +29,9 @@ b = [[0.0, 0.05], [0.05, -0.05]]
 """
 
 
-def need(found, what, command):
+def need(path, what, command):
     """Skip where an implementation is missing."""
-    if not found:
+    if not path:
         pytest.skip(f"{what} is not installed; `{command}` brings it")
 
 
@@ -78,7 +78,7 @@ def libmodbus():
 
 @pytest.fixture(scope="session")
 def leg_on_libmodbus(tmp_path_factory):
-    """Compile the leg that libmodbus serves; calling it serves one, as a context that tells the
+    """Compile the leg that libmodbus serves; calling it serves one, as a context that yields the
     port."""
     need(shutil.which("gcc"), "gcc", "apt-get install gcc libc6-dev")
     program = tmp_path_factory.mktemp("libmodbus") / "leg_server"
@@ -93,7 +93,7 @@ def leg_on_libmodbus(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def leg_on_pymodbustcp():
-    """Return what serves a leg by pyModbusTCP, as a context that tells the port."""
+    """Return what serves a leg by pyModbusTCP, as a context that yields the port."""
     pytest.importorskip(
         "pyModbusTCP", reason="pyModbusTCP is not installed; `make install` brings it"
     )
@@ -104,7 +104,7 @@ def leg_on_pymodbustcp():
 
 @pytest.fixture(scope="session")
 def our_rig():
-    """Return what serves the plain rig with a human, as a context that tells the port."""
+    """Return what serves the plain rig with a human, as a context that yields the port."""
     return _serving_ours
 
 

@@ -44,10 +44,10 @@ static void latch(void) {
     sample += 1;
     clock_us += PERIOD_US;
     for (int j = 0; j < DRIVES; j++) {
-        uint16_t *told = map[j]->tab_registers + WRITE;
+        uint16_t *written = map[j]->tab_registers + WRITE;
         last_angle[j] = angle[j];
         if (is_enabled(j))
-            angle[j] = (int32_t)((uint32_t)told[0] << 16 | told[1]);
+            angle[j] = (int32_t)((uint32_t)written[0] << 16 | written[1]);
         exchanged[j] = 0;
     }
 }

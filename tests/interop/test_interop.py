@@ -33,9 +33,18 @@ class Libmodbus:
         return list(words)
 
     def exchange(self, write_address, written, read_address, count):
-        told, words = (ctypes.c_uint16 * len(written))(*written), (ctypes.c_uint16 * count)()
+        counter_and_angle, words = (
+            (ctypes.c_uint16 * len(written))(*written),
+            (ctypes.c_uint16 * count)(),
+        )
         read = self._lib.modbus_write_and_read_registers(
-            self._context, write_address, len(written), told, read_address, count, words
+            self._context,
+            write_address,
+            len(written),
+            counter_and_angle,
+            read_address,
+            count,
+            words,
         )
         assert read == count
         return list(words)
@@ -48,14 +57,14 @@ class Libmodbus:
 @pytest.fixture
 def libmodbus_client(libmodbus):
     """Connect a client on libmodbus to a port and unit; closed at the test's end."""
-    made = []
+    clients = []
 
     def connect(port, unit):
-        made.append(Libmodbus(libmodbus, port, unit))
-        return made[-1]
+        clients.append(Libmodbus(libmodbus, port, unit))
+        return clients[-1]
 
     yield connect
-    for client in made:
+    for client in clients:
         client.close()
 
 
@@ -65,14 +74,14 @@ def pymodbustcp_client():
     module = pytest.importorskip(
         "pyModbusTCP.client", reason="pyModbusTCP is not installed; `make install` brings it"
     )
-    made = []
+    clients = []
 
     def connect(port, unit):
-        made.append(module.ModbusClient("127.0.0.1", port, unit_id=unit, timeout=20.0))
-        return made[-1]
+        clients.append(module.ModbusClient("127.0.0.1", port, unit_id=unit, timeout=20.0))
+        return clients[-1]
 
     yield connect
-    for client in made:
+    for client in clients:
         client.close()
 
 
@@ -127,15 +136,15 @@ def test_an_exchange_writes_before_it_reads(server, request, libmodbus_client):
 def test_an_exchange_reads_the_sample_that_was_latched_before_its_set_point_took_effect(
     server, request, libmodbus_client
 ):
-    def told(words):  # sequence, angle in force
+    def counter_and_angle(words):  # sequence, angle in force
         return (words[0] << 16 | words[1]), words[10] << 16 | words[11]
 
     with request.getfixturevalue(server)() as port:
         hip, knee = libmodbus_client(port, 1), libmodbus_client(port, 2)
         knee.exchange(200, [0, 0, ENABLE], 100, 14)
-        first, before = told(hip.exchange(200, [0, 1234, ENABLE], 100, 14))
+        first, before = counter_and_angle(hip.exchange(200, [0, 1234, ENABLE], 100, 14))
         knee.exchange(200, [0, 0, ENABLE], 100, 14)
-        second, after = told(hip.exchange(200, [0, 5678, ENABLE], 100, 14))
+        second, after = counter_and_angle(hip.exchange(200, [0, 5678, ENABLE], 100, 14))
     assert (before, after) == (0, 1234)
     assert second == (first + 1) % 2**32
 
@@ -152,7 +161,7 @@ def test_mbpoll_reads_identity_and_forces_of_our_rig(mbpoll, our_rig):
         assert mbpoll(port, 1, 104, "4:int", count=1)[1] == ["0"]  # it hangs at rest
 
 
-def test_mbpoll_writes_registers_of_our_rig_and_is_told_which_do_not_exist(mbpoll, our_rig):
+def test_mbpoll_writes_registers_of_our_rig_and_learns_which_do_not_exist(mbpoll, our_rig):
     with our_rig() as port:
         assert mbpoll(port, 2, 200, "4", 0, 77, 0)[0] == 0
         assert mbpoll(port, 2, 200, "4", count=3)[:2] == (0, ["0", "77", "0"])

@@ -139,19 +139,19 @@ def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset
 @given(st.integers(0, 10), st.integers(0, 10))
 def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
     wide = {"type": "int32", "unit": "N"}
-    told = {
+    registers = {
         "sequence": {"address": 100, "type": "uint16"},
         "force_x": {"address": first, **wide},
         "force_y": {"address": second, **wide},
         "force_z": {"address": 50, **wide},
     }
     if abs(first - second) >= 2:
-        assert SensorMap.model_validate({"read": told}).read.force_y.address == second
+        assert SensorMap.model_validate({"read": registers}).read.force_y.address == second
     else:
         with pytest.raises(
             ValidationError, match=rf"register {max(first, second)} is part of force_x too"
         ):
-            SensorMap.model_validate({"read": told})
+            SensorMap.model_validate({"read": registers})
 
 
 def test_a_value_too_large_saturates_as_in_a_device():
@@ -171,7 +171,7 @@ def test_units_become_si():
     assert block.decode([0x000F, 0x4240, 2]) == {"time": pytest.approx(1.0), "f": 2000.0}
 
 
-def test_an_unsigned_counter_begins_anew_after_its_span():
+def test_an_unsigned_counter_wraps_after_its_span():
     block = Block(
         {
             "time": Register(address=0, type="uint32", unit="us"),

@@ -25,7 +25,7 @@ def moving(servo, speed=1.6, samples=100):
     return (samples - 1) * speed / RATE
 
 
-def test_a_drive_that_is_told_nothing_goes_on_for_a_moment_slows_down_and_disables_itself(servo):
+def test_a_drive_without_set_points_goes_on_for_a_moment_slows_down_and_disables_itself(servo):
     last = moving(servo)
     path, enabled = np.transpose([servo.next(0.0) for _ in range(round(HEARTBEAT_S * RATE))])
     path = np.concatenate([[last], path])
@@ -34,13 +34,13 @@ def test_a_drive_that_is_told_nothing_goes_on_for_a_moment_slows_down_and_disabl
     assert np.diff(step).min() * RATE >= -SLOWING - 1e-6
     at_rest = EXTRAPOLATED + int(np.ceil(1.6 / SLOWING * RATE))
     assert (step[at_rest:] == 0).all()
-    # It was told something one sample before the first of these.
+    # It was sent a set-point one sample before the first of these.
     assert enabled[:-1].all()
     assert not enabled[-1]
     assert servo.status == 0x0008
 
 
-def test_a_drive_that_is_told_something_in_time_goes_on(servo):
+def test_a_drive_that_gets_a_set_point_in_time_goes_on(servo):
     moving(servo)
     for _ in range(round(HEARTBEAT_S * RATE) - 1):
         servo.next(0.0)
@@ -73,7 +73,7 @@ def test_a_fault_is_latched_until_it_is_reset_and_a_reset_alone_does_not_enable(
     assert (servo.enabled, servo.status) == (True, 0x0001)
 
 
-def test_a_halted_drive_stands_whatever_set_point_it_is_told(servo):
+def test_a_halted_drive_stands_whatever_its_set_point(servo):
     last = moving(servo)
     servo.receive(last + 0.3, HALT)
     assert servo.next(0.0) == (last, True)

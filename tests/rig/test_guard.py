@@ -15,7 +15,7 @@ READ = struct.pack(">HHHBBHH", 7, 0, 6, 1, 3, 0, 100)
 
 @pytest.fixture
 def talk():
-    """Serve unit 1 with 100 registers; runs ``client(connected socket, server)`` beside it."""
+    """Serve unit 1 with 100 registers; runs ``client(connected socket, server)`` meanwhile."""
 
     def run(client):
         async def serving():

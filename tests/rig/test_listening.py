@@ -23,7 +23,7 @@ def test_a_link_that_leads_nowhere_any_more_is_replaced_and_removed_at_the_end(l
     assert not link.is_symlink()
 
 
-def test_a_link_whose_port_is_somebody_elses_by_now_is_said_to_be_a_leftover_perhaps(link):
+def test_a_link_whose_port_is_another_processs_by_now_is_reported_as_a_possible_leftover(link):
     link.symlink_to("/dev/null")
     with pytest.raises(DeviceError) as refused, _linked(str(link), "/dev/zero"):
         raise AssertionError("the link is taken")

@@ -45,7 +45,7 @@ def test_over_a_period_the_drives_give_what_friction_takes(silent, excitation):
     assert_allclose(given, taken, rtol=0.01)
 
 
-def test_cuff_forces_tell_the_torque_on_the_persons_own_leg(silent, excitation):
+def test_cuff_forces_give_the_torque_on_the_persons_own_leg(silent, excitation):
     plant = Plant(silent, "with_human")
     measured = move(plant, excitation)
     q, dq, ddq = (np.ascontiguousarray(measured.truth[:, i]) for i in range(3))

@@ -103,7 +103,8 @@ async def _watch(
 ) -> dict[Probe, Series]:
     """Read devices until a value has moved by ``least`` and come back, or for ``PATIENCE_S``.
 
-    Return the answers of each probe. Probes of ``also`` are only advanced: in lockstep no device goes on without all drives.
+    Return the answers of each probe. Those of ``also`` are only advanced, since in lockstep no
+    device goes on without all drives.
     """
     for probe in probes:
         await probe.step()

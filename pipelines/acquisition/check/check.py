@@ -61,8 +61,8 @@ def check_rig(
         rate_hz = rig.plant.sample_rate_hz
     if move and rate_hz is None and rig.sampling == "recorder":
         raise SettingsError(
-            "--rate-hz: missing; give the rate of set-points, which cannot be measured on drives that"
-            " record by themselves"
+            "--rate-hz: missing; give the rate of set-points, which cannot be measured on drives"
+            " that record by themselves"
         )
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")

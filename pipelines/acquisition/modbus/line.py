@@ -259,7 +259,7 @@ class Line:
         if isinstance(self._settings, TlsLine) and not self._has_answered:
             return (
                 f"the other end closed the line before its first answer{others}; it does not trust"
-                " the certificate in the rig file, or has stopped"
+                " the certificate and key in the rig file, or has stopped"
             )
         return f"the line is lost{others}; check cable and power"
 

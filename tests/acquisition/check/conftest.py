@@ -47,8 +47,7 @@ def checked(rig_file, serve, monkeypatch):
 
 @pytest.fixture
 def altered(monkeypatch):
-    """Let devices tell something else than they measured: ``change(device, values)`` alters the
-    values in place."""
+    """Let devices report altered values: ``change(device, values)`` alters them in place."""
 
     def alter(change):
         put = server.Device._put

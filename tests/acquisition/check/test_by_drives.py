@@ -1,5 +1,4 @@
-"""A small movement by the drives tells whether set-point, angle, torque and velocity go the same
-way."""
+"""A small movement by the drives shows whether set-point, angle, torque and velocity agree."""
 
 import tempfile
 
@@ -21,13 +20,13 @@ def _short(monkeypatch):
     monkeypatch.setattr(by_drives, "PERIOD_S", 2.0)
 
 
-def told(report):
+def findings_of(report):
     return "\n".join(map(str, report.findings))
 
 
 def test_a_right_rig_answers_its_set_points(checked):
     report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
-    assert told(report) == ""
+    assert findings_of(report) == ""
     assert [answer.joint for answer in report.answers] == ["hip", "knee"]
     for answer in report.answers:
         assert answer.gain == pytest.approx(1.0, abs=by_drives.GAIN)
@@ -52,18 +51,19 @@ def test_a_right_rig_answers_its_set_points(checked):
     ],
     ids=["sign of the angle", "sign of the current", "scale of the set-point"],
 )
-def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, there, believed, words):
+def test_a_wrong_sign_or_scale_shows_in_the_answer(checked, there, believed, words):
     report = checked(options=MOVE, served=there, believed=believed, rest_rad="[0.0, 0.0]")
     assert [finding.device for finding in report.findings if words in finding.text] == [
         "drive hip",
         "drive knee",
-    ], told(report)
+    ], findings_of(report)
 
 
-def test_a_set_point_of_another_sign_than_its_angle_is_told_and_nothing_is_moved(checked):
+def test_a_set_point_of_another_sign_than_its_angle_is_reported_and_nothing_is_moved(checked):
     report = checked(options=MOVE, believed={WRITE: WRITE.replace("1e-6", "-1e-6")})
-    assert "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle" in told(
-        report
+    assert (
+        "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle"
+        in findings_of(report)
     )
     assert report.answers == []
 
@@ -73,34 +73,34 @@ def test_a_velocity_of_the_wrong_sign_or_scale_stops_the_movement(checked, scale
     report = checked(
         options=MOVE, believed={VELOCITY: VELOCITY.replace("1e-5", scale)}, rest_rad="[0.0, 0.0]"
     )
-    assert "rig: the guided movement was stopped: " in told(report)
-    assert "velocity" in told(report)
+    assert "rig: the guided movement was stopped: " in findings_of(report)
+    assert "velocity" in findings_of(report)
 
 
 def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checked):
     believed = {WRITE: WRITE.replace('"rad"', '"deg"'), ENABLE: f"own_scale = true\n{ENABLE}"}
     report = checked(options=MOVE, believed=believed, rest_rad="[0.0, 0.0]")
-    assert "rig: the guided movement was stopped: " in told(report)
+    assert "rig: the guided movement was stopped: " in findings_of(report)
 
 
 def test_devices_on_one_line_are_moved_like_others(checked):
     report = checked(options=MOVE, on_a_line=True, rest_rad="[0.0, 0.0]")
-    assert told(report) == ""
+    assert findings_of(report) == ""
     assert [answer.joint for answer in report.answers] == ["hip", "knee"]
 
 
 def test_a_leg_away_from_zero_is_not_moved_before_its_signs_are_known(checked):
     report = checked(options=MOVE, rest_rad="[0.3, -0.6]", coulomb_nm="[40.0, 40.0]")
-    assert "a drive of wrong sign leaps by twice its angle" in told(report)
-    assert (report.answers, len(report.devices)) == ([], 6)  # what was found out before is told
+    assert "a drive of wrong sign leaps by twice its angle" in findings_of(report)
+    assert (report.answers, len(report.devices)) == ([], 6)  # the report so far is kept
 
 
-def test_a_movement_that_the_rigs_limits_do_not_allow_is_told_beside_all_else_and_leaves_no_files(
+def test_a_movement_that_the_rigs_limits_do_not_allow_is_reported_with_the_rest_and_leaves_no_files(
     checked, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     report = checked(options=MOVE, rest_rad="[0.0, 0.0]", served={"[-0.35, 1.75]": "[-0.02, 1.75]"})
-    assert "rig: " in told(report) and "rad" in told(report)
+    assert "rig: " in findings_of(report) and "rad" in findings_of(report)
     assert len(report.devices) == 6
     assert not list(tmp_path.glob("exoid-check-*"))
 
@@ -118,7 +118,7 @@ def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(by_drives, "acquire", stopped)
     report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
-    assert "rig: the guided movement was stopped: hip drive: no answer" in told(report)
+    assert "rig: the guided movement was stopped: hip drive: no answer" in findings_of(report)
     assert bool(list(tmp_path.glob("exoid-check-*"))) is named
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a rig is found without moving it, and said in words."""
+"""Disagreements of a rig with its file are found without moving it, and reported in words."""
 
 import re
 import socket
@@ -20,13 +20,13 @@ FORCE_Y = 'force_y = { address = 104, type = "float32", unit = "N" }'
 TEMPERATURE = 'temperature = { address = 112, type = "int16", scale = 0.1, unit = "°C" }'
 
 
-def told(report):
+def findings_of(report):
     return "\n".join(map(str, report.findings))
 
 
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
 @pytest.mark.parametrize("run", ["exo_alone", "with_human"])
-def test_nothing_is_said_of_a_right_rig(checked, shipped, run):
+def test_a_right_rig_has_no_findings(checked, shipped, run):
     report = checked(shipped, options={"run": run})
     # A busy computer is a slow line, rightly.
     assert [str(finding) for finding in report.findings if finding.device != "rig"] == []
@@ -49,7 +49,7 @@ LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
 RECORDED = 'angle = { address = 4, type = "int32", scale = 1e-6, unit = "rad" }'
 
 
-def test_nothing_is_said_of_a_rig_whose_drives_record_faster_than_they_are_told(checked):
+def test_a_rig_whose_drives_record_faster_than_set_points_come_has_no_findings(checked):
     report = checked("recorder", served=LOCKSTEP, options={"rate_hz": 200.0})
     assert report.findings == []
     assert report.devices[0].clock.step == 5.0
@@ -66,16 +66,16 @@ def test_a_record_that_is_not_as_the_file_says_is_found(checked, was, believed, 
     report = checked(
         "recorder", served=LOCKSTEP, believed={was: believed}, options={"rate_hz": 200.0}
     )
-    assert words in told(report)
-    assert "map.drive.servo.ring" in told(report)
+    assert words in findings_of(report)
+    assert "map.drive.servo.ring" in findings_of(report)
 
 
 def test_a_rig_file_with_which_no_run_would_begin_is_found(checked):
     assert (
         "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s, for which one lost reply"
-        in told(checked("real_time"))
+        in findings_of(checked("real_time"))
     )
-    assert "heartbeat_s" not in told(checked("real_time", watchdog_s=1.0))
+    assert "heartbeat_s" not in findings_of(checked("real_time", watchdog_s=1.0))
 
 
 def test_nothing_is_written_to_a_real_rig(checked):
@@ -162,22 +162,22 @@ def test_nothing_is_written_to_a_real_rig(checked):
     ],
 )
 def test_a_register_described_wrongly_is_found_by_what_it_reads(checked, was, believed, words):
-    said = told(checked(believed={was: believed}))
-    assert [word for word in words if word not in said] == [], said
+    findings = findings_of(checked(believed={was: believed}))
+    assert [word for word in words if word not in findings] == [], findings
 
 
 def test_degrees_taken_for_radians_are_found_by_the_limits(checked):
     in_degrees = ANGLE.replace("1e-6", "1e-4").replace('"rad"', '"deg"')
-    said = told(
+    findings = findings_of(
         checked(
             served={ANGLE: in_degrees}, believed={in_degrees: in_degrees.replace('"deg"', '"rad"')}
         )
     )
-    assert "outside its limits -0.35 to 1.75 rad" in said
-    assert 'with unit = "deg" it would be' in said
+    assert "outside its limits -0.35 to 1.75 rad" in findings
+    assert 'with unit = "deg" it would be' in findings
 
 
-def test_swapped_bytes_are_told_from_swapped_words(checked, monkeypatch):
+def test_swapped_bytes_are_distinguished_from_swapped_words(checked, monkeypatch):
     put = server.Device._put
 
     def swapped(self, block, values):
@@ -194,14 +194,15 @@ def test_swapped_bytes_are_told_from_swapped_words(checked, monkeypatch):
     about_force = [str(finding) for finding in report.findings if "force_y" in finding.quantity]
     assert len(about_force) == 4
     assert all(
-        "with the two bytes of each register swapped it would be" in said for said in about_force
+        "with the two bytes of each register swapped it would be" in finding
+        for finding in about_force
     )
     assert not [finding for finding in report.findings if finding.device.startswith("drive")]
 
 
 def test_a_counter_that_stands_still_is_found(checked, altered):
     altered(lambda device, values: values.update(sequence=7.0))
-    assert "drive hip: its counter stands still at 7 for" in told(checked("real_time"))
+    assert "drive hip: its counter stands still at 7 for" in findings_of(checked("real_time"))
 
 
 def test_registers_that_are_not_latched_with_the_counter_are_found(checked, altered):
@@ -209,16 +210,16 @@ def test_registers_that_are_not_latched_with_the_counter_are_found(checked, alte
     altered(
         lambda device, values: "angle" in values and values.update(angle=0.1 + 1e-5 * next(asked))
     )
-    assert "angle changed while the sample counter did not" in told(checked("real_time"))
+    assert "angle changed while the sample counter did not" in findings_of(checked("real_time"))
 
 
 def test_a_rate_that_the_devices_do_not_have_is_found(checked):
-    said = told(checked("real_time", options={"rate_hz": 80.0}))
+    findings = findings_of(checked("real_time", options={"rate_hz": 80.0}))
     assert (
-        "drive hip: its counter goes up by 4" in said
-        or "drive hip: its counter goes up by 3" in said
+        "drive hip: its counter goes up by 4" in findings
+        or "drive hip: its counter goes up by 3" in findings
     )
-    assert "a second, expected 80" in said
+    assert "a second, expected 80" in findings
 
 
 def test_a_slow_device_and_a_slow_line_are_found(checked):
@@ -226,25 +227,25 @@ def test_a_slow_device_and_a_slow_line_are_found(checked):
         if device.unit == 13:
             time.sleep(0.03)
 
-    said = told(checked("real_time", fault=slow))
-    assert "sensor shank_front: takes" in said
-    assert "ms to answer, too long for a sample of 40 Hz (25 ms)" in said
-    assert "rig: all devices can be asked" in said
-    assert "raise `every` of the sensors" in said
+    findings = findings_of(checked("real_time", fault=slow))
+    assert "sensor shank_front: takes" in findings
+    assert "ms to answer, too long for a sample of 40 Hz (25 ms)" in findings
+    assert "rig: all devices can be asked" in findings
+    assert "raise `every` of the sensors" in findings
 
 
 EVERY = 'map = "force"\n'
 
 
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
-def test_sensors_that_are_hardly_ever_due_are_judged_by_what_they_told_alone(checked, shipped):
+def test_sensors_that_are_hardly_ever_due_are_checked_by_the_readings_alone(checked, shipped):
     report = checked(shipped, served={EVERY: f"{EVERY}every = 1000\n"})
     assert [finding for finding in report.findings if finding.device.startswith("sensor")] == []
     seldom = (
         "rig: sensor[0].every: found 1000, which is 25 s at 40 Hz; expected a force at least every"
         " 10 s"
     )
-    assert (seldom in told(report)) == (shipped == "real_time")
+    assert (seldom in findings_of(report)) == (shipped == "real_time")
 
 
 def test_a_sensor_that_would_be_read_less_often_than_any_watchdog_waits_is_refused(rig_file):
@@ -253,7 +254,7 @@ def test_a_sensor_that_would_be_read_less_often_than_any_watchdog_waits_is_refus
 
 
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
-def test_an_absent_device_is_said_to_be_absent_and_the_others_are_checked(checked, shipped):
+def test_an_absent_device_is_reported_and_the_others_are_checked(checked, shipped):
     believed = {'unit = 12\nmap = "force"': 'unit = 99\nmap = "force"'}
     report = checked(shipped, believed=believed)
     # A busy computer is a slow line, rightly.
@@ -268,10 +269,10 @@ def test_an_absent_device_is_said_to_be_absent_and_the_others_are_checked(checke
     ]
 
 
-def test_a_rig_that_is_off_is_said_to_refuse(rig_file):
+def test_a_rig_that_is_off_is_reported_to_refuse_connections(rig_file):
     report = check_rig(rig_file("real_time", 1))
     assert len(report.findings) == 6
-    assert "refuses the connection; check that the rig is on" in told(report)
+    assert "refuses the connection; check that the rig is on" in findings_of(report)
 
 
 def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_the_other(rig_file):
@@ -299,7 +300,7 @@ def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_t
     assert took < 8.0, "one line takes two seconds, one after the other they would take 12"
 
 
-def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, monkeypatch):
+def test_a_line_that_is_lost_while_its_devices_are_read_is_reported_once(checked, monkeypatch):
     async def lost(probe, report):
         raise DeviceError(
             "line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
@@ -307,15 +308,15 @@ def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, m
 
     monkeypatch.setattr(survey, "_measure_device", lost)
     assert (
-        told(checked())
+        findings_of(checked())
         == "rig: line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
     )
 
 
-def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
+def test_another_device_is_detected_by_its_identity_and_not_checked_further(checked):
     report = checked(believed={"value = 0x4653": "value = 0x4654"})
     assert len(report.findings) == 4
-    assert "identity register 0 holds 0x4653, expected 0x4654" in told(report)
+    assert "identity register 0 holds 0x4653, expected 0x4654" in findings_of(report)
 
 
 def test_a_sensor_that_is_frozen_is_found(checked, altered):
@@ -324,11 +325,11 @@ def test_a_sensor_that_is_frozen_is_found(checked, altered):
             "force_x" in values and values.update(force_x=1.0, force_y=2.0, force_z=3.0)
         )
     )
-    assert "all three forces are constant (1, 2, 3 N)" in told(checked())
+    assert "all three forces are constant (1, 2, 3 N)" in findings_of(checked())
 
 
 def test_a_fault_and_a_current_at_rest_are_found(checked, altered):
     altered(lambda device, values: "status" in values and values.update(status=8.0, current=9.0))
-    said = told(checked())
-    assert "reports a fault (status 0x0008, fault bits 0x0008)" in said
-    assert "current reads 9 A, expected less than" in said
+    findings = findings_of(checked())
+    assert "reports a fault (status 0x0008, fault bits 0x0008)" in findings
+    assert "current reads 9 A, expected less than" in findings

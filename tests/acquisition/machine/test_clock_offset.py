@@ -1,4 +1,4 @@
-"""Clocks that drift: found through late and uneven replies, and taken out of the recording."""
+"""Clocks that drift: measured by late and uneven replies, and corrected in the recording."""
 
 import random
 from pathlib import Path
@@ -61,8 +61,8 @@ def watched(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s
 
 def drift_of(*arguments):
     """Return what is found in the end."""
-    for _, found in watched(*arguments):
-        last = found
+    for _, result in watched(*arguments):
+        last = result
     return last
 
 
@@ -70,18 +70,18 @@ def drift_of(*arguments):
 @pytest.mark.parametrize("rate_hz", [200.0, 1000.0])
 def test_offset_and_rate_are_found_within_a_tenth_of_a_sample_and_five_ppm(rate_hz, ppm):
     first, other = Clock(rate_hz, 15.0, 990.0), Clock(rate_hz, 15.0 + ppm, 985.6789)
-    found = drift_of(first, other, rate_hz, 120.0)
-    true_lead = (first.origin + found.at * first.period - other.origin) / other.period - found.at
-    assert found.rate * 1e6 == pytest.approx(ppm, abs=5.0)
-    assert (found.lead - true_lead) / rate_hz == pytest.approx(0.0, abs=max(1e-4, 0.1 / rate_hz))
+    result = drift_of(first, other, rate_hz, 120.0)
+    true_lead = (first.origin + result.at * first.period - other.origin) / other.period - result.at
+    assert result.rate * 1e6 == pytest.approx(ppm, abs=5.0)
+    assert (result.lead - true_lead) / rate_hz == pytest.approx(0.0, abs=max(1e-4, 0.1 / rate_hz))
 
 
 def test_the_stated_errors_cover_the_truth():
     off = []
     for seed in range(10):
         first, other = Clock(1000.0, 0.0, 990.0), Clock(1000.0, 40.0, 985.0 + 0.01234 * seed)
-        found = drift_of(first, other, 1000.0, 20.0, seed)
-        off.append((found.rate - 40e-6) / found.rate_error)
+        result = drift_of(first, other, 1000.0, 20.0, seed)
+        off.append((result.rate - 40e-6) / result.rate_error)
     assert np.abs(off).max() < 3.0
 
 
@@ -96,11 +96,11 @@ def motion(instants):
 def aligned(position, knee, rows=200, batch=1):
     """Feed a drive that samples at integers and another with its own samples; return the rows that
     come."""
-    alignment, found = Alignment([position]), []
+    alignment, result = Alignment([position]), []
     hip = [reading(n, n / 200, motion(n / 200)) for n in range(rows)]
     for start in range(0, rows, batch):
-        found += alignment.rows([hip[start : start + batch], knee[start : start + batch]])
-    return found
+        result += alignment.rows([hip[start : start + batch], knee[start : start + batch]])
+    return result
 
 
 @pytest.mark.parametrize("batch", [1, 7])
@@ -111,24 +111,24 @@ def test_a_drives_samples_are_brought_to_the_first_ones_instants(batch):
         return (m + 0.3) / 200 * (1 + 1e-3)
 
     knee = [reading(m, 7 + at(m), motion(at(m))) for m in range(200)]
-    found = aligned(lambda n: n / (1 + 1e-3) - 0.3, knee, batch=batch)
-    sequence = np.array([row[0].sequence for row in found])
+    result = aligned(lambda n: n / (1 + 1e-3) - 0.3, knee, batch=batch)
+    sequence = np.array([row[0].sequence for row in result])
     assert np.diff(sequence).tolist() == [1] * (len(sequence) - 1)
-    assert len(found) > 190
-    assert_allclose([row[1].angle for row in found[1:]], motion(sequence[1:] / 200), atol=2e-7)
-    assert_allclose([row[1].time for row in found], 7 + sequence / 200, atol=1e-9)
+    assert len(result) > 190
+    assert_allclose([row[1].angle for row in result[1:]], motion(sequence[1:] / 200), atol=2e-7)
+    assert_allclose([row[1].time for row in result], 7 + sequence / 200, atol=1e-9)
 
 
 def test_where_positions_are_whole_samples_they_are_handed_on_untouched():
     knee = [reading(m, m / 200, motion(m / 200)) for m in range(205)]
-    found = aligned(lambda n: n + 3.0, knee)
-    assert [row[1] for row in found] == knee[3:200]
+    result = aligned(lambda n: n + 3.0, knee)
+    assert [row[1] for row in result] == knee[3:200]
 
 
 def test_nothing_is_invented_where_a_sample_is_missing():
     knee = [reading(m, m / 200, motion(m / 200)) for m in range(200) if not 50 <= m < 60]
-    found = [row[0].sequence for row in aligned(lambda n: n + 0.5, knee)]
-    assert set(range(196)) - set(found) == set(range(49, 60))
+    result = [row[0].sequence for row in aligned(lambda n: n + 0.5, knee)]
+    assert set(range(196)) - set(result) == set(range(49, 60))
 
 
 def test_rows_wait_until_the_drift_is_known():
@@ -161,8 +161,8 @@ def moved():
 
 
 def readings_of(moved, joint, ppm, offset_s):
-    """Return what a drive with a clock of its own tells."""
-    told = OwnClock(ppm, offset_s, RATE, 1000.0).sampled(moved)
+    """Return the readings of a drive with a clock of its own."""
+    samples = OwnClock(ppm, offset_s, RATE, 1000.0).sampled(moved)
     return [
         Reading(
             int(n),
@@ -175,12 +175,12 @@ def readings_of(moved, joint, ppm, offset_s):
             float(r[joint]),
         )
         for n, t, q, tau, v, r in zip(
-            told.sequence,
-            told.time,
-            told.angle,
-            told.torque,
-            told.velocity,
-            told.reference,
+            samples.sequence,
+            samples.time,
+            samples.angle,
+            samples.torque,
+            samples.velocity,
+            samples.reference,
             strict=True,
         )
     ]
@@ -195,16 +195,16 @@ def recorded(moved, ppm, offset_s):
     # at 1000 s.
     clocks = [Clock(RATE, of, 1000.0 + 0.5 / RATE / (1 + 1e-6 * of)) for of in (0.0, ppm)]
     clocks[1].origin -= began * clocks[1].period
-    found, rows = [None], []
-    alignment = Alignment([lambda n: found[0].position(n) if found[0] else None])
+    result, rows = [None], []
+    alignment = Alignment([lambda n: result[0].position(n) if result[0] else None])
     at = [0, 0]
     for now, estimate in watched(*clocks, RATE, LEAD_S + RUN_S - 0.1):
-        found[0], told = estimate, []
+        result[0], samples = estimate, []
         for k, (clock, readings) in enumerate(zip(clocks, (hip, knee), strict=True)):
             until = max(clock.newest(now) - readings[0].sequence + 1, at[k])
-            told.append(readings[at[k] : until])
+            samples.append(readings[at[k] : until])
             at[k] = until
-        rows += [row for row in alignment.rows(told) if row[0].time > LEAD_S]
+        rows += [row for row in alignment.rows(samples) if row[0].time > LEAD_S]
     columns = {"time_s": [row[0].time - rows[0][0].time for row in rows]}
     for j, joint in enumerate(("hip", "knee")):
         for name, unit in (("angle", "rad"), ("torque", "nm")):
@@ -230,7 +230,7 @@ def test_drives_whose_clocks_drift_identify_the_parameters_of_those_whose_clocks
 
 
 def test_uncorrected_the_same_drift_would_spoil_them(moved):
-    """Sample by sample, as counters tell it: after 20 s the knee's is 0.16 samples off, its offset
+    """Sample by sample, by the counters alone: after 20 s the knee's is 0.16 samples off, its offset
     is any."""
     common, metadata = recorded(moved, 0.0, 0.0)
     late = common.copy()

@@ -29,13 +29,13 @@ with exclusive_access(load_rig(sys.argv[1])):
 
 
 @pytest.fixture
-def told(monkeypatch):
-    """Control words that drives were told."""
-    words, hear = [], Servo.receive
+def control_words(monkeypatch):
+    """Control words that drives were sent."""
+    words, receive = [], Servo.receive
 
     def remember(servo, reference, control):
         words.append(control)
-        hear(servo, reference, control)
+        receive(servo, reference, control)
 
     monkeypatch.setattr(Servo, "receive", remember)
     return words
@@ -57,7 +57,7 @@ def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first
 
 
 @pytest.mark.parametrize("move", [False, True])
-def test_a_check_beside_a_run_is_refused_before_it_connects(rig_file, monkeypatch, move):
+def test_a_check_during_a_run_is_refused_before_it_connects(rig_file, monkeypatch, move):
     path = rig_file(port=free_port())
 
     async def connect(*_):
@@ -122,8 +122,8 @@ def left_enabled(monkeypatch):
 
 
 @pytest.mark.parametrize("drops", [(), ("enabled_",)])
-def test_a_drive_that_somebody_else_sends_set_points_is_told_nothing(
-    record, told, left_enabled, drops
+def test_a_drive_to_which_another_program_sends_set_points_is_sent_nothing(
+    record, control_words, left_enabled, drops
 ):
     def goes_on(device, function, written):
         if isinstance(device, Drive) and device.registers:
@@ -135,5 +135,5 @@ def test_a_drive_that_somebody_else_sends_set_points_is_told_nothing(
         match=r"^drive hip .* and drive knee .*: driven by another program, since angle or",
     ):
         record(fault=goes_on, served_as=served, drop=drops)
-    assert not told
+    assert not control_words
     assert served[0].enabled == [True, True]

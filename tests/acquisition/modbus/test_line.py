@@ -205,8 +205,8 @@ def test_devices_on_one_line_asked_all_at_once_each_get_their_own_answer(
         return await asyncio.gather(*(part.device.read(0, 1) for part in machine._parts * 5))
 
     with serve(path, None, "with_human"):
-        found = on(path, identities)
-    assert found == ([[0x4558]] * 2 + [[0x4653]] * 4) * 5
+        values = on(path, identities)
+    assert values == ([[0x4558]] * 2 + [[0x4653]] * 4) * 5
 
 
 def test_a_line_is_quiet_before_each_request_for_as_long_as_the_rig_file_says(
@@ -241,24 +241,24 @@ def test_a_lost_line_is_one_error_that_names_it_and_all_who_are_on_it(
 
         waited, answers = on(path, ask)
     place = load_rig(path).line["leg"].place
-    told = {str(answer) for answer in answers}
+    messages = {str(answer) for answer in answers}
     devices = (
         "drive hip (unit 1), drive knee (unit 2), sensor thigh_front (unit 11), sensor thigh_back"
         " (unit 12), "
     )
-    assert told == {
+    assert messages == {
         f"line leg ({place}): the line is lost, and with it {devices}sensor shank_front (unit 13),"
         " sensor shank_back (unit 14); check cable and power"
     }
     assert waited < 10.0  # it is not waited for an answer that cannot come
 
 
-def test_a_line_lost_in_a_run_stops_it_and_is_told_once(on_line, line_of, record_on):
-    served, left = [], [200]
+def test_a_line_lost_in_a_run_stops_it_and_is_reported_once(on_line, line_of, record_on):
+    served, remaining = [], [200]
 
     def pull_the_plug(device, function, written):
-        left[0] -= 1
-        if left[0] == 0:
+        remaining[0] -= 1
+        if remaining[0] == 0:
             served[0].stop_soon()
 
     with pytest.raises(DeviceError) as caught:
@@ -270,11 +270,11 @@ def test_a_line_lost_in_a_run_stops_it_and_is_told_once(on_line, line_of, record
 def test_after_a_broken_connection_the_drives_are_disabled_on_a_new_one(
     on_line, line_of, record_on
 ):
-    served, left = [], [200]
+    served, remaining = [], [200]
 
     def hang_up(device, function, written):
-        left[0] -= 1
-        if left[0] == 0:
+        remaining[0] -= 1
+        if remaining[0] == 0:
             (connection,) = list(ModbusBaseServer.active_server.active_connections.values())
             connection.close()
 
@@ -318,13 +318,13 @@ def test_a_path_that_is_no_serial_port_is_refused(on_line, line_of, tmp_path):
     )
 
 
-def test_settings_that_a_serial_port_does_not_take_are_told(serve, on_line, line_of):
+def test_settings_that_a_serial_port_does_not_support_are_reported(serve, on_line, line_of):
     path = on_line(line_of("rtu", parity="even"))
     with serve(path, None):
         assert "cannot be set up like that" in connecting(path)
 
 
-def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(
+def test_a_rig_whose_certificate_has_no_trusted_issuer_is_not_trusted(
     serve, on_line, line_of, certificates
 ):
     path = on_line(line_of("tls"))
@@ -337,14 +337,14 @@ def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(
 
 
 @pytest.mark.parametrize(
-    ("days", "found", "advice"),
+    ("days", "reason", "advice"),
     [
         (-2, "certificate has expired", "renew it at the rig"),
         (2, "certificate is not yet valid", "set the clocks"),
     ],
 )
-def test_a_certificate_out_of_its_time_is_told_as_that(
-    serve, on_line, line_of, certificates, tmp_path, days, found, advice
+def test_a_certificate_that_is_not_valid_now_is_reported_as_that(
+    serve, on_line, line_of, certificates, tmp_path, days, reason, advice
 ):
     stamp = [f"{datetime.now(UTC) + timedelta(days=days + more):%Y%m%d%H%M%SZ}" for more in (0, 1)]
     (tmp_path / "ca.cnf").write_text(
@@ -381,11 +381,11 @@ def test_a_certificate_out_of_its_time_is_told_as_that(
     path = on_line(line_of("tls", **timed))
     with serve(path, None):
         why = connecting(path)
-    assert f"its certificate is not trusted ({found}); {advice}" in why
+    assert f"its certificate is not trusted ({reason}); {advice}" in why
 
 
 @pytest.mark.parametrize("shown", ["", r"\1 = '\2other.\3'\n"], ids=["none", "another's"])
-def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(
+def test_a_client_whose_certificate_is_not_trusted_reports_that_as_a_possible_cause(
     serve, on_line, line_of, shown
 ):
     path = on_line(line_of("tls"))
@@ -403,13 +403,13 @@ def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(
 
 
 @pytest.mark.parametrize("transport", ["tcp", "rtu_over_tcp", "tls"])
-def test_a_host_that_nobody_knows_is_told(on_line, transport):
+def test_an_unknown_host_is_reported(on_line, transport):
     why = connecting(on_line(f"transport = {transport!r}\nhost = 'no-such-host.invalid'\n"))
     assert "no such host (" in why
     assert why.endswith("correct host in the rig file, or give its address")
 
 
-def test_a_port_that_does_not_speak_tls_is_told(serve, on_line, line_of):
+def test_a_port_without_tls_is_reported(serve, on_line, line_of):
     path = on_line(line_of("tcp"), connect_s=1.0)
     port = re.search(r"port = (\d+)", path.read_text())[1]
     with serve(path, None):
@@ -460,14 +460,14 @@ def test_what_is_written_to_one_end_of_a_null_modem_comes_out_of_the_other():
             serial.Serial(left) as a,
             serial.Serial(right, timeout=0) as b,
         ):
-            for one, other, said in ((a, b, b"\x01\x03\r\n"), (b, a, b"\x00\xff\x11\x13")):
+            for one, other, sent in ((a, b, b"\x01\x03\r\n"), (b, a, b"\x00\xff\x11\x13")):
                 other.timeout = 0
-                one.write(said)
-                heard = b""
-                while len(heard) < len(said):
+                one.write(sent)
+                received = b""
+                while len(received) < len(sent):
                     await asyncio.sleep(0.01)
-                    heard += other.read(100)
-                assert heard == said
+                    received += other.read(100)
+                assert received == sent
 
     asyncio.run(asyncio.wait_for(talk(), 20))
 
@@ -544,15 +544,15 @@ class Slow:
 
 def test_a_reply_that_comes_too_late_on_a_serial_line_is_not_taken_for_the_next_ones():
     async def ask(device):
-        found = []
+        answers = []
         for count in (4, 4, 7, 4):
             try:
-                found.append(await device.read(100, count, in_motion=True))
+                answers.append(await device.read(100, count, in_motion=True))
             except Unanswered:
-                found.append(None)
-        return found
+                answers.append(None)
+        return answers
 
-    # Without waiting for it, the second would be told [0, 0, 0, 0], and the third be refused for
+    # Without waiting for it, the second would get [0, 0, 0, 0], and the third be refused for
     # its length.
     assert Slow(0.55, 0.0, 0.0, 0.0).at_work(ask) == [None, [1] * 4, [2] * 7, [3] * 4]
     assert Slow(0.0, 0.55, 0.0, 0.0).at_work(ask) == [[0] * 4, None, [2] * 7, [3] * 4]
@@ -574,8 +574,8 @@ def test_a_line_is_renewed_only_where_it_failed_and_nobody_is_asked_in_between()
         with pytest.raises(Unanswered):
             await device.read(100, 1, in_motion=True)
         # The neighbour on the line, whose turn comes while it is renewed.
-        _, found = await asyncio.gather(line.renew(), device.read(100, 2))
-        return opened, found
+        _, values = await asyncio.gather(line.renew(), device.read(100, 2))
+        return opened, values
 
     assert Slow(9.0, 0.0).at_work(ask) == ([False], [1, 1])
 

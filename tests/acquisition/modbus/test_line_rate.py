@@ -31,7 +31,7 @@ def on_serial_lines(rig_file, apart, baud_rate, silence):
     ("apart", "baud_rate", "silence", "rate"),
     [(False, 115200, "", 45), (True, 115200, "", 58), (False, 921600, "silence_s = 0.0002", 378)],
 )
-def test_docs_tell_what_fits_through_serial_lines(rig_file, apart, baud_rate, silence, rate):
+def test_docs_state_the_rates_of_serial_lines(rig_file, apart, baud_rate, silence, rate):
     rig = on_serial_lines(rig_file, apart, baud_rate, silence)
     assert floor(highest_rate(rig, with_sensors=False)[0]) == rate
     page = (DOCS / "rig.md").read_text()
@@ -56,7 +56,7 @@ def test_sensors_on_a_line_take_their_share_of_every_sample_that_reads_them(rig_
         pytest.approx(1 / (look + drives + sensors)),
         "leg",
     )
-    # Two of the four are read every third cycle, in turns: one of them beside the other two at
+    # Two of the four are read every third cycle, in turns: one of them with the other two at
     # most.
     seldom = rig.model_copy(
         update={
@@ -100,7 +100,7 @@ def test_what_drives_record_themselves_takes_its_share_of_a_line(rig_file):
     assert 0.0 < highest(115200, record_rate_hz=100) < 1000 / 12
 
 
-def test_nothing_is_said_of_the_speed_of_a_network(rig_file):
+def test_the_speed_of_a_network_is_unknown(rig_file):
     table = '[line.leg]\ntransport = "tcp"\n'
     changes = {
         'map = "servo"': 'map = "servo"\nline = "leg"',
@@ -112,7 +112,7 @@ def test_nothing_is_said_of_the_speed_of_a_network(rig_file):
     )
 
 
-def test_the_template_tells_what_fits_through_its_lines_and_that_is_enough():
+def test_the_template_states_the_rate_of_its_lines_which_is_enough():
     path = datasets() / "rigs" / "lab.toml"
     rate, _ = highest_rate(load_rig(path), with_sensors=True)
     assert f"at most {floor(rate)} samples a second fit" in path.read_text()

@@ -91,17 +91,17 @@ def truth(numbers):
 
 
 @pytest.mark.parametrize("began", [0, 65530])
-def test_every_sample_comes_once_and_in_order_also_where_ring_and_counter_begin_anew(began):
+def test_every_sample_comes_once_and_in_order_also_where_ring_and_counter_wrap(began):
     drive = Drive(RING, began)
     drive.sample(1)
-    ring, found, number = Ring(drive, RING, numbered()), [], numbered()
+    ring, records, number = Ring(drive, RING, numbered()), [], numbered()
     number(began, None)
     ring._note_newest(began, None)
     drained(ring, began)
     for _ in range(40):
         drive.sample(7)
-        found += drained(ring, drive.number)
-    assert found == truth(range(began + 1, began + 281))
+        records += drained(ring, drive.number)
+    assert records == truth(range(began + 1, began + 281))
 
 
 @settings(max_examples=200, deadline=None)
@@ -109,28 +109,28 @@ def test_every_sample_comes_once_and_in_order_also_where_ring_and_counter_begin_
 def test_what_was_overwritten_before_or_while_it_was_read_is_missing_and_never_wrong(steps):
     drive = Drive(RING)
     drive.sample(1)
-    ring, found = Ring(drive, RING, numbered()), []
+    ring, records = Ring(drive, RING, numbered()), []
     drained(ring, 0)
     for count, meanwhile in steps:
         drive.sample(count)
         drive.after_each_read = meanwhile
-        found += drained(ring, drive.number)
-    numbers = [number for number, _ in found]
+        records += drained(ring, drive.number)
+    numbers = [number for number, _ in records]
     assert numbers == sorted(set(numbers))
-    assert found == truth(numbers)
+    assert records == truth(numbers)
 
 
 def test_nothing_is_missing_while_the_ring_is_drained_before_it_is_full():
     drive = Drive(RING)
     drive.sample(1)
-    ring, found = Ring(drive, RING, numbered()), []
+    ring, records = Ring(drive, RING, numbered()), []
     drained(ring, 0)
     drive.after_each_read = 1
     for _ in range(30):
         drive.sample(20)
-        found += drained(ring, drive.number)
-    assert [number for number, _ in found] == list(range(1, found[-1][0] + 1))
-    assert found[-1][0] > 500
+        records += drained(ring, drive.number)
+    assert [number for number, _ in records] == list(range(1, records[-1][0] + 1))
+    assert records[-1][0] > 500
 
 
 def test_a_drain_takes_no_longer_than_a_few_reads_of_125_registers():
@@ -183,12 +183,12 @@ def test_a_queue_is_emptied_and_what_it_lost_is_missing():
 def test_a_queue_of_short_reads_is_emptied_at_twenty_samples_a_set_point():
     drive = Drive(QUEUE)
     drive.sample(1)
-    queue, found = Queue(drive, QUEUE, samples_per_cycle=20), []
+    queue, records = Queue(drive, QUEUE, samples_per_cycle=20), []
     drained(queue, 0)
     for _ in range(50):
         drive.sample(20)
-        found += drained(queue, drive.number)
-    assert found == truth(range(1, 1001))
+        records += drained(queue, drive.number)
+    assert records == truth(range(1, 1001))
 
 
 @pytest.mark.parametrize(

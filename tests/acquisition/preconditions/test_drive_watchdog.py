@@ -46,13 +46,13 @@ def test_a_lost_reply_leaves_its_drive_without_a_set_point_for_as_long_as_is_sta
     run = run_with(tmp_path, Event(at, kind), line=line, trajectory=times(0.1))
     rig = RIGS["real_time", True, FINE_RAD, line]
     for joint, drive in enumerate(rig.drive):
-        heard = [
-            told.time
-            for told in run.rig.told
-            if told.joint == joint and told.control and told.arrived
+        times = [
+            sent.time
+            for sent in run.rig.told
+            if sent.joint == joint and sent.control and sent.arrived
         ]
         waits = replies_waited_for(rig, drive, with_sensors=False)
-        assert np.diff(heard).max() <= waits * rig.safety.longest_reply_s + 2 / RATE + SOON_S
+        assert np.diff(times).max() <= waits * rig.safety.longest_reply_s + 2 / RATE + SOON_S
 
 
 @pytest.mark.parametrize(
@@ -97,15 +97,15 @@ def test_what_the_rig_file_says_of_the_drives_own_watchdogs_counts_and_nothing_e
     shared = load_rig(with_line(TCP, *both))
     for heartbeat_s, is_refused in ((0.6, True), (0.61, True), (0.62, False)):
         safety = shared.safety.model_copy(update={"heartbeat_s": heartbeat_s})
-        told = shared.model_copy(update={"safety": safety})
+        stated = shared.model_copy(update={"safety": safety})
         if is_refused:
             with pytest.raises(
                 SettingsError,
                 match=re.escape(f"safety.heartbeat_s: found {heartbeat_s:g}, expected"),
             ):
-                refuse_short_heartbeat(told, 200.0, with_sensors=False)
+                refuse_short_heartbeat(stated, 200.0, with_sensors=False)
         else:
-            refuse_short_heartbeat(told, 200.0, with_sensors=False)
+            refuse_short_heartbeat(stated, 200.0, with_sensors=False)
     refuse_short_heartbeat(shared.model_copy(update={"plant": None}), 200.0, with_sensors=False)
     refuse_short_heartbeat(load_rig(rig_file("real_time")), 200.0, with_sensors=True)  # a line each
 

@@ -24,7 +24,7 @@ def lab(tmp_path):
     return load
 
 
-def test_a_rig_with_limits_of_a_persons_own_moves_somebody(lab):
+def test_a_rig_with_limits_of_a_persons_own_moves_a_person(lab):
     refuse_unguarded(lab(), 200.0)
 
 
@@ -59,7 +59,7 @@ def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
     assert "0.1 rad" in warning
 
 
-def test_a_drive_whose_faults_nobody_reads_is_warned_of(lab):
+def test_a_drive_whose_faults_are_not_read_gives_a_warning(lab):
     (warning,) = unmonitored(
         lab(
             ("fault_mask = 0x0008", "fault_mask = 0x0000"),

@@ -14,13 +14,13 @@ EXCHANGE = 23
 @pytest.fixture
 def slowly(record):
     """Record at 50 Hz on a rig that takes its time; returns why that was refused, and which devices
-    were told."""
+    were written to."""
 
     def run(takes_s, who, run):
-        told, seen = set(), []
+        written, seen = set(), []
 
         def slow(device, function, written):
-            told.update({device} if function == EXCHANGE else ())
+            written.update({device} if function == EXCHANGE else ())
             if seen and device in getattr(seen[0].rig, who):
                 time.sleep(takes_s)
 
@@ -36,22 +36,22 @@ def slowly(record):
                 cuff_force_n=1e4,
                 speed_rad_s=50.0,
             )
-        return str(refused.value), told
+        return str(refused.value), written
 
     return run
 
 
-def test_a_rate_that_drives_are_too_slow_for_is_refused_before_any_is_told_anything(slowly):
-    why, told = slowly(0.011, "drives", "exo_alone")
+def test_a_rate_that_is_too_high_for_the_drives_is_refused_before_any_is_sent_anything(slowly):
+    why, written = slowly(0.011, "drives", "exo_alone")
     assert (
         "cycles in which every device was asked took longer than the 20 ms from one set-point to"
         " the next" in why
     )
     assert why.endswith("lower acquire.sample_rate_hz, or close other programs; nothing was moved")
-    assert not told
+    assert not written
 
 
 def test_where_it_is_sensors_that_take_long_reading_them_less_often_is_named(slowly):
-    why, told = slowly(0.008, "sensors", "with_human")
+    why, written = slowly(0.008, "sensors", "with_human")
     assert "raise `every` of the sensors" in why
-    assert not told
+    assert not written

@@ -32,10 +32,10 @@ def test_set_points_that_would_leap_a_count_are_refused_at_the_rate_at_which_the
 
 @pytest.mark.parametrize("angle", [-0.35, 1.75])
 def test_a_set_point_at_a_limit_is_not_rounded_beyond_it(rig_file, angle):
-    async def made():  # a connection belongs to an event loop
+    async def build():  # a connection belongs to an event loop
         return Machine(load_rig(rig_file(replace=COARSE)), with_sensors=False).drives[0]
 
-    drive = asyncio.run(made())
-    told = drive.write_block.decode(drive.words(drive.map.enable, angle))["reference"]
-    assert -0.35 <= told <= 1.75
-    assert told == pytest.approx(angle, abs=drive.map.write.reference.step)
+    drive = asyncio.run(build())
+    sent = drive.write_block.decode(drive.words(drive.map.enable, angle))["reference"]
+    assert -0.35 <= sent <= 1.75
+    assert sent == pytest.approx(angle, abs=drive.map.write.reference.step)

@@ -55,19 +55,19 @@ class Written:
         is wrong."""
         self.path.write_bytes(damaged)
         try:
-            made = recover(self.path, output)
-        except InputError as error:  # nothing is recovered, nothing lost, and both are told
+            recovery = recover(self.path, output)
+        except InputError as error:  # nothing is recovered, nothing lost, and both are reported
             assert str(error).startswith(f"{self.path}: ")
             assert "delete" not in str(error)
             assert self.path.read_bytes() == damaged
             return set()
         frame = RECORDING.read(output).frame
         output.unlink()
-        found = frame["sequence"].to_numpy() - 7000
-        assert np.array_equal(frame[COLUMNS].to_numpy(), [row(k) for k in found])
-        summary = made.summary
+        numbers = frame["sequence"].to_numpy() - 7000
+        assert np.array_equal(frame[COLUMNS].to_numpy(), [row(k) for k in numbers])
+        summary = recovery.summary
         assert (
-            len(found)
+            len(numbers)
             == summary.samples
             == SAMPLES - summary.missed - (summary.cut_off - (200 - SAMPLES))
         )
@@ -75,8 +75,8 @@ class Written:
             assert self.path.read_bytes() == damaged
         else:
             assert not self.path.exists()
-            assert len(found) == SAMPLES
-        return set(found)
+            assert len(numbers) == SAMPLES
+        return set(numbers)
 
 
 @pytest.fixture(params=[False, True], ids=["killed", "ended"])
@@ -103,7 +103,7 @@ HOW = ("zeroed", "erased", "random", "left out", "twice", "stale", "inserted", "
 
 
 @pytest.mark.parametrize("how", HOW)
-def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(
+def test_each_row_that_is_recovered_was_recorded_and_the_rest_is_reported_for_any_damaged_sector(
     written, tmp_path, how
 ):
     (tmp_path / "other").mkdir()
@@ -112,11 +112,11 @@ def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_r
     for begin in range(0, len(written.bytes), SECTOR):
         end = min(begin + SECTOR, len(written.bytes))
         damaged = spoil(written.bytes, rng, how, begin, end, stale)
-        found = written.recovered(damaged, tmp_path / "made.parquet")
-        assert written.untouched(begin, end) <= found, (how, begin)
+        numbers = written.recovered(damaged, tmp_path / "made.parquet")
+        assert written.untouched(begin, end) <= numbers, (how, begin)
 
 
-def test_whatever_bytes_are_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(
+def test_each_row_that_is_recovered_was_recorded_and_the_rest_is_reported_for_any_damaged_bytes(
     written, tmp_path
 ):
     (tmp_path / "other").mkdir()
@@ -140,8 +140,8 @@ def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other
 ):
     begin, end = written.places[3]
     for at in range(begin, end, 7):
-        found = written.recovered(flipped(written.bytes, at, at % 8), tmp_path / "made.parquet")
-        assert found == written.untouched(begin, end), at
+        numbers = written.recovered(flipped(written.bytes, at, at % 8), tmp_path / "made.parquet")
+        assert numbers == written.untouched(begin, end), at
 
 
 def test_no_batch_is_read_by_a_head_that_it_was_not_written_after(written, tmp_path):
@@ -151,7 +151,7 @@ def test_no_batch_is_read_by_a_head_that_it_was_not_written_after(written, tmp_p
         assert written.recovered(flipped(lost, at, at % 8), tmp_path / "made.parquet") == set()
 
 
-def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_use(written):
+def test_a_journal_of_which_nothing_can_be_read_is_not_reported_as_of_no_use(written):
     begin, end = written.places[0][0], written.places[-1][1]
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
     with pytest.raises(InputError) as refused:
@@ -167,21 +167,23 @@ def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_
 
 @pytest.mark.parametrize("why", ["stopped by Ctrl-C; the leg was stopped", None])
 @pytest.mark.parametrize("lost", [3, 8])
-def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_and_where(
+def test_a_run_whose_journal_the_disk_damaged_reports_the_number_and_place_of_its_samples(
     tmp_path, why, lost
 ):
     """Eight batches are all that it had: then there is no recording, and none is named."""
     written, output = Written(tmp_path, ended=True, why=why), tmp_path / "one.parquet"
     begin, end = written.places[0][0], written.places[lost - 1][1]
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
-    told = why or "the run is complete"
+    text = why or "the run is complete"
     with locked(written.path) as lock, pytest.raises(DeviceError) as raised:
-        _recorded(output, lock, DeviceError, told, None)
+        _recorded(output, lock, DeviceError, text, None)
     place = recording_path(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
-    left = "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
+    state = (
+        "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
+    )
     assert (
         str(raised.value)
-        == f"{told}; {left} the disk did not give back all that was written; check the disk,"
+        == f"{text}; {state} the disk did not give back all that was written; check the disk,"
         f" {written.path} is kept"
     )
     assert place.exists() == (lost < 8)
@@ -191,16 +193,18 @@ def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_an
 @pytest.fixture
 def unchecked(tmp_path):
     """A journal as an older exoid wrote it, without checksums."""
-    made = Written(tmp_path, ended=True)
-    made.bytes = made.bytes.replace(b"exoid-batch:", b"other-batch:")
-    made.path.write_bytes(made.bytes)
-    return made
+    other = Written(tmp_path, ended=True)
+    other.bytes = other.bytes.replace(b"exoid-batch:", b"other-batch:")
+    other.path.write_bytes(other.bytes)
+    return other
 
 
-def test_a_journal_without_checksums_is_read_as_ever_and_that_is_told(unchecked, exoid, tmp_path):
-    said = exoid("recover", unchecked.path, "-o", tmp_path / "made.parquet")
-    assert said.code == 0
-    assert "; its numbers were not checked, an older exoid wrote it without checksums; " in said.out
+def test_a_journal_without_checksums_is_read_and_reported_as_unchecked(unchecked, exoid, tmp_path):
+    outcome = exoid("recover", unchecked.path, "-o", tmp_path / "made.parquet")
+    assert outcome.code == 0
+    assert (
+        "; its numbers were not checked, an older exoid wrote it without checksums; " in outcome.out
+    )
     table = RECORDING.read(tmp_path / "made.parquet")
     assert table.metadata["unchecked"] is True
     assert np.array_equal(table.frame[COLUMNS].to_numpy(), [row(k) for k in range(SAMPLES)])

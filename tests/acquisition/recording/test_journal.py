@@ -55,7 +55,7 @@ def test_what_was_appended_is_soon_on_disk_though_nothing_is_appended_any_more(t
 
 
 class Hung:
-    """A disk that takes nothing until it is told to go on."""
+    """A disk that accepts nothing until it is released."""
 
     def __init__(self, file):
         self._file, self.goes_on = file, threading.Event()
@@ -74,7 +74,9 @@ class Hung:
         return self._file.write(data)
 
 
-def test_a_disk_that_hangs_holds_up_nobody_and_is_told_before_memory_is_full(tmp_path, monkeypatch):
+def test_a_disk_that_hangs_delays_nothing_and_is_reported_before_memory_is_full(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr("pipelines.acquisition.recording.journal.MOST_WAITING", 300)
     path = tmp_path / "run.journal"
     journal = fill(path, 0)
@@ -212,7 +214,7 @@ def test_a_damaged_copy_of_the_head_is_not_believed(three_batches):
     assert read_journal(path)[1] == {"run": "exo_alone"}  # from the copy at the end
 
 
-def test_a_run_that_is_killed_before_its_first_sample_has_said_no_last_word(tmp_path):
+def test_a_run_that_is_killed_before_its_first_sample_has_no_last_words(tmp_path):
     path = tmp_path / "run.journal"
     journal = fill(path, 0)
     assert [batch.last_words for batch in JournalFile(path).batches()] == [None, None]

@@ -1,4 +1,4 @@
-"""What a recording tells of how long its answers took."""
+"""The latencies of the answers in a recording's metadata."""
 
 import numpy as np
 import pytest
@@ -13,14 +13,14 @@ def test_counted_durations_have_the_quantiles_of_the_durations_to_a_hundredth():
     counted = Latencies()
     for seconds in durations:
         counted.add(seconds)
-    told = counted.metadata()
-    assert told["cycles"] == 20_000
-    assert told["median_ms"] == pytest.approx(1e3 * np.median(durations), rel=0.01)
-    assert told["p99_ms"] == pytest.approx(1e3 * np.quantile(durations, 0.99), rel=0.01)
-    assert told["longest_ms"] == pytest.approx(250.0)
+    latency = counted.metadata()
+    assert latency["cycles"] == 20_000
+    assert latency["median_ms"] == pytest.approx(1e3 * np.median(durations), rel=0.01)
+    assert latency["p99_ms"] == pytest.approx(1e3 * np.quantile(durations, 0.99), rel=0.01)
+    assert latency["longest_ms"] == pytest.approx(250.0)
 
 
-def test_what_is_too_short_or_too_long_to_be_told_apart_is_counted_all_the_same():
+def test_times_that_are_shorter_or_longer_than_all_bins_are_counted():
     counted = Latencies()
     for seconds in (0.0, 1e-9, 100.0):
         counted.add(seconds)
@@ -28,11 +28,11 @@ def test_what_is_too_short_or_too_long_to_be_told_apart_is_counted_all_the_same(
     assert counted.metadata()["longest_ms"] == 100_000.0
 
 
-def test_a_run_that_never_began_tells_nothing():
+def test_a_run_that_never_began_has_no_latencies():
     assert Latencies().metadata() == {}
 
 
-def test_a_recording_tells_how_long_its_answers_took(record):
-    told = record().metadata["latency"]
-    assert told["cycles"] > 100
-    assert 0.0 < told["median_ms"] <= told["p99_ms"] <= told["longest_ms"]
+def test_a_recording_has_the_latencies_of_its_answers(record):
+    latency = record().metadata["latency"]
+    assert latency["cycles"] > 100
+    assert 0.0 < latency["median_ms"] <= latency["p99_ms"] <= latency["longest_ms"]

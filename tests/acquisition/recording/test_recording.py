@@ -37,7 +37,7 @@ QUEUE = {
 
 @pytest.fixture
 def record_in_real_time(tmp_path, excitation, rig_file):
-    """Record two seconds at 1 kHz, told 50 times a second, the rig in a process of its own: a busy
+    """Record two seconds at 1 kHz, with 50 set-points a second, the rig in a process of its own: a busy
     computer can too."""
 
     def run(run="exo_alone", **replace):
@@ -83,7 +83,7 @@ def test_a_set_point_every_fiftieth_sample_records_them_all_too(record, drain):
     assert np.diff(frame["sequence"]).tolist() == [1] * 999
 
 
-def test_recorded_and_cyclic_samples_tell_the_same_motion(record):
+def test_recorded_and_cyclic_samples_agree_on_the_motion(record):
     silent = {"ripple_nm": "[0.0, 0.0]"}
     often = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP, **silent).frame
     seldom = record(shipped="plain", **silent).frame
@@ -121,10 +121,10 @@ def test_what_a_drive_overwrote_before_it_was_drained_is_a_gap_and_the_rest_is_r
     ((time, missed),) = table.metadata["gaps"]
     assert 100 < missed < 200
     assert len(table.frame) == 1000 - missed
-    found = table.frame.set_index("sequence")
-    assert_allclose(found, whole.loc[found.index], atol=2e-6)
-    assert np.diff(found["time_s"]).max() == pytest.approx((missed + 1) / 1000, abs=2e-6)
-    assert found["time_s"].to_numpy()[np.argmax(np.diff(found["time_s"]))] == pytest.approx(
+    rows = table.frame.set_index("sequence")
+    assert_allclose(rows, whole.loc[rows.index], atol=2e-6)
+    assert np.diff(rows["time_s"]).max() == pytest.approx((missed + 1) / 1000, abs=2e-6)
+    assert rows["time_s"].to_numpy()[np.argmax(np.diff(rows["time_s"]))] == pytest.approx(
         time - 1e-3, abs=2e-6
     )
 
@@ -133,10 +133,10 @@ def test_a_glitch_between_two_cycles_which_no_exchange_sees_ends_the_run(record,
     values = Drive._values
 
     def glitch(drive, sample):
-        told = values(drive, sample)
+        altered = values(drive, sample)
         if drive.joint == 1 and sample.sequence[0] == 1502:
-            told["angle"] += 100.0
-        return told
+            altered["angle"] += 100.0
+        return altered
 
     monkeypatch.setattr(Drive, "_values", glitch)
     with pytest.raises(DeviceError, match=r"knee angle (99|100)\.\d+ rad is outside its limits"):
@@ -316,7 +316,7 @@ def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_
     assert set(served) == {0}  # disabled
 
 
-def test_clocks_that_drift_are_found_corrected_and_told(record_in_real_time):
+def test_drifting_clocks_are_detected_corrected_and_reported(record_in_real_time):
     drift = {
         "seed = 1 ": "clock_ppm = [0.0, 40.0]\nclock_offset_s = [3.0, 12.345]\nseed = 1 ",
         'sampling = "recorder"': 'clocks = "own"\nsampling = "recorder"',
@@ -358,7 +358,7 @@ class SlowRecord:
         return [SimpleNamespace(sequence=newest)]
 
 
-def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
+def test_a_record_is_drained_in_each_cycle_in_addition_to_the_set_points():
     async def run():
         drive, brought = SlowRecord(), []
         recorded = sampling.RecorderSource(drive)

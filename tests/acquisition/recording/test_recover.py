@@ -1,4 +1,4 @@
-"""What a killed run left becomes a whole recording, and what is missing is said."""
+"""The journal of a killed run becomes a whole recording that states what is missing."""
 
 import json
 import os
@@ -56,11 +56,15 @@ def killed(tmp_path):
     return journal_of(output)
 
 
-def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path):
-    made = recover(killed)
+def test_a_killed_run_becomes_a_recording_that_states_what_is_missing(killed, tmp_path):
+    recovery = recover(killed)
     table = RECORDING.read(tmp_path / "one.aborted.parquet")
-    assert made.path == table.path
-    assert (made.summary.samples, made.summary.missed, made.summary.cut_off) == (147, 3, 50)
+    assert recovery.path == table.path
+    assert (recovery.summary.samples, recovery.summary.missed, recovery.summary.cut_off) == (
+        147,
+        3,
+        50,
+    )
     assert table.frame["sequence"].tolist() == [7000 + k for k in (*range(40), *range(43, 150))]
     assert table.metadata["gaps"] == [[0.2, 3]]
     assert (
@@ -72,17 +76,17 @@ def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path
 
 
 def test_wherever_a_journal_was_cut_off_all_whole_batches_are_recovered(killed, tmp_path):
-    whole, found = killed.read_bytes(), []
+    whole, counts = killed.read_bytes(), []
     for cut in range(0, len(whole), 307):
         killed.write_bytes(whole[:cut])
         try:
             recover(killed, tmp_path / f"{cut}.parquet")
-            found.append(len(RECORDING.read(tmp_path / f"{cut}.parquet").frame))
+            counts.append(len(RECORDING.read(tmp_path / f"{cut}.parquet").frame))
         except InputError as error:
             assert ("delete it" in str(error)) == (cut <= 512 or "holds no sample" in str(error))
-            found.append(0)
-    assert found == sorted(found)
-    assert set(found) == set(range(0, 141, 20))  # the last batch, of 7, is never whole here
+            counts.append(0)
+    assert counts == sorted(counts)
+    assert set(counts) == set(range(0, 141, 20))  # the last batch, of 7, is never whole here
 
 
 def test_samples_that_were_missed_before_the_first_one_kept_are_a_gap(tmp_path):
@@ -198,13 +202,16 @@ def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(
     ],
 )
 @pytest.mark.parametrize("at", [100, 119, 120])
-def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(
+def test_a_row_that_no_recording_may_hold_costs_only_itself_and_is_reported(
     tmp_path, column, value, at
 ):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(at))
     journal.append(
-        [value if name == column else told for name, told in zip(COLUMNS, row(at), strict=True)]
+        [
+            value if name == column else original
+            for name, original in zip(COLUMNS, row(at), strict=True)
+        ]
     )
     for index in range(at + 1, 200):
         journal.append(row(index))
@@ -216,7 +223,7 @@ def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(
     assert table.frame["sequence"].tolist() == [7000 + k for k in range(200) if k != at]
 
 
-def test_a_damaged_journal_is_kept_beside_the_recording_of_all_that_can_be_read(tmp_path):
+def test_a_damaged_journal_is_kept_next_to_the_recording_of_all_that_can_be_read(tmp_path):
     output = tmp_path / "one.parquet"
     journal = journal_with(output, range(100))
     place = journal.path.stat().st_size
@@ -228,8 +235,12 @@ def test_a_damaged_journal_is_kept_beside_the_recording_of_all_that_can_be_read(
     journal.close()
     whole = journal.path.read_bytes()
     journal.path.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
-    made = recover(journal.path)
-    assert (made.path, made.summary.damaged, made.summary.gaps) == (output, True, [(0.5, 20)])
+    recovery = recover(journal.path)
+    assert (recovery.path, recovery.summary.damaged, recovery.summary.gaps) == (
+        output,
+        True,
+        [(0.5, 20)],
+    )
     assert len(RECORDING.read(output).frame) == 180
     assert journal.path.exists()
 
@@ -267,7 +278,7 @@ def test_a_disk_that_fills_up_half_way_through_a_batch_costs_no_earlier_and_no_l
             journal.append(row(index))
         journal.flush()
     assert sum(batch.rows.num_rows for batch in JournalFile(journal_of(output)).batches()) == 40
-    journal._file = file  # somebody made room
+    journal._file = file  # there is room again
     journal.close()
     recover(journal_of(output))
     assert len(RECORDING.read(tmp_path / "one.aborted.parquet").frame) == 60
@@ -312,7 +323,7 @@ def memory_of_recovery(output, samples):
 
 
 @pytest.mark.skipif(
-    not sys.platform.startswith("linux"), reason="needs /proc to tell the most memory held"
+    not sys.platform.startswith("linux"), reason="needs /proc to measure the most memory held"
 )
 @pytest.mark.parametrize("seconds", [300, pytest.param(3600, marks=pytest.mark.slow)])
 def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_recording(
@@ -381,8 +392,8 @@ def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path,
     content[at] ^= 1 << 4
     killed.write_bytes(content)
     if copies:
-        made = recover(killed)
-        assert (made.summary.samples, made.summary.damaged) == (147, True)
+        recovery = recover(killed)
+        assert (recovery.summary.samples, recovery.summary.damaged) == (147, True)
     else:
         for refuse in (recover, refuse_leftover):
             with pytest.raises(InputError) as refused:
@@ -471,7 +482,7 @@ def test_last_words_that_are_damaged_are_none_and_cost_no_sample(tmp_path, word,
     whole = journal.path.read_bytes()
     at = whole.rindex(word)
     journal.path.write_bytes(whole[:at] + instead + whole[at + len(word) :])
-    made = recover(journal.path)
-    assert (made.summary.samples, made.summary.damaged) == (190, True)
-    assert "without a word" in made.summary.abort
+    recovery = recover(journal.path)
+    assert (recovery.summary.samples, recovery.summary.damaged) == (190, True)
+    assert "without a word" in recovery.summary.abort
     assert journal.path.exists()
