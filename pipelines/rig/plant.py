@@ -198,7 +198,8 @@ def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term])
     """Return the model of the machine, with the person as a rigid body of their own."""
     exo, human = np.array(settings.exo_inertial), np.array(settings.human_inertial)
     for name, X in (("exo_inertial", exo), ("exo_inertial + human_inertial", exo + human)):
-        if broken := LEG.unrealizable(X, geometry):
+        broken = LEG.unrealizable(X, geometry)
+        if broken:
             raise SettingsError(f"plant.{name}: no real leg has these: {broken[0]}; correct them")
     frictions = zip(JOINTS, settings.coulomb_nm, settings.viscous_nm_s_rad, strict=True)
     return Model(

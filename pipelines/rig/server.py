@@ -391,10 +391,11 @@ async def serve(
             f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for"
             " the places that the rig file names, or give 0 for free ones"
         )
-    if port and isinstance(line := rig.line.get(str(next(iter(on_line)))), RtuLine):
+    first_line = rig.line.get(str(next(iter(on_line))))
+    if port and isinstance(first_line, RtuLine):
         raise SettingsError(
-            f"--port: found {port}, but the rig is on a serial line, {line.serial_port}; leave it"
-            " out, or give 0 for a pseudo-terminal of any name"
+            f"--port: found {port}, but the rig is on a serial line, {first_line.serial_port};"
+            " leave it out, or give 0 for a pseudo-terminal of any name"
         )
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:

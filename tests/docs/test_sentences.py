@@ -27,7 +27,6 @@ NOT_YET: dict[str, int] = {
     "docs/own-effect.md": 3,
     "docs/real-data.md": 21,
     "docs/report.md": 7,
-    "docs/rig-check.md": 5,
     "docs/science.md": 1,
     "docs/simulation.md": 4,
 }

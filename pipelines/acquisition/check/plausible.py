@@ -152,7 +152,8 @@ def _check_faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Findin
     if "status" not in series.block.registers:
         return
     status = int(series.of("status")[-1])
-    if bits := drive.map.active_faults(status):
+    bits = drive.map.active_faults(status)
+    if bits:
         yield Finding(
             probe.name,
             f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual"

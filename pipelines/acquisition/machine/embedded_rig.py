@@ -109,7 +109,8 @@ def _place(output: ProcessOutput, path: Path, errors: IO[bytes]) -> tuple[str | 
 
     The name is None for devices that are on no line of the rig file.
     """
-    if line := output.line(START_S):
+    line = output.line(START_S)
+    if line:
         name, _, place = line.rpartition(" ")
         return name or None, place
     output.end()

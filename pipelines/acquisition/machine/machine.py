@@ -270,9 +270,11 @@ class Machine:
         gained = [count - self._last_count for count in counts]
         # The counter that goes on as before is right.
         j, other = (fast, slow) if gained[slow] > 0 else (slow, fast)
-        what = "leapt" if gained[slow] > 0 else "went back" if gained[slow] < 0 else "stands still"
+        change = (
+            "leapt" if gained[slow] > 0 else "went back" if gained[slow] < 0 else "stands still"
+        )
         return (
-            f"{self.drives[j].device.label}: its sample counter {what}"
+            f"{self.drives[j].device.label}: its sample counter {change}"
             f" ({readings[j].sequence - gained[j]}, then {readings[j].sequence}) while that of"
             f" drive {self.rig.drive[other].joint} went on by {gained[other]} in"
             f' {self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the'

@@ -29,7 +29,7 @@ _GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
 REMEDY: dict[int, str] = {
     ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",
     ExcCodes.DEVICE_BUSY: (
-        "end what else asks it, wait until it is ready, or lower acquire.sample_rate_hz"
+        "stop other programs that use it, wait until it is ready, or lower acquire.sample_rate_hz"
     ),
     ExcCodes.GATEWAY_PATH_UNAVIABLE: _GATEWAY,
     ExcCodes.GATEWAY_NO_RESPONSE: _GATEWAY,
@@ -87,10 +87,10 @@ class Device:
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
         """Read words by FC03; ``in_motion`` with the short time-out of a moving leg."""
-        what = f"reading registers {address} to {address + count - 1}"
+        action = f"reading registers {address} to {address + count - 1}"
         time_out = self._in_motion if in_motion else self._at_rest
         request = self._client.read_holding_registers
-        return await self._ask(what, count, time_out, request, address=address, count=count)
+        return await self._ask(action, count, time_out, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
         """Read the words of a queue by FC24, whole records of ``words`` each.
@@ -100,30 +100,30 @@ class Device:
         DeviceError
             The answer is not made of whole records.
         """
-        what = f"reading the queue at register {address}"
+        action = f"reading the queue at register {address}"
         response = await self._request(
-            what, self._in_motion, self._client.read_fifo_queue, address=address
+            action, self._in_motion, self._client.read_fifo_queue, address=address
         )
         registers = list(getattr(response, "values", []))
         if len(registers) % words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(registers)} registers, expected a"
+                f"{self.label}: answered {action} with {len(registers)} registers, expected a"
                 f" multiple of {words}; compare ring.words in the rig file with the device's manual"
             )
         return registers
 
     async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
         """Write a block by FC16; ``in_motion`` with the short time-out of a moving leg."""
-        what = f"writing registers {_range(block)}"
+        action = f"writing registers {_range(block)}"
         time_out = self._in_motion if in_motion else self._write
         request = self._client.write_registers
-        await self._ask(what, None, time_out, request, address=block.address, values=list(words))
+        await self._ask(action, None, time_out, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
-        what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
+        action = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
         return await self._ask(
-            what,
+            action,
             read.count,
             self._in_motion,
             self._client.readwrite_registers,
@@ -135,24 +135,24 @@ class Device:
 
     async def _ask(
         self,
-        what: str,
+        action: str,
         words: int | None,
         time_out: TimeOut,
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
     ) -> list[int]:
         """Send a request and return the words of its answer, ``words`` of them if given."""
-        response = await self._request(what, time_out, request, **arguments)
+        response = await self._request(action, time_out, request, **arguments)
         if words is not None and len(response.registers) != words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(response.registers)} registers, expected"
-                f" {words}; compare the register map in the rig file with the device's manual"
+                f"{self.label}: answered {action} with {len(response.registers)} registers,"
+                f" expected {words}; compare the register map in the rig file with the device's manual"
             )
         return list(response.registers)
 
     async def _request(
         self,
-        what: str,
+        action: str,
         time_out: TimeOut,
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
@@ -163,12 +163,12 @@ class Device:
         except (ModbusException, OSError) as error:
             kind = Unanswered if self._client.connected else DeviceError
             raise kind(
-                f"{self.label}: did not answer {what} within {time_out.seconds:.3g} s; check cable"
-                f" and power, or raise safety.{time_out.setting} in the rig file"
+                f"{self.label}: did not answer {action} within {time_out.seconds:.3g} s; check"
+                f" cable and power, or raise safety.{time_out.setting} in the rig file"
             ) from error
         if isinstance(response, InvalidReply):
             raise DeviceError(
-                f"{self.label}: answered {what} with {response.reason}; check that it speaks"
+                f"{self.label}: answered {action} with {response.reason}; check that it speaks"
                 " Modbus, and the line"
             )
         # pymodbus does not raise an exception for an exception reply.
@@ -179,7 +179,7 @@ class Device:
                 code, "compare the register map in the rig file with the device's manual"
             )
             raise Refused(
-                f"{self.label}: answered {what} with Modbus exception {code}{meaning}; {remedy}"
+                f"{self.label}: answered {action} with Modbus exception {code}{meaning}; {remedy}"
             )
         return response
 

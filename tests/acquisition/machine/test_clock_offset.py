@@ -230,8 +230,7 @@ def test_drives_whose_clocks_drift_identify_the_parameters_of_those_whose_clocks
 
 
 def test_uncorrected_the_same_drift_would_spoil_them(moved):
-    """Sample by sample, by the counters alone: after 20 s the knee's is 0.16 samples off, its offset
-    is any."""
+    """By the counters alone the knee is 0.16 samples off after 20 s, plus any offset."""
     common, metadata = recorded(moved, 0.0, 0.0)
     late = common.copy()
     for column in ("knee_angle_rad", "knee_torque_nm"):

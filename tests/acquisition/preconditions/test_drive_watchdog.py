@@ -46,13 +46,13 @@ def test_a_lost_reply_leaves_its_drive_without_a_set_point_for_as_long_as_is_sta
     run = run_with(tmp_path, Event(at, kind), line=line, trajectory=times(0.1))
     rig = RIGS["real_time", True, FINE_RAD, line]
     for joint, drive in enumerate(rig.drive):
-        times = [
+        sent_at = [
             sent.time
             for sent in run.rig.told
             if sent.joint == joint and sent.control and sent.arrived
         ]
         waits = replies_waited_for(rig, drive, with_sensors=False)
-        assert np.diff(times).max() <= waits * rig.safety.longest_reply_s + 2 / RATE + SOON_S
+        assert np.diff(sent_at).max() <= waits * rig.safety.longest_reply_s + 2 / RATE + SOON_S
 
 
 @pytest.mark.parametrize(

@@ -37,8 +37,10 @@ QUEUE = {
 
 @pytest.fixture
 def record_in_real_time(tmp_path, excitation, rig_file):
-    """Record two seconds at 1 kHz, with 50 set-points a second, the rig in a process of its own: a busy
-    computer can too."""
+    """Record two seconds at 1 kHz with 50 set-points a second, which a busy computer can do too.
+
+    The rig is a process of its own.
+    """
 
     def run(run="exo_alone", **replace):
         # So slow a motion that set-points which are left out do not jerk the leg; that is not the
