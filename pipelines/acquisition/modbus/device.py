@@ -146,7 +146,8 @@ class Device:
         if words is not None and len(response.registers) != words:
             raise DeviceError(
                 f"{self.label}: answered {action} with {len(response.registers)} registers,"
-                f" expected {words}; compare the register map in the rig file with the device's manual"
+                f" expected {words}; compare the register map in the rig file with the device's"
+                " manual"
             )
         return list(response.registers)
 
