@@ -48,7 +48,7 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             "time_s",
-            "clock jitter: the stamps are even, but all angles jump together, as if sampled"
+            "clock jitter: the stamps are even, but all angles jump together. The samples are"
             f" {100 * jitter:.2g} % of a sample period rms"
             f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; store the measured"
             " instants, not the planned ones",

@@ -44,7 +44,7 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
         channel,
         f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an"
         f" inertia of {body:.4g} {inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses"
-        f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}), and both must be positive. A reversed"
+        f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}). Both must be positive. A reversed"
         f" {column(motion, 0, 'angle')} looks the same; reverse the sign in"
         f" {settings_of(motion)}, if every run has it, and in this recording",
     )

@@ -40,8 +40,7 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     if share < NEARLY_ALL:
         sentences.append(
             f"it removes {100.0 * share:.0f} % of the systematic error there, and a true cause"
-            " removes nearly all. So a part of its probability belongs to an unlisted effect that"
-            " resembles it"
+            " removes nearly all; a part of its probability goes to an unlisted similar effect"
         )
     if effect.each_run:
         sentences.append(_differs(d, label, effect))

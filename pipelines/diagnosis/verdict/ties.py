@@ -48,8 +48,8 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         " stays",
     ),
     frozenset({"parallel_spring", "coulomb_asymmetry"}): Tie(
-        "a soft spring that is far wound up adds little but a constant torque, as friction does"
-        " that differs with direction while the joint always moves",
+        "a soft spring that is far wound up adds little but a constant torque. While the joint"
+        " always moves, friction that differs with direction does the same",
         "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
     ),
     frozenset({"friction_temperature", "friction_warmup"}): Tie(
