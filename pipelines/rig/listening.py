@@ -128,8 +128,8 @@ def _what_is_there(link: Path) -> str:
     # A killed rig's port may now be another process's, so a valid link may still be a leftover.
     if link.is_symlink():
         return (
-            f"is a link to {link.readlink()} already, as a virtual rig makes one; end the rig that"
-            " is served there or, if none is and a killed one left it, delete the link"
+            f"is a link to {link.readlink()} already, as a virtual rig makes one; end that rig"
+            " or, if a killed one left the link, delete it"
         )
     return (
         "is there already, where the link to the virtual rig's pseudo-terminal was to be; remove it"

@@ -10,6 +10,8 @@ import pytest
 from pipelines.acquisition.acquire import acquire
 from pipelines.contracts import RECORDING
 from pipelines.rig import server
+from pipelines.rig.device import Device
+from pipelines.rig.virtual_rig import VirtualRig, build_plant
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
@@ -77,9 +79,9 @@ class Served:
     """A rig in a thread of this process, and what its devices look like from inside."""
 
     def __init__(self, path: Path, run: str, seed: int, port: int) -> None:
-        self.rig: server.VirtualRig
+        self.rig: VirtualRig
         self._rig, self._port = load_rig(path), port
-        self._plant = server.build_plant(self._rig, path, run, seed)
+        self._plant = build_plant(self._rig, path, run, seed)
         self._listening = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
 
@@ -121,7 +123,7 @@ def serve(monkeypatch):
     @contextmanager
     def serving(path, port, run="exo_alone", seed=0, fault=None):
         made = []
-        build, answer = server.VirtualRig.__init__, server.Device._serve
+        build, answer = VirtualRig.__init__, Device._serve
 
         def remember(self, *arguments):
             made.append(self)
@@ -132,8 +134,8 @@ def serve(monkeypatch):
                 return code
             return await answer(self, function, first, address, count, registers, written)
 
-        monkeypatch.setattr(server.VirtualRig, "__init__", remember)
-        monkeypatch.setattr(server.Device, "_serve", faulty)
+        monkeypatch.setattr(VirtualRig, "__init__", remember)
+        monkeypatch.setattr(Device, "_serve", faulty)
         served = Served(path, run, seed, port)
         served.start()
         served.rig = made[0]

@@ -8,7 +8,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.modbus.device import Device
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.rig.server import Drive
+from pipelines.rig.device import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings

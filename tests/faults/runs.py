@@ -17,7 +17,9 @@ from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.rig import server
+from pipelines.rig.device import one
 from pipelines.rig.plant import Samples
+from pipelines.rig.virtual_rig import build_plant
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
@@ -100,13 +102,13 @@ def served(
     """Serve the rig; yields its port, and all that it latches by number."""
     path = rig_file(folder, 502, frames)
     rig = load_rig(path)
-    plant, latched = server.build_plant(rig, path, run, SEED, RATE), dict[int, Latched]()
+    plant, latched = build_plant(rig, path, run, SEED, RATE), dict[int, Latched]()
     advance = plant.run
 
     def remembered(*arguments: object) -> Samples:
         samples = advance(*arguments)
         for k, number in enumerate(samples.sequence.tolist()):
-            latched[number] = Latched(server.one(samples, k), time.monotonic())
+            latched[number] = Latched(one(samples, k), time.monotonic())
         return samples
 
     plant.run = remembered

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.rig.server import build_plant, serve
+from pipelines.rig.server import serve
+from pipelines.rig.virtual_rig import build_plant
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
 

@@ -29,9 +29,8 @@ def test_a_link_whose_port_is_another_processs_by_now_is_reported_as_a_possible_
         raise AssertionError("the link is taken")
     assert (
         str(refused.value)
-        == f"{link}: is a link to /dev/null already, as a virtual rig makes one; end the rig that"
-        " is served there or, if none is and a killed one left it, delete the link, or name"
-        " another path in serial_port"
+        == f"{link}: is a link to /dev/null already, as a virtual rig makes one; end that rig"
+        " or, if a killed one left the link, delete it, or name another path in serial_port"
     )
     assert os.readlink(link) == "/dev/null"
 

@@ -64,8 +64,8 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
         if abs(angle) > NEAR_ZERO_RAD:
             raise SettingsError(
                 f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g}"
-                " rad of zero, since a drive of wrong sign leaps by twice its angle; let the leg"
-                " hang straight, or add --by-hand"
+                " rad: a drive of wrong sign leaps by twice its angle; let the leg hang straight,"
+                " or add --by-hand"
             )
 
 

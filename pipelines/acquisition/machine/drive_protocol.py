@@ -143,7 +143,7 @@ async def refuse_other_rate(drive: Drive, rate_hz: float, setting: str) -> None:
         raise DeviceError(
             f"{drive.device.label}: its sample counter goes up by"
             f" {samples / (0.5 * (shortest + longest)):.4g} a second, expected {rate_hz:g};"
-            f" correct {setting}, or the rate that is set in the drive; nothing was moved"
+            f" correct {setting}, or the rate in the drive; nothing was moved"
         )
     if not keeps_time(samples, seconds, rate_hz):
         raise DeviceError(
@@ -165,8 +165,7 @@ async def empty_recorder(drive: Drive) -> None:
     while not await drive.forget_records():
         if time.monotonic() > until:
             raise DeviceError(
-                f"{drive.device.label}: its queue is not empty after {EMPTYING_S:g} s in which"
-                " it was read without a pause, so it fills faster; raise the speed of its"
-                " line, give each drive a line of its own, or let it record less often"
-                " (record_rate_hz)"
+                f"{drive.device.label}: its queue is not empty after {EMPTYING_S:g} s of reading"
+                " without a pause; raise the speed of its line, give each drive its own line, or"
+                " let it record less often (record_rate_hz)"
             )

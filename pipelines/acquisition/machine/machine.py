@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine.clock_offset import Bounds
+from pipelines.acquisition.machine.counter_leads import find_leads
 from pipelines.acquisition.machine.drive import Drive, Send
 from pipelines.acquisition.machine.drive_protocol import (
     empty_recorder,
@@ -30,10 +30,6 @@ LAG_PAUSE_S = 0.0002
 """Pause before a drive is read again that has not latched the cycle's sample yet."""
 LOOKS = 9
 """Readings from which the offset between the drives' counters is determined."""
-SAME_TIME = 0.1
-"""Largest difference, in samples, between clocks that count as showing the same time."""
-MOST_LOOKS = 200
-"""Most readings for the offset where samples come faster than replies."""
 
 Answer = TypeVar("Answer")
 
@@ -160,42 +156,12 @@ class Machine:
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
         rig = self.rig
         if rig.sampling == "recorder" and rig.clock == "real_time" and rig.clocks == "common":
-            await self._find_leads()
+            assert rig.record_rate_hz  # the rig file is checked: recorders have a rate
+            leads = await find_leads(self.drives, rig.record_rate_hz)
+            self.leads_are_vague = None in leads
+            self.leads = [lead or 0 for lead in leads]
         self._last_count = looks[-1][0].sequence
         return Row(tuple(looks[-1]), await self.cuff_forces(), self.samples_per_cycle)
-
-    async def _find_leads(self) -> None:
-        """Determine the leads of counters that go on while one drive after the other is read.
-
-        Each reply bounds them. Where the drives' clocks give a lead within these bounds, they show
-        the same time, and it is that one; else the bounds must leave a single whole number.
-        """
-        rate_hz = self.rig.record_rate_hz
-        assert rate_hz  # the rig file is checked: recorders have a rate
-        all_bounds = [Bounds(1.0 / rate_hz) for _ in self.drives]
-        for drive, bounds in zip(self.drives, all_bounds, strict=True):
-            drive.bounds = bounds
-        try:
-            for _ in range(MOST_LOOKS):
-                readings = await asyncio.gather(*(drive.look() for drive in self.drives))
-                (origin, width), *others = [bounds.now() for bounds in all_bounds]
-                leads = [
-                    _lead(
-                        (origin - other[0]) * rate_hz,
-                        (width + other[1]) * rate_hz / 2,
-                        readings[0],
-                        reading,
-                        rate_hz,
-                    )
-                    for other, reading in zip(others, readings[1:], strict=True)
-                ]
-                self.leads_are_vague = None in leads
-                if not self.leads_are_vague:
-                    break
-        finally:
-            for drive in self.drives:
-                drive.bounds = None
-        self.leads = [0, *(lead or 0 for lead in leads)]
 
     async def count(self) -> int:
         """Return the cycle that the first drive is in."""
@@ -305,17 +271,3 @@ async def all_answers(requests: Iterable[Awaitable[Answer]]) -> list[Answer]:
             raise answer
         answers.append(answer)
     return answers
-
-
-def _lead(
-    bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float
-) -> int | None:
-    """Return the samples by which a drive is ahead, replies saying ``bounded`` ± ``margin``.
-
-    None where more than one number is possible.
-    """
-    by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
-    nearest = round(by_clock)
-    if abs(by_clock - nearest) < SAME_TIME and abs(nearest - bounded) <= margin + 0.5:
-        return nearest
-    return round(bounded) if margin <= 0.5 else None

@@ -65,9 +65,9 @@ def _locked(path: Path, name: str) -> IO[bytes]:
             file = os.fdopen(_opened(path), "rb+", buffering=0)
         except OSError as error:
             raise DeviceError(
-                f"{path}: cannot be opened ({error.strerror}), so it is unknown whether another"
-                f" exoid uses {name}; repair this file, or set TMPDIR to a folder that every user"
-                " of the rig may write in; nothing was moved"
+                f"{path}: cannot be opened ({error.strerror}), so another exoid may be using"
+                f" {name}; repair this file, or set TMPDIR to a folder that all users can write;"
+                " nothing was moved"
             ) from error
         if not take(file, wait=False):
             with file:

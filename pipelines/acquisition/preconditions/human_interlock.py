@@ -15,17 +15,15 @@ def unmonitored(rig: RigSettings) -> list[str]:
     if blind:
         missing.append(
             f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency"
-            " stop that is pressed and released is noticed only once the leg is"
-            " safety.following_error_rad from its set-point"
+            " stop that is pressed and released is noticed only by safety.following_error_rad"
             f" ({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g}"
-            " rad), and until then the leg leaps back by as much on its release"
+            " rad), by which the leg may leap on the release"
         )
     deaf = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]
     if deaf:
         missing.append(
-            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it"
-            " reports is noticed only once it says that it is no longer enabled, or the leg does"
-            " not follow"
+            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: its fault is"
+            " noticed only if it then reports that it is not enabled, or the leg does not follow"
         )
     return missing
 

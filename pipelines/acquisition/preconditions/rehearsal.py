@@ -34,7 +34,7 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
         return
     less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
-        f"{late} of {done} cycles in which every device was asked took longer than the"
+        f"{late} of {done} cycles with all devices took longer than the"
         f" {1e3 / cycle_hz:g} ms from one set-point to the next; lower"
         f" acquire.sample_rate_hz{less_often}, or close other programs; nothing was moved"
     )

@@ -35,17 +35,17 @@ def _contradiction(map_: DriveMap) -> str | None:
     if written.scale * read.scale < 0.0:
         return (
             f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign"
-            " for both, or the drive leaps to the other side of zero as it is enabled; find out by"
-            " `exoid rig check --by-hand` which sign is wrong, and change that"
+            " for both, else the drive leaps when it is enabled; find the wrong one by `exoid rig"
+            " check --by-hand`"
         )
     difference = None if map_.own_scale else _difference(written, read)
     if difference is None:
         return None
     key, one, other = difference
     return (
-        f"{key}: found {one} with {other} of read.angle, expected the same, or the drive leaps by"
-        " the difference as it is enabled; correct one, or set own_scale = true next to `enable`"
-        " where the drive's manual says that both are right"
+        f"{key}: found {one} with {other} of read.angle, expected the same, else the drive leaps"
+        " when it is enabled; correct one, or set own_scale = true next to `enable` if both are as"
+        " in the drive's manual"
     )
 
 

@@ -143,9 +143,9 @@ def _why_no_journal(path: Path) -> str:
             "is no journal of a run, or not even its head was written and so no sample; delete it"
         )
     return (
-        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and no"
-        " whole copy of it is there; nothing was changed; keep it, samples may be in it; check the"
-        " disk, and move it away to record here"
+        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and so"
+        " are its copies; nothing was changed; keep it, it may hold samples; check the disk, and"
+        " move it away to record here"
     )
 
 

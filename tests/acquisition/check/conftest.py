@@ -4,7 +4,7 @@ import pytest
 
 from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.check import check_rig
-from pipelines.rig import server
+from pipelines.rig.device import Device
 
 
 @pytest.fixture
@@ -50,12 +50,12 @@ def altered(monkeypatch):
     """Let devices report altered values: ``change(device, values)`` alters them in place."""
 
     def alter(change):
-        put = server.Device._put
+        put = Device._put
 
         def altered_put(self, block, values):
             change(self, values)
             put(self, block, values)
 
-        monkeypatch.setattr(server.Device, "_put", altered_put)
+        monkeypatch.setattr(Device, "_put", altered_put)
 
     return alter

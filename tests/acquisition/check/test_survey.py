@@ -10,7 +10,7 @@ import pytest
 from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.check import check_rig
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.rig import server
+from pipelines.rig.device import Device, Sensor
 from pipelines.settings.rig import load_rig
 
 ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -178,18 +178,18 @@ def test_degrees_taken_for_radians_are_found_by_the_limits(checked):
 
 
 def test_swapped_bytes_are_distinguished_from_swapped_words(checked, monkeypatch):
-    put = server.Device._put
+    put = Device._put
 
     def swapped(self, block, values):
         put(self, block, values)
-        if isinstance(self, server.Sensor):
+        if isinstance(self, Sensor):
             start = block.address - self.first
             words = self.registers[start : start + block.count]
             self.registers[start : start + block.count] = [
                 (w >> 8) | ((w & 0xFF) << 8) for w in words
             ]
 
-    monkeypatch.setattr(server.Device, "_put", swapped)
+    monkeypatch.setattr(Device, "_put", swapped)
     report = checked()
     about_force = [str(finding) for finding in report.findings if "force_y" in finding.quantity]
     assert len(about_force) == 4

@@ -11,7 +11,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.errors import DeviceError
-from pipelines.rig.server import Drive
+from pipelines.rig.device import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig

@@ -16,8 +16,9 @@ from pymodbus.server.base import ModbusBaseServer
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.modbus.connection import explain
 from pipelines.acquisition.modbus.device import Device
-from pipelines.acquisition.modbus.line import Line, _explained, lines_of
+from pipelines.acquisition.modbus.line import Line, lines_of
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.rig.listening import _tls_context
@@ -308,7 +309,7 @@ def test_a_serial_port_that_another_program_uses_is_not_shared(serve, on_line, l
 
 def test_a_serial_port_without_permission_says_how_to_get_it():
     # As root, who may everything, tests cannot meet the real thing.
-    assert "join its group" in _explained(serial.SerialException(errno.EACCES, "Permission denied"))
+    assert "join its group" in explain(serial.SerialException(errno.EACCES, "Permission denied"))
 
 
 def test_a_path_that_is_no_serial_port_is_refused(on_line, line_of, tmp_path):

@@ -44,8 +44,7 @@ def slowly(record):
 def test_a_rate_that_is_too_high_for_the_drives_is_refused_before_any_is_sent_anything(slowly):
     why, written = slowly(0.011, "drives", "exo_alone")
     assert (
-        "cycles in which every device was asked took longer than the 20 ms from one set-point to"
-        " the next" in why
+        "cycles with all devices took longer than the 20 ms from one set-point to the next" in why
     )
     assert why.endswith("lower acquire.sample_rate_hz, or close other programs; nothing was moved")
     assert not written

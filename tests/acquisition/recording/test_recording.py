@@ -18,8 +18,8 @@ from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.rig import ring
+from pipelines.rig.device import Drive
 from pipelines.rig.ring import Ring
-from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig

@@ -401,7 +401,7 @@ def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path,
             assert str(refused.value).startswith(
                 f"{killed}: the head of its {len(content)} bytes, which names the"
             )
-            assert "keep it, samples may be in it" in str(refused.value)
+            assert "keep it, it may hold samples" in str(refused.value)
             assert "delete" not in str(refused.value)
     assert killed.read_bytes() == content
 

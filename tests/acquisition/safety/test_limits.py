@@ -19,7 +19,7 @@ from pipelines.acquisition.safety.limits import HOLD_SAMPLES, Limits, refuse_lea
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
-from pipelines.rig.server import READ_WRITE, Drive, Sensor
+from pipelines.rig.device import READ_WRITE, Drive, Sensor
 from pipelines.rig.servo import Servo
 from pipelines.settings.rig import load_rig
 from tests.acquisition.journals import read_journal
