@@ -66,7 +66,7 @@ class Exchange:
         if tracker.sent_at == sent_at:
             self._supervisor.resume(joint, reading, now)
         else:  # it was sent a set-point meanwhile
-            self._supervisor.update_enabled(joint, reading)
+            self._supervisor.enable_states.update(joint, reading)
         return reading, now
 
     async def find_all(self) -> tuple[int, float]:
@@ -80,7 +80,7 @@ class Exchange:
         """Pass on a drive's reports that came next to what was awaited, or were asked again."""
         statuses = self.machine.drives[joint].statuses
         while statuses:
-            self._supervisor.update_enabled(joint, statuses.pop(0))
+            self._supervisor.enable_states.update(joint, statuses.pop(0))
 
     def sent_at(self, joint: int) -> float:
         """Return when a drive was sent something last, or is being sent it."""

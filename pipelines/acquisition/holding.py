@@ -49,7 +49,7 @@ class Holding:
                     return
             is_delayed = time.monotonic() - due > LOOK_PAUSE * period
             self._exchange.refuse_signals()
-            self._supervisor.refuse_after_abort()
+            self._supervisor.reason.refuse()
             if self._exchange.sent_at(joint) != sent_at:  # no drive is awaited for long
                 patience = SLACK_SAMPLES * period
             elif drive.device.awaited_s > period:  # it is the one that is awaited

@@ -75,7 +75,7 @@ class Loop:
         began_at = time.monotonic()
         while True:
             self._exchange.refuse_signals()
-            answers = await self._exchange.cycle(self._supervisor.rest_set_point)
+            answers = await self._exchange.cycle(self._supervisor.enabling.set_point)
             if row := self._supervisor.enabling.check(answers, time.monotonic() - began_at):
                 break
             # Else the records of meanwhile would be in the way once the leg moves.

@@ -13,12 +13,13 @@ from pymodbus.client.base import ModbusBaseClient
 
 from pipelines.acquisition import exchange as exchanges
 from pipelines.acquisition import holding, loop, pacing, progress, stopping
-from pipelines.acquisition.acquire import _finish, _record
+from pipelines.acquisition.acquire import record_run
 from pipelines.acquisition.loop import Loop
 from pipelines.acquisition.machine import drive, drive_protocol, force_sensor, machine
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.recording import journal
+from pipelines.acquisition.run_outcome import finish_run
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.states import State
 from pipelines.acquisition.uninterrupted import run_to_its_end
@@ -379,7 +380,7 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
     with _patched(simulated, time, run, plan, own) as report:
         try:
             run_to_its_end(
-                _record(
+                record_run(
                     supervisor,
                     settings,
                     trajectory,
@@ -392,7 +393,7 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
                 ),
                 supervisor.abort,
             )
-            run.result = _finish(path, path.with_suffix(".journal"), supervisor)
+            run.result = finish_run(path, path.with_suffix(".journal"), supervisor)
         except BaseException as error:
             run.result = error
     assert not time.hung, "the run hangs"

@@ -45,7 +45,7 @@ def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(
         signal.raise_signal(signal.SIGINT)
         write_recording(*given)
 
-    monkeypatch.setattr("pipelines.acquisition.acquire.write_recording", interrupted)
+    monkeypatch.setattr("pipelines.acquisition.run_outcome.write_recording", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record()
     assert [len(RECORDING.read(path).frame) for path in tmp_path.rglob("*.parquet")] == [200]

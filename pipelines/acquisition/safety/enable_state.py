@@ -1,10 +1,11 @@
-"""Whether a drive is enabled, by what it reports itself."""
+"""Whether the drives are enabled, by what each of them reports itself."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from pipelines.acquisition.machine.reading import DriveStatus, Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.errors import DeviceError
+from pipelines.settings.rig.devices import DriveSettings
 
 
 class EnableState:
@@ -12,7 +13,7 @@ class EnableState:
 
     def __init__(self, joint: str) -> None:
         """Watch the drive of a joint."""
-        self._joint = joint
+        self.joint = joint
         self.enabled: bool | None = None
         """The last report; None while the drive has made none."""
         self._has_dropped = False
@@ -21,7 +22,7 @@ class EnableState:
     def may_be_sent(self) -> bool:
         """Whether the drive may still be sent set-points in a stop.
 
-        A drive that reported a fault, or that it is no longer enabled, must not be told to enable
+        A drive that reported a fault, or that it is no longer enabled, must not be sent to enable
         with its leg anywhere.
         """
         return not self._has_dropped and self.enabled is not False
@@ -38,18 +39,41 @@ class EnableState:
         if status.fault or not dropped:
             return status.fault
         return (
-            f"drive {self._joint}: its status word says that it is no longer enabled; was the"
+            f"drive {self.joint}: its status word says that it is no longer enabled; was the"
             " emergency stop pressed?"
         )
 
 
-def update_all(states: Sequence[EnableState], samples: Row | Answers) -> None:
-    """Note every drive's report; refuse to go on where one has a fault or dropped out."""
-    pairs = zip(states, samples.drives, strict=True)
-    refuse_any([state.update(one) for state, one in pairs if isinstance(one, Reading)])
+class EnableStates:
+    """The enable states of all drives; a fault, or a drive that dropped out, ends the run."""
 
+    def __init__(self, drives: Sequence[DriveSettings]) -> None:
+        """Watch the drives of a rig."""
+        self._states = [EnableState(drive.joint) for drive in drives]
 
-def refuse_any(reasons: Sequence[str | None]) -> None:
-    """Raise DeviceError with the first reason that there is."""
-    for reason in filter(None, reasons):
-        raise DeviceError(reason)
+    def __getitem__(self, joint: int) -> EnableState:
+        return self._states[joint]
+
+    @property
+    def idle(self) -> list[str]:
+        """Joints whose drives report that they are not enabled."""
+        return [state.joint for state in self._states if state.enabled is False]
+
+    def update(self, joint: int, status: DriveStatus) -> None:
+        """Note one drive's report; raise DeviceError where it is a reason to stop."""
+        self._update([(joint, status)])
+
+    def update_all(self, samples: Row | Answers) -> None:
+        """Note the reports of samples; raise DeviceError where one is a reason to stop."""
+        answers = enumerate(samples.drives)
+        self._update((joint, one) for joint, one in answers if isinstance(one, Reading))
+
+    def update_records(self, records: Sequence[Sequence[Reading]]) -> None:
+        """Note the reports of records, by joint; raise DeviceError for a reason to stop."""
+        self._update((joint, one) for joint, samples in enumerate(records) for one in samples)
+
+    def _update(self, reports: Iterable[tuple[int, DriveStatus]]) -> None:
+        """Note every report, then raise the first reason to stop that there is."""
+        reasons = [self._states[joint].update(status) for joint, status in reports]
+        for reason in filter(None, reasons):
+            raise DeviceError(reason)

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 from pipelines.acquisition.machine.row import Answers, Row
-from pipelines.acquisition.safety.enable_state import EnableState, update_all
+from pipelines.acquisition.safety.enable_state import EnableStates
 from pipelines.acquisition.safety.sample_checks import SampleChecks
 from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
+from pipelines.acquisition.safety.stop_reason import StopReason
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings
 
@@ -22,12 +23,14 @@ class Enabling:
         rig: RigSettings,
         sample_rate_hz: float,
         trackers: Sequence[SetPointTracker],
-        enable_states: Sequence[EnableState],
+        enable_states: EnableStates,
         checks: SampleChecks,
+        reason: StopReason,
     ) -> None:
-        """Enable the drives that are tracked."""
+        """Enable the drives that are tracked, unless there is a reason to stop."""
         self._rig, self._rate = rig, sample_rate_hz
         self._trackers, self._enable_states, self._checks = trackers, enable_states, checks
+        self._reason = reason
         self._start: list[float] = []
         """Where the leg stood when the plan was made, (J,) rad."""
 
@@ -38,7 +41,13 @@ class Enabling:
             tracker.start_at(angle)
 
     def check_at_rest(self, row: Row) -> None:
-        """Refuse to enable drives whose leg has left the plan's start, or breaks a limit."""
+        """Refuse to enable drives whose leg has moved from the plan's start, or breaks a limit.
+
+        Raises
+        ------
+        DeviceError
+            Either is so, or a drive reports a fault.
+        """
         for tracker, angle in zip(self._trackers, row.angle, strict=True):
             drive, planned = tracker.drive, tracker.sent
             # The drive goes from where the leg stands to its first set-point within one sample.
@@ -47,27 +56,38 @@ class Enabling:
                     f"the {drive.joint} moved from {planned:.3f} to {angle:.3f} rad before its"
                     " drive was enabled; keep the leg still and start again"
                 )
-        update_all(self._enable_states, row)
+        self._enable_states.update_all(row)
         self._checks.check_limits(row)
 
     def set_point(self, joint: int, now: float) -> float:
-        """Return the set-point (rad) with which a drive is enabled: where the leg stands."""
+        """Return the set-point (rad) with which a drive is enabled: where the leg stands.
+
+        Raises
+        ------
+        DeviceError
+            The run is being stopped.
+        """
+        self._reason.refuse()
         return self._trackers[joint].follow(self._start[joint], 0.0, now)
 
     def check(self, answers: Answers, waited_s: float) -> Row | None:
         """Return the sample at which every drive reports that it is enabled; None until then.
 
-        Refuse to wait too long for it.
+        Raises
+        ------
+        Unanswered
+            A drive has not answered for longer than the watchdog waits.
+        DeviceError
+            A drive is not enabled after ``safety.control_s``, or a limit is broken.
         """
-        update_all(self._enable_states, answers)
+        self._enable_states.update_all(answers)
         silent = [answer for answer in answers.drives if isinstance(answer, Unanswered)]
         if silent and waited_s > self._rig.safety.watchdog_s:
             raise silent[0]
-        states = zip(self._rig.drive, self._enable_states, strict=True)
-        idle = [drive for drive, state in states if state.enabled is False]
+        idle = self._enable_states.idle
         if idle and waited_s > self._rig.safety.control_s:
             raise DeviceError(
-                f"drive {idle[0].joint}: was told to enable, but its status word does not say that"
+                f"drive {idle[0]}: was told to enable, but its status word does not say that"
                 f" it is after {self._rig.safety.control_s:g} s; see the drive's manual, correct"
                 " enabled_mask and enabled_value in the rig file, or raise safety.control_s there"
             )

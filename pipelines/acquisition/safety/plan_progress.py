@@ -4,50 +4,79 @@ The path is the plan's set-points after the place where the leg stood. What is s
 is latched is reached at the end of the next one.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.row import Row
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.safety.return_to_plan import Path
+from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
 from pipelines.acquisition.states import State
+from pipelines.errors import DeviceError
+
+LONGEST_RETURN_S = 5.0
+"""How long set-points may take to the end of their path once it is due."""
 
 
 class PlanProgress:
-    """The plan of a run, along the machine's cycles."""
+    """The plan of a run, along the machine's cycles; instants ``now`` are the host's clock, s."""
 
-    def __init__(self, plan: Plan, start: NDArray) -> None:
+    def __init__(self, plan: Plan, start: NDArray, rate_hz: float) -> None:
         """Follow a plan from where the leg stood when it was made, (J,) rad."""
-        self.plan, self.start = plan, start
-        self.first_cycle = 0
+        self._plan, self._start, self._rate_hz = plan, start, rate_hz
+        self._length = len(plan.reference)
+        self._first_cycle = 0
+        self.cycle, self.followed_at = 0, 0.0
+        """The cycle at which the plan was followed last, and when."""
+        self.has_advanced = True
+        """Whether that is another cycle than before: there is one step a cycle."""
 
-    @property
-    def length(self) -> int:
-        """Set-points of the plan."""
-        return len(self.plan.reference)
+    def begin(self, cycle: int, now: float) -> None:
+        """Begin to follow the plan at a cycle."""
+        self._first_cycle = self.cycle = cycle
+        self.followed_at = now
 
-    def due(self, joint: int, cycle: int) -> tuple[float, float, float]:
+    def advance(self, cycle: int, now: float) -> None:
+        """Go on to what is due at a cycle."""
+        self.has_advanced = cycle > self.cycle
+        self.cycle, self.followed_at = cycle, now
+
+    def due(self, joint: int, cycle: int) -> Path:
         """Return a joint's set-points due at a cycle and at the two before it, rad."""
-        now, before, earlier = (self.at(self._index(cycle - back)) for back in range(3))
+        now, before, earlier = (self._at(self._index(cycle - back)) for back in range(3))
         return float(now[joint]), float(before[joint]), float(earlier[joint])
 
     def state(self, cycle: int) -> State:
         """Return the state to which the set-point due at a cycle belongs."""
         index = self._index(cycle) - 1
-        if index < self.plan.first:
+        if index < self._plan.first:
             return State.RAMP
-        return State.RUN if index < self.plan.stop else State.RAMP_DOWN
+        return State.RUN if index < self._plan.stop else State.RAMP_DOWN
 
-    def cycles_past_end(self, row: Row) -> int:
-        """Return how many cycles a sample is past the end of the plan."""
-        return row.sequence - self.first_cycle - self.length
+    def is_finished(self, row: Row, trackers: Sequence[SetPointTracker]) -> bool:
+        """Return whether the set-points are at the end of the plan, but for a count.
 
-    def at(self, index: int) -> NDArray:
-        """Return the set-points (J,) rad of the path; its first is where the leg stood."""
-        return np.asarray(self.plan.reference[index - 1] if index else self.start)
+        Raises
+        ------
+        DeviceError
+            They are long overdue: more samples are lost than the way back makes up for.
+        """
+        cycles_past_end = row.sequence - self._first_cycle - self._length
+        if cycles_past_end > LONGEST_RETURN_S * self._rate_hz:
+            raise DeviceError(
+                f"the motion is {LONGEST_RETURN_S:g} s late and still not finished: too many"
+                " samples are lost; check the line, or whether one drive's sample counter runs"
+                " differently from the other's"
+            )
+        pairs = zip(trackers, self._at(self._length).tolist(), strict=True)
+        at_end = [abs(tracker.sent - angle) <= tracker.resolution for tracker, angle in pairs]
+        return cycles_past_end > 0 and all(at_end)
 
     def set_point(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; it may be outside the plan."""
-        return row.sequence - self.first_cycle - 2
+        return row.sequence - self._first_cycle - 2
 
     def sample(self, row: Row) -> int:
         """Return how many samples of its drives a row is after the beginning of the recording.
@@ -56,9 +85,13 @@ class PlanProgress:
         trajectory begins, half a cycle before the plan's first set-point is reached.
         """
         cycle = row.samples_per_cycle
-        reached = row.drives[0].sequence - (self.first_cycle + 2) * cycle
-        return reached - (self.plan.first - 1) * cycle - cycle // 2 - 1
+        reached = row.drives[0].sequence - (self._first_cycle + 2) * cycle
+        return reached - (self._plan.first - 1) * cycle - cycle // 2 - 1
+
+    def _at(self, index: int) -> NDArray:
+        """Return the set-points (J,) rad of the path; its first is where the leg stood."""
+        return np.asarray(self._plan.reference[index - 1] if index else self._start)
 
     def _index(self, cycle: int) -> int:
         """Return which set-point of the path is due at a cycle."""
-        return min(max(cycle - self.first_cycle, 0), self.length)
+        return min(max(cycle - self._first_cycle, 0), self._length)

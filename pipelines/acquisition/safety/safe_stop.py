@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.reading import Reading
-from pipelines.acquisition.safety.enable_state import EnableState, refuse_any
+from pipelines.acquisition.safety.enable_state import EnableStates
 from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 from pipelines.acquisition.safety.sample_checks import SampleChecks
 from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
@@ -20,7 +20,7 @@ class SafeStop:
         safety: SafetySettings,
         sample_rate_hz: float,
         trackers: Sequence[SetPointTracker],
-        enable_states: Sequence[EnableState],
+        enable_states: EnableStates,
         checks: SampleChecks,
     ) -> None:
         """Stop the drives that are tracked."""
@@ -59,7 +59,7 @@ class SafeStop:
         allowed = self._safety.following_error_rad + tracker.drive.speed_rad_s * late / self._rate
         self.pressing |= not abs(reading.torque) <= tracker.drive.torque_nm
         self.pressing |= not abs(error) <= allowed
-        refuse_any([self._enable_states[joint].update(reading)])
+        self._enable_states.update(joint, reading)
 
     def check_cuffs(self, forces: NDArray) -> None:
         """Check the cuff forces (4, 3) N."""

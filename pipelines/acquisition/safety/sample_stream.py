@@ -6,34 +6,24 @@ with the limits, between counter and clock, angle and velocity, a value and the 
 sent. An error that contradicts nothing passes; docs/faults.md says how large it can be.
 """
 
-from math import ceil, inf
+from math import ceil
 
 from pipelines.acquisition.machine.reading import Reading
-from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
+from pipelines.acquisition.safety.clock_check import ClockCheck
 from pipelines.acquisition.safety.limits import sample_violation
 from pipelines.acquisition.safety.set_point_history import SetPointHistory
-from pipelines.acquisition.safety.stuck_register import (
-    ANSWER_CYCLES,
-    STUCK_CYCLES,
-    STUCK_RAD,
-    StuckValue,
-)
+from pipelines.acquisition.safety.stuck_register import StuckRegisters
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import MOST_REGISTERS
 
-SETTLED_CYCLES = 50
-"""Cycles after which a clock's rate is looked at; a step of it can then be told from a wrong
-unit."""
 SPEED_SHARE = 0.25
 """How far a drive's speed may be from what its angle does in one sample, as a share of the speed
 limit."""
 ECHO_CYCLES = 8
 """Within how many cycles at the speed limit a drive's set-point must be of the one that was
 sent."""
-CHANGING = {"angle": "rad", "velocity": "rad/s", "current": "A"}
-"""Readings that change while a joint moves, with their units."""
 
 
 class SampleStream:
@@ -50,20 +40,20 @@ class SampleStream:
         self._watchdog = Watchdog(rig.safety.watchdog_s)
         self._most = self._cycle * (1 + ceil(rig.safety.watchdog_s * sample_rate_hz))
         self._history = history
-        self._held = {name: StuckValue() for name in CHANGING}
-        self._travel = 0.0
+        self._clock = ClockCheck(self._label, self._cycle, self._rate)
+        self._registers = StuckRegisters(self._label, self._cycle, self._rate, history)
         self._settle_s = rig.safety.settle_s
         self._left_out: tuple[int, int] | None = None
         """Samples between which the drive was sent nothing last: samples were missed, or set-points
         left out."""
-        self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
         self._unanswered: Unanswered | None = None
 
     def begin(self, reading: Reading, now: float) -> None:
         """Begin with a sample."""
-        self._first = self._last = reading
+        self._last = reading
+        self._clock.begin(reading)
         self._watchdog.reset(now)
 
     def miss(self, error: Unanswered) -> None:
@@ -119,56 +109,26 @@ class SampleStream:
         self._unanswered = None
         self.refuse_count(reading.sequence)
         before = self._last or reading
-        if self._first is None:
+        if self._last is None:
             self.begin(reading, now)
         elif reading.sequence == before.sequence:
             return False
         # One more or less than a cycle is the host's doing.
         if reading.sequence - before.sequence >= 2 * self._cycle:
             self.leave_out(before.sequence, reading.sequence)
-        checks = (self._clock, self._limit, self._step, self._leap, self._echo, self._frozen)
-        for check in checks:
+        for check in (
+            self._clock.check_rate,
+            self._limit,
+            self._clock.check_step,
+            self._leap,
+            self._echo,
+            self._registers.check,
+        ):
             if reason := check(before, reading):
                 raise DeviceError(reason)
         self._last = reading
         self._watchdog.reset(now)
         return True
-
-    def _settled(self, reading: Reading) -> int:
-        """Return how many samples the rate can be told from; 0 while they are too few."""
-        assert self._first is not None  # begun
-        samples = reading.sequence - self._first.sequence
-        return samples if samples >= SETTLED_CYCLES * self._cycle else 0
-
-    def _clock(self, before: Reading, reading: Reading) -> str | None:
-        """Check that the clock goes on at the rate; its unit may be another."""
-        if reading is not before and not reading.time > before.time:
-            return (
-                f"{self._label}: its clock went from {before.time:.6f} to {reading.time:.6f} s"
-                f" while its counter went from {before.sequence} to {reading.sequence}; was it"
-                " restarted?"
-            )
-        if not (samples := self._settled(reading)):
-            return None
-        assert self._first is not None  # begun
-        rate = samples / max(reading.time - self._first.time, 1e-9)
-        if abs(rate / self._rate - 1.0) <= RATE_TOLERANCE:
-            return None
-        return (
-            f"{self._label}: samples {rate:.4g} times a second by its own clock, expected"
-            f" {self._rate:g}; correct acquire.sample_rate_hz, or the unit of time in the rig file"
-        )
-
-    def _step(self, before: Reading, reading: Reading) -> str | None:
-        """Check the clock against the counter from one sample to the next."""
-        samples, seconds = reading.sequence - before.sequence, reading.time - before.time
-        if not self._settled(reading) or keeps_time(samples, seconds, self._rate):
-            return None
-        return (
-            f"{self._label}: its clock went on by {seconds:.6f} s while its counter went on by"
-            f" {samples} samples of {1 / self._rate:.6f} s; one of the two leapt: was it restarted,"
-            " or is its answer damaged?"
-        )
 
     def _leap(self, before: Reading, reading: Reading) -> str | None:
         """Check an angle against the one before it, the speed limit and the measured velocity."""
@@ -236,34 +196,3 @@ class SampleStream:
             f" {sent:.4f} rad; check the register of reference in the rig file, or what else writes"
             " to the drive"
         )
-
-    def _frozen(self, before: Reading, reading: Reading) -> str | None:
-        """Check that no register stands still while the joint is sent to move, and moves."""
-        sent_travel = self._history.at(reading.sequence - ANSWER_CYCLES * self._cycle).travel
-        self._travel += reading.velocity * (reading.sequence - before.sequence) / self._rate
-        for name, unit in CHANGING.items():
-            held = self._held[name]
-            value = getattr(reading, name)
-            held.update(value, reading.sequence, sent_travel, self._travel, reading.angle)
-            samples, sent = reading.sequence - held.since, sent_travel - held.sent_travel
-            if samples < STUCK_CYCLES * self._cycle or sent <= STUCK_RAD:
-                continue
-            seconds = samples / self._rate
-            # NaN: nothing else is known.
-            if not self._contradicted(name, held, reading, seconds) <= STUCK_RAD:
-                return (
-                    f"{self._label}: reports {name} {held.value:.6g} {unit} for {seconds:.3f} s,"
-                    f" while it was sent {sent:.3f} rad; its register is frozen, or the joint"
-                    " is blocked"
-                )
-        return None
-
-    def _contradicted(self, name: str, held: StuckValue, reading: Reading, seconds: float) -> float:
-        """Return by how much angle or velocity contradict a value that stood still, rad."""
-        if name == "angle":
-            return abs(self._travel - held.travel)
-        if name == "velocity" and reading.angle == held.angle and reading.velocity != 0.0:
-            return inf  # one that stands has no speed
-        if name == "velocity":
-            return abs(reading.angle - held.angle - reading.velocity * seconds)
-        return inf

@@ -1,5 +1,4 @@
-"""The set-points of one drive: the last one sent, how fast it moves, and how the next one may go
-on from it.
+"""The set-points of one drive: the last one sent, and how the next one may go on from it.
 
 A tracker neither waits nor sends. It refuses a set-point that no planned motion may ask for, and
 knows when a drive that was sent nothing for a while must be asked where it is.
@@ -41,21 +40,17 @@ class SetPointTracker:
         self.sent = 0.0
         """The last set-point; to begin with, where the leg stands."""
         self.base = 0.0
-        """Where the next set-point steps from: the last one, or where the drive is after a
-        silence."""
+        """Where the next one steps from: the last one, or where the drive is after a silence."""
         self.in_force = 0.0
-        """The set-point that is reached at the sample which is latched when the last one is
-        sent."""
+        """The set-point that is reached at the sample latched when the last one is sent."""
         self.sent_at = 0.0
         self.counter_lead = 0.0
-        """Samples by which the drive's counter is ahead of the machine's cycles when its set-points
-        come."""
+        """Samples by which the drive's counter leads the machine's cycles as set-points come."""
         self._speed = 0.0
         """rad/s at which set-points move: a stop slows down from there, the way back to the plan
         begins there."""
         self._drift_speed = 0.0
-        """rad/s at which the drive may go on by itself: as its last set-point did from the one
-        before."""
+        """rad/s at which the drive may go on by itself, as from its last two set-points."""
         self._answered_at = 0.0
         self._unanswered = 0
         """Set-points since the drive answered last."""
@@ -92,22 +87,19 @@ class SetPointTracker:
         return now - self._answered_at > SLACK_SAMPLES / self._rate
 
     def resume(self, reading: Reading, now: float) -> None:
-        """Go on from where the drive is after a silence: some drives hold meanwhile, others move
-        on."""
+        """Go on from where the drive is after a silence, in which some hold and others move on."""
         self.mark_answered(now)
-        silent_s = now - self.sent_at
+        silent_s, drift = now - self.sent_at, self._drift_speed
         if self._reports_reference:
             reach = self.drive.speed_rad_s * silent_s
             place = clamped(reading.reference, self.sent - reach, self.sent + reach)
         else:  # the leg lags behind a drive that holds, and is ahead with one that moves on
-            ahead = self.sent + self._drift_speed * silent_s
+            ahead = self.sent + drift * silent_s
             place = clamped(reading.angle, *sorted((self.sent, ahead)))
         speed = reading.velocity
         if isnan(speed):
             speed = (place - self.sent) / silent_s if silent_s else 0.0
-        moves_on = (place - self.sent) * self._drift_speed > self.resolution * abs(
-            self._drift_speed
-        )
+        moves_on = (place - self.sent) * drift > self.resolution * abs(drift)
         self.base = self.in_force = place
         self._speed = clamped(speed, *sorted((0.0, self._speed)))
         cycle = (reading.sequence - self.counter_lead) / self._samples_per_cycle
@@ -143,8 +135,7 @@ class SetPointTracker:
         return self.follow(*self._towards(path, cycle, now), now)
 
     def hold_to_plan(self, path: Path, cycle: int, now: float) -> float:
-        """Return the set-point towards the plan, as near as the limits allow, while others are
-        awaited."""
+        """Return the set-point towards the plan, within the limits, while others are awaited."""
         return self._send_limited(*self._towards(path, cycle, now), now)
 
     def slow_down(self, now: float) -> float:

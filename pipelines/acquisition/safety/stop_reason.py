@@ -31,6 +31,11 @@ class StopReason:
             if is_reported:
                 self.text = f"{self.text}; then {reason}"
 
+    def refuse(self) -> None:
+        """Raise DeviceError where there is a reason to stop."""
+        if self.text is not None:
+            raise DeviceError(self.text)
+
     def join(self, complaints: Sequence[str]) -> None:
         """Join all reasons, with ``complaints`` of drives that could not be disabled."""
         if self.text is not None:

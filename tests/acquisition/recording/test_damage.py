@@ -4,12 +4,12 @@ for right ones."""
 import numpy as np
 import pytest
 
-from pipelines.acquisition.acquire import _recorded
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.recording.journal import Journal
 from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
 from pipelines.acquisition.recording.recording import recording_path
 from pipelines.acquisition.recording.recover import recover
+from pipelines.acquisition.run_outcome import record_journal
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, InputError
@@ -176,7 +176,7 @@ def test_a_run_whose_journal_the_disk_damaged_reports_the_number_and_place_of_it
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
     text = why or "the run is complete"
     with locked(written.path) as lock, pytest.raises(DeviceError) as raised:
-        _recorded(output, lock, DeviceError, text, None)
+        record_journal(output, lock, DeviceError, text, None)
     place = recording_path(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
     state = (
         "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"

@@ -234,7 +234,7 @@ def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stoppe
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pipelines.acquisition.acquire.write_recording", full)
+    monkeypatch.setattr("pipelines.acquisition.run_outcome.write_recording", full)
     why = stopped(fault=After(300, freeze), watchdog_s=0.3, duration_s=3.0)
     journal = journal_of(tmp_path / "test.parquet")
     assert why.startswith("watchdog: no new sample from drive hip")

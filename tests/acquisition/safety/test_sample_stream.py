@@ -32,6 +32,10 @@ def hip():
     history = SetPointHistory()
     for number in range(BEGINS, BEGINS + 2000, 5):
         history.add(number, moved(number).angle)
+    return stream_of(history)
+
+
+def stream_of(history):
     return SampleStream(load_rig(datasets() / "rigs" / "recorder.toml"), 0, CYCLE_HZ, history)
 
 
@@ -153,28 +157,26 @@ def test_a_joint_that_sticks_to_its_friction_is_left_to_the_following_error(hip)
     assert all(take(hip, *sticking))
 
 
-def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not(hip):
+def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not():
     still = SetPointHistory()
     still.add(BEGINS, 0.0)
-    hip._history = still
     at_rest = [
         replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
         for k in range(500)
     ]
-    assert all(take(hip, *at_rest))
+    assert all(take(stream_of(still), *at_rest))
 
 
-def test_a_late_record_is_held_against_what_the_joint_was_told_then_and_not_since(hip):
+def test_a_late_record_is_held_against_what_the_joint_was_told_then_and_not_since():
     """The joint has moved on by then: that way is none that the record did not follow."""
     history = SetPointHistory()
     for number in range(BEGINS, BEGINS + 1000, 5):
         history.add(number, 0.0 if number < BEGINS + 500 else 0.3)
-    hip._history = history
     at_rest = [
         replace(moved(BEGINS), sequence=BEGINS + k, time=7.0 + k / RATE_HZ, velocity=0.0)
         for k in range(490)
     ]
-    assert all(take(hip, *at_rest))
+    assert all(take(stream_of(history), *at_rest))
 
 
 def test_a_record_that_stands_still_while_the_counter_goes_on_ends_the_run(hip):

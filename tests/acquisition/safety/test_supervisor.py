@@ -12,7 +12,7 @@ from pipelines.acquisition.machine.reading import DriveStatus, Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.supervisor import Supervisor
-from pipelines.acquisition.states import TRANSITIONS, State
+from pipelines.acquisition.states import FOLLOWING, TRANSITIONS, Conditions, State, check_guard
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
@@ -72,7 +72,7 @@ def row(sequence, angle=0.0):
 
 def enable(supervisor):
     for joint in range(2):
-        supervisor.rest_set_point(joint, 10.0)
+        supervisor.enabling.set_point(joint, 10.0)
 
 
 def step(supervisor, found, now):
@@ -124,6 +124,24 @@ def test_the_drive_that_is_silent_for_too_long_is_named_though_the_other_one_ans
 def test_a_state_cannot_be_skipped(supervisor):
     with pytest.raises(AssertionError, match="there is no way from check to run"):
         supervisor._go(State.RUN)
+
+
+@pytest.mark.parametrize(
+    ("state", "following", "closed"),
+    [
+        (State.CHECK, State.RAMP, {"all_enabled": False}),
+        (State.RAMP, State.RUN, {"due": State.RAMP}),
+        (State.RUN, State.RAMP_DOWN, {"due": State.RUN}),
+        (State.RAMP_DOWN, State.DISABLED, {"all_disabled": False}),
+        (State.ABORT, State.DISABLED, {"all_disabled": False}),
+        *((state, State.ABORT, {"reason": None}) for state in (State.CHECK, *FOLLOWING)),
+    ],
+)
+def test_a_state_is_entered_only_under_its_condition(state, following, closed):
+    met = Conditions(due=State.RAMP_DOWN, all_enabled=True, all_disabled=True, reason="lost")
+    check_guard(state, following, met)
+    with pytest.raises(AssertionError, match=f"the way from {state} to {following} is closed"):
+        check_guard(state, following, replace(met, **closed))
 
 
 def test_after_an_abort_no_set_point_of_the_plan_follows_and_the_first_reason_stays(supervisor):
@@ -363,10 +381,10 @@ def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_i
 ):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    supervisor.update_enabled(0, DriveStatus(enabled=True))
+    supervisor.enable_states.update(0, DriveStatus(enabled=True))
     with pytest.raises(DeviceError, match=r"is no longer enabled|overheated"):
-        supervisor.update_enabled(0, DriveStatus(**word))
-    supervisor.update_enabled(0, DriveStatus(enabled=True))
+        supervisor.enable_states.update(0, DriveStatus(**word))
+    supervisor.enable_states.update(0, DriveStatus(enabled=True))
     assert supervisor.safe_stop.set_point(0, 10.2) is None
 
 
