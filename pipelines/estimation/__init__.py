@@ -1,1 +1,1 @@
-"""Least squares on regressors, with intervals that survive autocorrelated residuals."""
+"""Estimate parameters from regressors, with intervals valid for autocorrelated residuals."""

@@ -1,10 +1,8 @@
-"""Noise of the angles: accelerations that no torque goes with let every fit take the machine for
-too light.
+"""Detect noise of the angles, which biases the inertia of every fit towards zero.
 
-Where the motion nearly cancels what its torques would be, as in a free swing, little noise is
-enough. What the angles hold above a low cut-off is either motion, which takes torque, or noise,
-which takes none: so the torque that the slow motion's fit foretells from that part alone is held
-against the torque that was measured.
+Little noise suffices if the motion nearly cancels its torques, as a free swing does. Angles above a
+low cut-off are either motion, which needs torque, or noise, which needs none. So the torque that
+the slow motion's fit predicts from the fast part alone is compared with the measured torque.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,21 +17,24 @@ from pipelines.mechanics.slow_motion import below, edge
 from pipelines.model import Model, ParameterLayout, baseline
 
 CUTOFF_HZ = 5.0
+"""Frequency that separates slow from fast motion."""
 LOOKED_S = 600.0
-"""How much of a run that is read piece by piece is looked at: encoders shake as much in ten minutes
-as in a day."""
+"""Length of a run that is examined if it is read piece by piece; encoder noise does not change with
+time."""
 REAL = 0.5
-"""Share of the foretold torque that must be measured: 1 where the fast part is motion, 0 where it
-is noise."""
+"""Least share of the predicted torque that must be measured: it is 1 if the fast part is motion, 0
+if it is noise."""
 LOUD = 1.0
-"""Times by which noise must outdo, rms, all that the slow motion's fit leaves: being less than half
-of the error's power, it biases little."""
-IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles hold accelerations that no torque goes with: noise"
+"""Least ratio of the noise torque to the slow fit's residual, rms. Less is under half of the
+error's power, and biases little."""
+IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles are mostly noise"
 
 
 def is_loud(runs: Sequence[Run]) -> bool:
-    """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a
-    fit leaves."""
+    """Return whether noise of the angles exceeds the residual of the slow motion's fit.
+
+    One joint suffices.
+    """
     effects = baseline(runs[0].machine, kinds_of(runs))
     model, layout = Model.of(effects), ParameterLayout.of(effects)
     body = layout.bodies.ravel()
@@ -46,8 +47,7 @@ def is_loud(runs: Sequence[Run]) -> bool:
 
 
 def _beginning(run: Run) -> Iterator[Piece]:
-    """Yield a run's pieces, with what the filters need to both sides, until enough of it was looked
-    at."""
+    """Yield a run's pieces, with margins for the filters, until enough of it was examined."""
     rate, seen = run.sample_rate_hz, 0
     for piece in run.pieces(edge(rate, CUTOFF_HZ) + padding(run) + block_average(run).decimation):
         yield piece
@@ -57,8 +57,10 @@ def _beginning(run: Run) -> Iterator[Piece]:
 
 
 def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
-    """Return the Gram matrix of each joint, (J, c, c): the slow motion's columns, the bodies' fast
-    part, the torque."""
+    """Return the Gram matrix of each joint, (J, c, c).
+
+    Its columns are those of the slow motion, the bodies' fast part, and the torque.
+    """
     fast = regress(piece, model)
     slow = regress(piece._replace(motion=below(piece.motion, CUTOFF_HZ)), model)
     usable = fast.usable & slow.valid[:, np.newaxis]
@@ -71,11 +73,10 @@ def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
 
 
 def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
-    """Fit the slow motion, p columns, and hold what it foretells of the fast part against what was
-    measured of it."""
+    """Fit the slow motion, p columns, and compare predicted and measured fast torque."""
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]
-    # A joint whose torque is nought all along tells nothing; what fits it refuses it.
+    # A joint whose torque is always zero has no weight here; the fit itself refuses it.
     weights = np.divide(1.0, torque, out=np.zeros_like(torque), where=torque > 0.0)
     normal, right = np.einsum("j,jik->ik", weights, slow), weights @ gram[:, :p, -1]
     size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))

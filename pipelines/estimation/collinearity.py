@@ -1,4 +1,7 @@
-"""Which parameters a motion cannot tell apart, in words (Belsley, Kuh and Welsch, 1980, ch. 3)."""
+"""Name the parameters that a motion does not separate.
+
+Source: Belsley, Kuh and Welsch (1980), Regression Diagnostics, ch. 3.
+"""
 
 from collections.abc import Sequence
 
@@ -9,7 +12,7 @@ WEAK = 10.0
 STRONG = 30.0
 """Condition indices at which Belsley calls a dependence weak, and strong."""
 SHARE = 0.5
-"""Of a parameter's variance that a dependence must hold to involve it."""
+"""Share of a parameter's variance above which a dependence involves it."""
 
 
 def scaled_gram(gram: NDArray) -> NDArray:
@@ -19,10 +22,20 @@ def scaled_gram(gram: NDArray) -> NDArray:
 
 
 def profiled(gram: NDArray, others: NDArray) -> NDArray:
-    """Return what A'A, (p, p), tells of some parameters where the ``others``, indices (k,), are
-    unknown as well.
+    """Return the information on some parameters if the others are unknown as well.
 
-    It is the Schur complement of the others' block, (p - k, p - k).
+    It is the Schur complement of the others' block in A'A.
+
+    Parameters
+    ----------
+    gram : (p, p) array
+        A'A.
+    others : (k,) int array
+        Indices of the other parameters.
+
+    Returns
+    -------
+    (p - k, p - k) array
     """
     kept = np.setdiff1d(np.arange(len(gram)), others)
     across = gram[np.ix_(kept, others)]
@@ -32,9 +45,14 @@ def profiled(gram: NDArray, others: NDArray) -> NDArray:
 
 
 def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
-    """Say which groups of parameters the data hardly separate; empty when all are well apart.
+    """Describe the groups of parameters that the data hardly separate; empty if there are none.
 
-    ``gram`` is the weighted A'A, (p, p).
+    Parameters
+    ----------
+    gram : (p, p) array
+        Weighted A'A.
+    names : sequence of str
+        Names of the p parameters.
     """
     eigenvalues, vectors = np.linalg.eigh(scaled_gram(gram))
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
@@ -48,14 +66,13 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
             how = "hardly separates" if index[k] > STRONG else "separates only weakly"
             sentences.append(
                 f"this motion {how} {_listed(involved)} (condition index {index[k]:.0f}): "
-                "an error in one is made up by the others"
+                "the others compensate for an error in one"
             )
     return sentences
 
 
 def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
-    """Return the parameters that the least determined combination of a scaled A'A, (p, p),
-    mixes."""
+    """Return the parameters in the least determined combination of a scaled A'A, (p, p)."""
     _, vectors = np.linalg.eigh(scaled)
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]

@@ -1,10 +1,9 @@
-"""The rows of a regression in as few as there are columns, from which every fit with one weight a
-joint follows.
+"""Compress the rows of a regression to as few as it has columns.
 
-Rows that come piece by piece are compressed as they pass (Golub and Van Loan, Matrix Computations,
-5.3; the triangles of pieces are stacked and made one triangle again, as in Demmel et al., 2012,
-SIAM J. Sci. Comput. 34(1)): residuals of any fit have the same square sum in both, and no digits
-are lost to squaring.
+Every fit with one weight per joint follows from the compressed rows: the residuals of any fit have
+the same sum of squares in both, and no digits are lost by squaring. Rows that arrive piece by piece
+are compressed as they pass (Golub and Van Loan, Matrix Computations, 5.3): triangles of pieces are
+stacked and made one triangle again, as in Demmel et al. (2012), SIAM J. Sci. Comput. 34(1).
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,23 +18,29 @@ from pipelines.estimation.regression import Regression
 
 @dataclass(frozen=True)
 class Compressed:
-    """All usable rows of some runs in few, r for each of J joints: ``torque = regressor @
-    parameters + noise``."""
+    """Usable rows of some runs, r per joint: ``torque = regressor @ parameters + noise``."""
 
     regressor: NDArray
-    """(J, r, p)."""
+    """(J, r, p) N·m per unit."""
     torque: NDArray
     """(J, r) N·m."""
     count: NDArray
-    """(J,) how many rows there were."""
+    """(J,) number of rows before compression."""
 
     def select(self, columns: NDArray) -> "Compressed":
         """Return the regression on some of the parameters, (k,) columns."""
         return replace(self, regressor=self.regressor[:, :, columns])
 
     def with_held(self, columns: NDArray, values: NDArray) -> "Compressed":
-        """Return the same rows, less the torque of parameters, (k,) columns, whose values (k,) are
-        known."""
+        """Return the same rows without the torque of some parameters.
+
+        Parameters
+        ----------
+        columns : (k,) int array
+            Columns whose values are known.
+        values : (k,) array
+            Their values.
+        """
         return replace(self, torque=self.torque - self.regressor[:, :, columns] @ values)
 
 
@@ -51,7 +56,7 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
                 : rows.shape[2]
             ]
         count = count + r.usable.sum(axis=0)
-    # Few usable rows make fewer rows than columns; zeros say nothing, and all joints have as many.
+    # A joint with few usable rows has fewer than there are columns; zeros fill them up.
     width = triangles[0].shape[1]
     stacked = np.stack([np.pad(t, ((0, width - len(t)), (0, 0))) for t in triangles])
     return Compressed(stacked[:, :, :-1], stacked[:, :, -1], np.asarray(count))
@@ -67,12 +72,35 @@ def together(parts: Sequence[Compressed]) -> Compressed:
 
 
 def normal_equations(rows: Compressed, weights: NDArray) -> tuple[NDArray, NDArray]:
-    """Return A'WA (p, p) and A'W tau (p,) over all usable rows."""
+    """Return the normal equations over all usable rows.
+
+    Parameters
+    ----------
+    rows : Compressed
+        Rows of J joints on p columns.
+    weights : (J,) array
+        Weight of each joint.
+
+    Returns
+    -------
+    gram : (p, p) array
+        A'WA.
+    right : (p,) array
+        A'W tau.
+    """
     gram = np.einsum("j,jri,jrk->ik", weights, rows.regressor, rows.regressor)
     return gram, np.einsum("j,jri,jr->i", weights, rows.regressor, rows.torque)
 
 
 def residual_rms(rows: Compressed, values: NDArray) -> NDArray:
-    """Return the root mean square residual of each joint over usable rows, (J,) N·m."""
+    """Return the root mean square residual of each joint over usable rows, (J,) N·m.
+
+    Parameters
+    ----------
+    rows : Compressed
+        Rows of J joints on p columns.
+    values : (p,) array
+        Parameters.
+    """
     residual = rows.torque - rows.regressor @ values
     return np.sqrt(np.sum(residual**2, axis=1) / np.maximum(rows.count, 1))

@@ -1,13 +1,12 @@
-"""The test of Durbin, Wu and Hausman: whether two estimators that agree on good data agree on
-these.
+"""The Durbin-Wu-Hausman test of whether two estimators agree.
 
-Least squares and instrumental variables have the same limit unless what stands in the regressor,
-the angles, goes with what the fit leaves: noise in the angles. Their difference over its own
-covariance then is no larger than chance (Hausman, 1978, Econometrica 46(6); for robots Janot,
-Vandanjon and Gautier, 2014, Proc. ICRA). That covariance is the long-run one of the difference of
-both influence functions, so autocorrelated noise raises no alarm; what it is uncertain itself is
-allowed for as in Hotelling's T². Where it is nearly singular, only those combinations of parameters
-are judged in which the estimators can differ, as with Hausman's generalized inverse.
+Least squares and instrumental variables have the same limit unless the regressor correlates with
+the residual, as it does with noise in the angles. If they have, their difference over its own
+covariance is no larger than chance (Hausman, 1978, Econometrica 46(6); for robots Janot, Vandanjon
+and Gautier, 2014, Proc. ICRA). That covariance is the long-run one of the difference of both
+influence functions, so autocorrelated noise raises no alarm; its own uncertainty is allowed for as
+in Hotelling's T². Where it is nearly singular, only those combinations of parameters are tested in
+which the estimators can differ, as with Hausman's generalized inverse.
 """
 
 from collections.abc import Hashable, Iterator
@@ -23,33 +22,32 @@ from pipelines.estimation.long_run import long_run_covariance
 
 LEVEL = 0.05
 FAINT = 0.1
-"""Variance, of a mean of 1 once each parameter is scaled by its error, below which a combination of
-parameters is not judged: so little differs there that errors of second order outdo it, which the
-covariance counts twice."""
+"""Variance below which a combination of parameters is not tested, where each parameter scaled by
+its error has a mean variance of 1. Below it, second-order errors exceed the difference, and the
+covariance counts them twice."""
 
 
 @dataclass(frozen=True)
 class DurbinWuHausman:
-    """How sure it is that two estimators differ."""
+    """Result of the test of whether two estimators differ."""
 
     difference: NDArray
     """(k,) the first's values less the second's."""
     std_error: NDArray
     """(k,) of the difference."""
     statistic: float
-    """F."""
+    """F statistic."""
     freedom: tuple[float, float]
     """Degrees of freedom of F."""
     p_value: float
 
     @property
     def rejects(self) -> bool:
-        """Tell whether the estimators differ by more than chance makes them in 19 of 20
-        sessions."""
+        """Whether the estimators differ at a significance level of 5 %."""
         return self.p_value < LEVEL
 
     def as_json(self) -> dict[str, Any]:
-        """Return what a file's metadata say of it."""
+        """Return the test for a file's metadata."""
         return {
             "statistic": self.statistic,
             "degrees_of_freedom": list(self.freedom),
@@ -60,7 +58,7 @@ class DurbinWuHausman:
 
 
 def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
-    """Compare two fits of the same parameters to the same rows."""
+    """Compare two fits of the same k parameters to the same rows."""
 
     def influences() -> Iterator[tuple[Hashable, NDArray]]:
         for (name, ours), (_, theirs) in zip(one.scores(), other.scores(), strict=True):

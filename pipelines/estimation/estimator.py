@@ -1,10 +1,10 @@
-"""The interface of an estimator: it makes the sum of scores zero, and says what scores.
+"""The interface of an estimator: values for which the sum of scores is zero.
 
 Every method here solves k equations in k parameters: the sum over all rows of a row's *score* is
-zero. For least squares a score is the row's column vector times its residual, for instrumental
-variables the instruments times it, and so on. Its covariance then follows from the scores alone and
-is computed in one place, ``estimated``: a sandwich H⁻¹ S H⁻ᵀ of how the sum changes with the
-parameters (H) and the scores' long-run covariance (S).
+zero. For least squares, a score is the row's column vector times its residual; for instrumental
+variables, it is the instruments times the residual. The covariance then follows from the scores
+alone, and is computed in one place, ``estimated``. It is a sandwich H⁻¹ S H⁻ᵀ of the scores'
+derivative with respect to the parameters (H) and the scores' long-run covariance (S).
 """
 
 from abc import ABC, abstractmethod
@@ -20,31 +20,31 @@ from pipelines.estimation.problem import Problem
 
 @dataclass(frozen=True)
 class Fit:
-    """What an estimator found: k fitted parameters of p."""
+    """The values of k fitted parameters, of p in the model, with their scores."""
 
     values: NDArray
-    """(k,)."""
+    """(k,) values in SI units."""
     normal: NDArray
-    """(k, k) weighted normal matrix, symmetric: what collinearity is read from."""
+    """(k, k) weighted normal matrix, symmetric; collinearity is computed from it."""
     sensitivity: NDArray
-    """(k, k) how the values answer to the sum of scores: H⁻¹."""
+    """(k, k) derivative of the values with respect to the sum of scores: H⁻¹."""
     carry: NDArray
-    """(k, p) how the values answer to those that are held; zero for the fitted ones."""
+    """(k, p) derivative of the values with respect to the held ones; zero for the fitted ones."""
     weights: NDArray
-    """(J,) of the joints: inverse variance of what is left there."""
+    """(J,) weight of each joint: inverse variance of its residual."""
     scores: Scores
     about: dict[str, Any] = field(default_factory=dict)
-    """What the method says of itself, for the file's metadata."""
+    """Details of the method, for the file's metadata."""
     remarks: tuple[str, ...] = ()
-    """What the user should know, a sentence each."""
+    """Remarks for the user, a sentence each."""
 
 
 @dataclass(frozen=True)
 class Estimate(Fit):
-    """A fit, and how far to trust it."""
+    """A fit with its covariance."""
 
     covariance: NDArray = field(kw_only=True)
-    """(k, k), the held values taken for certain."""
+    """(k, k), for held values without error."""
     critical: float = field(kw_only=True)
     """Half-width of a 95 % interval in standard errors."""
 
@@ -54,11 +54,11 @@ class Estimator(ABC):
 
     name: ClassVar[str]
     short: ClassVar[str] = ""
-    """What papers call it for short, where they do: ``--method`` takes that too."""
+    """Abbreviation in papers, if there is one; ``--method`` accepts it too."""
     title: ClassVar[str]
-    """In the words of a sentence."""
+    """Name in sentences."""
     masks: ClassVar[bool] = True
-    """Whether it leaves out samples near reversals, where not told otherwise."""
+    """Whether samples near reversals are left out by default."""
 
     @abstractmethod
     def fit(self, problem: Problem) -> Fit:
@@ -67,27 +67,41 @@ class Estimator(ABC):
         Raises
         ------
         NotIdentifiable
-            Where the motion cannot separate them.
+            If the motion does not separate them.
         InputError
-            Where the runs lack what the method needs.
+            If the runs lack data that the method needs.
         """
 
 
 def estimated(fit: Fit) -> Estimate:
-    """Return a fit with the covariance that its scores tell."""
+    """Return a fit with the covariance of its values."""
     S = long_run_covariance(fit.scores, len(fit.values))
     covariance = fit.sensitivity @ S.covariance @ fit.sensitivity.T
     return Estimate(**vars(fit), covariance=covariance, critical=S.critical)
 
 
 def distrust(settled: bool, after: str) -> tuple[str, ...]:
-    """Return what to say of a search that went on for so long: nothing where it settled."""
+    """Return a remark on a search that did not converge; empty if it did."""
     return () if settled else (f"did not settle in {after}; distrust its values",)
 
 
 def carry_of(problem: Problem, sensitivity: NDArray, slope: NDArray) -> NDArray:
-    """Return how fitted values answer to held ones, (k, p): the sum of scores falls by ``slope``
-    (k, p) per unit."""
+    """Return the derivative of fitted values with respect to held ones.
+
+    Parameters
+    ----------
+    problem : Problem
+        Which columns are fitted, and which are held.
+    sensitivity : (k, k) array
+        Derivative of the fitted values with respect to the sum of scores.
+    slope : (k, p) array
+        Decrease of the sum of scores per unit of each column.
+
+    Returns
+    -------
+    (k, p) array
+        Zero for the fitted columns.
+    """
     carry = np.zeros_like(slope)
     carry[:, problem.of_held] = -sensitivity @ slope[:, problem.of_held]
     return carry

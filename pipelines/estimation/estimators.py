@@ -1,6 +1,6 @@
-"""Every estimator exoid knows, in plain sight; docs/estimators.md compares them.
+"""Every estimator of exoid; docs/estimators.md compares them.
 
-Adding one is a file, a line here, and its name in ``[identify] method``.
+A new one needs a file, a line here, and its name in ``[identify] method``.
 """
 
 from pipelines.errors import InputError
@@ -23,13 +23,12 @@ ESTIMATORS: tuple[type[Estimator], ...] = (
 
 
 def estimator_named(name: str) -> Estimator:
-    """Look an estimator up by the name that exoid.toml uses, or by its short one, as ``--method``
-    may.
+    """Return the estimator of a name, as exoid.toml and ``--method`` spell it, or of a short name.
 
     Raises
     ------
     InputError
-        Where there is none of this name.
+        If no estimator has this name.
     """
     known = {
         name: estimator

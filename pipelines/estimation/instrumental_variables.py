@@ -1,9 +1,9 @@
-"""Instrumental variables (IDIM-IV): unbiased where noise in the angles biases least squares.
+"""Instrumental variables (IDIM-IV): no bias from noise in the angles.
 
-What stands in a least-squares regressor is measured: noise in angles, and more so in their
-derivatives, goes with the residual and pulls the parameters down. Instruments have the motion's
-shape and no noise: the regressor along the motion that the model itself makes of the references, in
-closed loop. Values and instruments are computed in turn until they rest (Janot, Vandanjon and
+The regressor of least squares is measured. Noise in the angles, and more so in their derivatives,
+correlates with the residual and biases the parameters towards zero. Instruments have the shape of
+the motion and no noise: they are the regressor along a closed-loop simulation of the model on the
+references. Values and instruments are computed in turn until they converge (Janot, Vandanjon and
 Gautier, 2014, IEEE Trans. Control Systems Technology 22(1); Young, 2011, Recursive Estimation and
 Time-Series Analysis, 6-7). The simulation need not be right, only free of the noise.
 """
@@ -26,21 +26,20 @@ from pipelines.estimation.regression import Regression, by_segment, residual_of
 
 ITERATIONS = 20
 SETTLED = 0.01
-"""Largest change of a value, in standard errors of independent blocks, at which iterations end."""
+"""Largest change of a value at convergence, in standard errors of independent blocks."""
 
 SLIGHT = 0.1
-"""Of the half-width of a parameter's 95 % interval, so a twentieth of the interval, within which a
-bias does not matter: the two estimates share their noise, so the test sees much less, but the
-interval about either still covers the truth 94.5 times of 100."""
+"""Share of the half-width of a parameter's 95 % interval within which a bias does not matter. The
+two estimates share their noise, so the test detects much less; yet the interval about either still
+covers the truth 94.5 times of 100."""
 
 SLIGHT_SHARE = 0.001
-"""Of a parameter itself, likewise: no scale of a torque is known any better, however long the
-recording."""
+"""Share of a parameter within which a bias does not matter: no torque scale is known any better,
+however long the recording."""
 
 
 class InstrumentalVariables(Estimator):
-    """Instruments from the closed-loop simulation of the identified model; whole runs are held in
-    memory."""
+    """Instruments from a closed-loop simulation of the model; whole runs are held in memory."""
 
     name = "instrumental_variables"
     short = "iv"
@@ -62,8 +61,7 @@ class InstrumentalVariables(Estimator):
             values = solution.values
             if change.max() < SETTLED:
                 break
-        # On the same rows by the same weights: they would differ by what one of them leaves out,
-        # too.
+        # Both use the same rows and weights, so that only the instruments differ.
         itself = [replace(r, instruments=r.measured.regressor) for r in rows]
         test = durbin_wu_hausman(_solved(problem, itself, solution.weights), solution)
         settled = bool(change.max() < SETTLED)
@@ -104,7 +102,7 @@ def _solved(problem: Problem, rows: Sequence[_Rows], weights: NDArray) -> Fit:
         slope += np.einsum("mj,mjk,mjp->kp", W, Z, r.measured.regressor, optimize=True)
         normal += np.einsum("mj,mjk,mjl->kl", W, Z, Z, optimize=True)
         right += np.einsum("mj,mjk,mj->k", W, Z, r.measured.torque, optimize=True)
-    inverse(normal, problem.names)  # refuses instruments that do not separate the parameters
+    inverse(normal, problem.names)  # Raises if the instruments do not separate the parameters.
     sensitivity = np.linalg.inv(slope[:, problem.fitted])
     held = problem.of_held
     values = sensitivity @ (right - slope[:, held] @ problem.held[held])
@@ -166,8 +164,7 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
 
 
 def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
-    """Tell of each parameter whether least squares is off by enough for anybody to mind, (k,)
-    bool."""
+    """Return which parameters' bias in least squares is large enough to matter, (k,) bool."""
     estimate = estimated(fit)
     reach = estimate.critical * np.sqrt(np.diag(estimate.covariance))
     off = np.abs(test.difference)

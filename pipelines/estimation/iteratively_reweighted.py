@@ -1,11 +1,10 @@
-"""Iteratively reweighted least squares: blocks far off count less, and those farthest off not at
-all.
+"""Iteratively reweighted least squares: outlying blocks count less, and the farthest not at all.
 
-An M-estimate after Huber (1964, Ann. Math. Statist. 35(1)) and Beaton and Tukey (1974,
-Technometrics 16(2)), in the order of Yohai's MM-estimate (1987, Ann. Statist. 15(2)): Huber's
-convex weights with each joint's scale, the median absolute residual, until both rest; then Tukey's
-bisquare with that scale. On Gaussian noise it needs 5 % more data than least squares for equal
-intervals.
+An M-estimate after Huber (1964), Ann. Math. Statist. 35(1), and Beaton and Tukey (1974),
+Technometrics 16(2), in the order of Yohai's MM-estimate (1987), Ann. Statist. 15(2). First come
+Huber's convex weights with each joint's scale, the median absolute residual, until both converge;
+then Tukey's bisquare with that scale. On Gaussian noise it needs 5 % more data than least squares
+for equal intervals.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -24,23 +23,23 @@ from pipelines.estimation.regression import by_segment, residual_of
 
 HUBER = 1.345
 BISQUARE = 4.685
-"""Standard deviations where the weights begin to fall, and where they end: 95 % efficiency on
-Gaussian noise."""
+"""Standard deviations at which Huber's weights begin to fall, and at which Tukey's are zero: 95 %
+efficiency on Gaussian noise."""
 MAD = 1.4826
 """Standard deviation of Gaussian noise over its median absolute value."""
 ITERATIONS = 50
 SETTLED = 1e-3
-"""Largest change of a value, in standard errors of independent blocks, at which iterations end."""
+"""Largest change of a value at convergence, in standard errors of independent blocks."""
 WORTH_SAYING = 1e-3
-"""Share of blocks that count for nothing from which on the user is told."""
+"""Share of rejected blocks above which the user is informed."""
 
 
 @dataclass(frozen=True)
 class Loss:
-    """How much a residual of ``u`` standard deviations counts."""
+    """A robust loss of a residual of ``u`` standard deviations."""
 
     weight: Callable[[NDArray], NDArray]
-    """Over that of a small one."""
+    """Weight over that of a small residual."""
     slope: Callable[[NDArray], NDArray]
     """Derivative of u times the weight."""
 
@@ -59,22 +58,22 @@ Bisquare = Loss(
 
 @dataclass(frozen=True)
 class Sums:
-    """What one passage through the rows leaves."""
+    """Sums of one pass over the rows."""
 
     normal: NDArray
     """(p, p) sum of weighted outer products of the columns."""
     slope: NDArray
-    """(p, p) the same with the loss's slope for weight."""
+    """(p, p) the same, weighted by the loss's slope."""
     right: NDArray
     """(p,) sum of weighted columns times torque."""
     scale: NDArray
     """(J,) N·m, 1.48 times the median absolute residual."""
     rejected: NDArray
-    """(J,) share of usable blocks that count for nothing."""
+    """(J,) share of usable blocks with zero weight."""
 
 
 class IterativelyReweighted(Estimator):
-    """Huber's weights, then Tukey's bisquare, a scale for each joint."""
+    """Huber's weights, then Tukey's bisquare, with a scale for each joint."""
 
     name = "iteratively_reweighted"
     short = "irls"
@@ -112,14 +111,14 @@ class IterativelyReweighted(Estimator):
 def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(
         f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard"
-        " deviations off and count for nothing"
+        " deviations off and are ignored"
         for joint, share in shares.items()
         if share > WORTH_SAYING
     )
 
 
 class _Iterated(NamedTuple):
-    """Where the iteration ended."""
+    """The values at the end of an iteration."""
 
     values: NDArray
     """(k,)."""
@@ -130,7 +129,7 @@ class _Iterated(NamedTuple):
 
 
 def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> _Iterated:
-    """Fit and weigh in turn until the values rest; the bisquare's scale is held."""
+    """Fit and weight in turn until the values converge; the bisquare's scale is held."""
     free, held = problem.fitted, problem.of_held
     for iteration in range(1, ITERATIONS + 1):
         sums = _sums(problem, values, scale, loss)

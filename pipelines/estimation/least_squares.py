@@ -1,8 +1,7 @@
-"""Ordinary and weighted least squares: each joint's weight is the inverse of its residual's
-variance.
+"""Ordinary and weighted least squares; a joint's weight is the inverse variance of its residual.
 
-Gautier and Khalil (1992, Int. J. Robotics Research 11(4)) and, for the weights, Gautier (1997,
-Proc. ICRA). The first answer to give, and the cheapest: the runs are gone through once, and twice
+Sources: Gautier and Khalil (1992), Int. J. Robotics Research 11(4); for the weights, Gautier
+(1997), Proc. ICRA. This is the cheapest method: it reads the runs once for the values, and twice
 more for the covariance.
 """
 
@@ -19,13 +18,13 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
 
 PASSES = 3
-"""Of reweighting."""
+"""Number of times that the joints are weighted again."""
 LEAST_NM = 1e-6
-"""A perfect fit would weigh infinitely; below a micronewton-metre there is nothing to balance."""
+"""Least residual of a joint for its weight, N·m; a perfect fit would have infinite weight."""
 
 
 class WeightedLeastSquares(Estimator):
-    """Joints weighed by the inverse variance of what the fit leaves at them."""
+    """Least squares with joints weighted by the inverse variance of their residuals."""
 
     name = "weighted_least_squares"
     short = "wls"
@@ -61,7 +60,7 @@ class WeightedLeastSquares(Estimator):
 
 
 class OrdinaryLeastSquares(WeightedLeastSquares):
-    """All joints weigh alike, whatever their noise."""
+    """Least squares with equal weights for all joints, whatever their noise."""
 
     name = "ordinary_least_squares"
     short = "ols"
@@ -70,8 +69,22 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
 
 
 def scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
-    """Return what every block adds to the normal equations' residual, (m, k); values (k,), joints'
-    weights (J,)."""
+    """Return the scores of least squares: each block's part of the normal equations' residual.
+
+    Parameters
+    ----------
+    problem : Problem
+        Which rows and columns are fitted.
+    values : (k,) array
+        Fitted values.
+    weights : (J,) array
+        Weight of each joint, 1/(N·m)².
+
+    Returns
+    -------
+    Scores
+        Pieces of (m, k) scores.
+    """
     every = problem.completed(values)
 
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:

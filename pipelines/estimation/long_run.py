@@ -1,10 +1,9 @@
-"""The covariance of a sum of autocorrelated scores, which come piece by piece.
+"""The covariance of a sum of autocorrelated scores, which arrive piece by piece.
 
-Residuals of a moving leg are autocorrelated, and the textbook covariance, which takes every sample
-for news, then covers the truth 27 % of the time instead of 95 %. Here it is the long-run covariance
-of the scores (Newey and West, 1987, Econometrica 55(3); lag chosen after Andrews, 1991,
-Econometrica 59(3)); critical values allow for the lag's length (Kiefer and Vogelsang, 2005,
-Econometric Theory 21(6)).
+Residuals of a moving leg are autocorrelated. The textbook covariance assumes independent samples,
+and covers the truth 27 % of the time instead of 95 %. Here it is the long-run covariance of the
+scores (Newey and West, 1987, Econometrica 55(3); lag after Andrews, 1991, Econometrica 59(3)).
+Critical values allow for the lag's length (Kiefer and Vogelsang, 2005, Econometric Theory 21(6)).
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -14,31 +13,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 Scores = Callable[[], Iterable[tuple[Hashable, NDArray]]]
-"""Goes through the scores from the first on each time it is called: an unbroken stretch's name and
-its next scores (m, p). What follows under the same name goes on where it ended."""
+"""Iterates over the scores from the first on each time it is called: the name of an unbroken
+stretch and its next scores (m, p). Scores of the same name continue the stretch."""
 
 
 class LongRun(NamedTuple):
-    """The covariance of a sum of scores, and how well it is known."""
+    """The covariance of a sum of scores, and its accuracy."""
 
     covariance: NDArray
     """(p, p)."""
     critical: float
     """Half-width of a 95 % interval in standard errors."""
     freedom: float
-    """Of a variance that is estimated so well: 3 / (2 b), b the lag's share of the rows (Priestley,
-    1981, 6.2.4)."""
+    """Degrees of freedom of a variance estimated as accurately: 3 / (2 b), where b is the lag's
+    share of the rows (Priestley, 1981, 6.2.4)."""
 
 
 def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
-    """Sum the scores' autocovariances with Bartlett weights; nothing is multiplied across a gap.
+    """Sum the scores' autocovariances with Bartlett weights, without products across gaps.
 
     Parameters
     ----------
     scores : callable
-        Of pieces (m, p); gone through twice: for the lag, and for the sum.
+        Yields pieces of (m, p) scores. It is called twice: for the lag, and for the sum.
     parameters : int
-        Fitted parameters, for the loss of degrees of freedom.
+        Number of fitted parameters, for the loss of degrees of freedom.
+
+    Returns
+    -------
+    LongRun
+        With a covariance of (p, p).
     """
     lag, total = _lag(scores)
     S = _bartlett(scores, lag)
@@ -48,12 +52,11 @@ def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
 
 
 def _bartlett(scores: Scores, lag: int) -> NDArray:
-    """Return the sum of s_t s_u' (1 - |t - u| / (lag + 1)) over all t and u of a stretch no more
-    than ``lag`` apart.
+    """Return the sum of s_t s_u' (1 - |t - u| / (lag + 1)) over all pairs up to ``lag`` apart.
 
-    It is the mean square of running sums over lag + 1 scores, zeros before and after the stretch:
-    each product stands in as many of them as its weight says. That takes one step a score, whatever
-    the lag.
+    It is the mean square of running sums over lag + 1 scores, with zeros before and after each
+    stretch: a product occurs in as many of them as its weight requires. The cost is one step per
+    score, whatever the lag.
     """
     S: NDArray | float = 0.0
     for x in _led(scores, lag):
@@ -65,8 +68,7 @@ def _bartlett(scores: Scores, lag: int) -> NDArray:
 
 
 def _led(scores: Scores, lag: int) -> Iterator[NDArray]:
-    """Yield each piece behind the ``lag`` scores before it, and after a stretch's last as many
-    zeros."""
+    """Yield each piece after the ``lag`` scores before it, and zeros at the end of a stretch."""
     name, before = None, np.zeros((0, 0))
     for stretch, x in scores():
         silence = np.zeros((lag, x.shape[1]))
@@ -82,9 +84,9 @@ def _led(scores: Scores, lag: int) -> Iterator[NDArray]:
 
 
 def _lag(scores: Scores) -> tuple[int, int]:
-    """Return Andrews' lag for first-order autocorrelation, and how many rows there are.
+    """Return Andrews' lag for first-order autocorrelation, and the number of rows.
 
-    Each column weighs alike whatever its unit.
+    All columns have equal weight, whatever their units.
     """
     name, last = None, np.zeros((0, 0))
     total, together, earlier, later = 0, 0.0, 0.0, 0.0
@@ -101,7 +103,7 @@ def _lag(scores: Scores) -> tuple[int, int]:
         return 0, total
     power = np.asarray(earlier)[moved]
     rho = np.clip(np.asarray(together)[moved] / power, -0.97, 0.97)
-    # Of the innovations, over the score's own: scores have the units of their parameters.
+    # Variance of the innovations over that of the score, whose unit depends on its parameter.
     variance = (np.asarray(later)[moved] - 2.0 * rho * np.asarray(together)[moved]) / power + rho**2
     above = np.sum(4 * rho**2 * variance**2 / ((1 - rho) ** 6 * (1 + rho) ** 2))
     below = np.sum(variance**2 / (1 - rho) ** 4)

@@ -1,4 +1,4 @@
-"""The inverse of a normal matrix, refused where the motion leaves it singular."""
+"""Invert a normal matrix, and refuse a singular one."""
 
 from collections.abc import Sequence
 
@@ -9,23 +9,34 @@ from pipelines.errors import NotIdentifiable
 from pipelines.estimation.collinearity import worst_direction
 
 SINGULAR = 1e7
-"""Condition number of the scaled regressor beyond which rounding decides."""
+"""Condition number of the scaled regressor above which rounding errors decide."""
 
 
 def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
-    """Return the inverse of a normal matrix (p, p) whose columns have ``names``.
+    """Return the inverse of a normal matrix.
+
+    Parameters
+    ----------
+    gram : (p, p) array
+        Normal matrix.
+    names : sequence of str
+        Names of its columns, for the message.
+
+    Returns
+    -------
+    (p, p) array
 
     Raises
     ------
     NotIdentifiable
-        Where the motion does not separate the parameters; the message names them.
+        If the motion does not separate the parameters; the message names them.
     """
     size = np.sqrt(np.diag(gram))
     if not np.all(size > 0):
         silent = [name for name, s in zip(names, size, strict=True) if s == 0]
         raise NotIdentifiable(
-            f"the motion does not excite {', '.join(silent)} at all: their columns are zero on"
-            " every usable sample; move every joint, in both directions, faster than it sticks"
+            f"the motion does not excite {', '.join(silent)}: their columns are zero at every"
+            " usable sample. Move every joint in both directions, faster than it sticks"
         )
     scaled = gram / np.outer(size, size)
     eigenvalues = np.linalg.eigvalsh(scaled)
@@ -33,6 +44,6 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         mixed = worst_direction(scaled, names)
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
-            " others; excite more harmonics and both joints at once, or lengthen the run"
+            " others. Excite more harmonics and both joints at once, or lengthen the run"
         )
     return np.linalg.inv(scaled) / np.outer(size, size)

@@ -1,10 +1,10 @@
-"""Output error: the parameters whose simulation stays nearest to the measured angles.
+"""Output error: the parameters whose simulation stays closest to the measured angles.
 
-The model is driven by the recorded torque from the recorded state over short windows, and the angle
-it strays by is made least by Gauss and Newton's steps within a trust region (Ljung, 1999, System
-Identification, 7; for robots Gautier, Janot and Vandanjon, 2013, IEEE TCST 21(2)). No acceleration
-is needed, a joint that sticks does so in the simulation too, and noise in the angles stands in the
-residual where it belongs. It costs some hundred simulations of each run.
+The recorded torque drives the model from the recorded state over short windows, and Gauss-Newton
+steps within a trust region minimize its angle error (Ljung, 1999, System Identification, 7; for
+robots Gautier, Janot and Vandanjon, 2013, IEEE TCST 21(2)). It needs no acceleration, reproduces
+sticking joints, and keeps noise of the angles in the residual. It costs some hundred simulations of
+each run.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -23,22 +23,21 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
 
 WINDOW_S = 0.5
-"""One after the other; longer ones would feel the noise of the torque more, shorter ones that of
-the first state."""
+"""Length of a window. Longer ones are more sensitive to noise of the torque, shorter ones to noise
+of the first state."""
 PASSES = 2
-"""Of reweighting the joints."""
+"""Number of times that the joints are weighted again."""
 STEP = 0.5
-"""Standard errors of the start by which a value is moved to see what the simulation does: less than
-a joint's sticking a moment longer or shorter would let it jump."""
+"""Step for derivatives, in standard errors of the start. It is small enough that a joint does not
+stick noticeably longer or shorter."""
 SETTLED = 1e-5
-"""Relative fall of the square error at which the search ends: less than a tenth of a standard
-error."""
+"""Relative decrease of the squared error at convergence; less than a tenth of a standard error."""
 RESTS = 0.01
-"""Step, as a share of the way from the start, at which it ends."""
+"""Relative step at convergence."""
 LEAST_RAD = 1e-9
-"""A perfect fit would weigh infinitely."""
+"""Least rms angle error for a weight; a perfect fit would have infinite weight."""
 RAN_AWAY = 10.0
-"""rad (m) off within a window: the model is none that can exist."""
+"""Angle error within a window, rad (m), above which no such machine can exist."""
 
 
 class OutputError(Estimator):
@@ -50,11 +49,10 @@ class OutputError(Estimator):
     masks = False
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once, beginning with the least-squares model that can exist."""
+        """Fit all runs at once, beginning with the realizable least-squares model."""
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
-        # One step of each value: of the fitted ones in their standard errors, of the held ones in
-        # fiftieths.
+        # Step of each value: a standard error if it is fitted, a fiftieth of itself if it is held.
         size = np.abs(problem.held) / 50.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
         values = nearest(problem, start.values, start.normal)
@@ -71,7 +69,7 @@ class OutputError(Estimator):
 
 
 def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
-    """Return by how much the simulation strays, (windows, samples, J) for each run."""
+    """Return the simulation's angle error, (windows, samples, J) for each run."""
     model_of = problem.training.model_of
     return [
         replay(model_of(run, every), run.whole(), WINDOW_S, WINDOW_S).error
@@ -82,8 +80,7 @@ def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
 def _slopes(
     problem: Problem, every: NDArray, columns: Sequence[int], size: NDArray
 ) -> list[NDArray]:
-    """Return how that changes with some columns' values, (windows, samples, J, columns) for each
-    run."""
+    """Return the derivatives of the angle error, (windows, samples, J, columns) for each run."""
     at = _errors(problem, every)
     slopes = [np.zeros((*error.shape, len(columns))) for error in at]
     for place, column in enumerate(columns):
@@ -103,8 +100,16 @@ def _weights(errors: Sequence[NDArray]) -> NDArray:
 def _searched(
     problem: Problem, values: NDArray, size: NDArray, weights: NDArray
 ) -> tuple[NDArray, int, bool]:
-    """Return the values with the least weighted square error, after how many simulations of all
-    runs, and whether the search came to rest there.
+    """Minimize the weighted squared error.
+
+    Returns
+    -------
+    values : (k,) array
+        Values at the end of the search.
+    simulations : int
+        Number of simulations of all runs.
+    converged : bool
+        Whether the search converged.
     """
     unit, root = size[problem.fitted], np.sqrt(weights)
     outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
@@ -113,8 +118,8 @@ def _searched(
         return problem.completed(values + unit * step)
 
     def residual(step: NDArray) -> NDArray:
-        # What runs away, or has a mass matrix that no machine has, is refused by the search: it
-        # takes a shorter step.
+        # NaN makes the search take a shorter step away from a model that diverges or has a
+        # singular mass matrix.
         try:
             residual = np.concatenate(
                 [(error * root).ravel() for error in _errors(problem, completed(step))]
@@ -174,8 +179,8 @@ def _window_scores(
 ) -> NDArray:
     """Return one score for each window, (windows, k): within it nothing is independent.
 
-    There are few, and each has pulled the fit towards itself: what it would score without that is
-    (I - G H⁻¹)⁻¹ times as much, G its part of the normal matrix (the CR3 of Bell and McCaffrey,
+    There are few windows, and each has pulled the fit towards itself. Its score without that is (I
+    - G H⁻¹)⁻¹ times as large, where G is its part of the normal matrix (CR3 of Bell and McCaffrey,
     2002, Survey Methodology 28(2)).
     """
     scores = -np.einsum("j,wnjk,wnj->wk", weights, slopes, errors, optimize=True)

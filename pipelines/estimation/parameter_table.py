@@ -1,4 +1,4 @@
-"""``parameters/1``: the rows of a fitted model, and their intervals."""
+"""Rows and intervals of a fitted model, for ``parameters/1``."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ class Row:
     step: str
     value: float
     slope: NDArray
-    """How it changes with what the covariance is of."""
+    """Derivative of the value with respect to the parameters of the covariance."""
     one_way: bool = False
-    """Whether its interval ends at nought: of a cause that is there, as play or a stiffness."""
+    """Whether the interval ends at zero, as of a play or a stiffness of a cause that is present."""
 
 
 def rows_of(
@@ -36,15 +36,17 @@ def rows_of(
     Parameters
     ----------
     effect : Effect
-        What the rows are of.
+        Effect of the rows.
     values : (v,) array
-        Of its linear parameters, then of its shape.
+        Values of its linear parameters, then of its shape.
     slopes : (k, s) array
-        How the first k of them change with what the covariance is of; the others are certain.
+        Derivatives of the first k values with respect to the parameters of the covariance; the
+        other values are certain.
     step : str
-        In which they were found.
+        Step of the identification that fitted them.
     positive : collection of Parameter
-        Of those, the interval of one that is never negative, as play or a stiffness, ends at zero.
+        Parameters of a cause that is present. The interval of one that is never negative, such as a
+        play or a stiffness, ends at zero.
     """
     of_rows = effect.jacobian(values)[:, : len(slopes)] @ slopes
     rows = zip(effect.parameters, effect.physical(values), of_rows, strict=True)
@@ -55,10 +57,16 @@ def rows_of(
 
 
 def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> pd.DataFrame:
-    """Return ``parameters/1`` of r rows, whose standard errors are (r,), NaN of what was held and
-    is not known.
+    """Build the ``parameters/1`` table of r rows.
 
-    ``critical``, (r,) or one for all, is the half-width of their intervals in standard errors.
+    Parameters
+    ----------
+    rows : sequence of Row
+        Its r rows.
+    error : (r,) array
+        Standard errors; NaN for a held value of unknown error.
+    critical : (r,) array or float
+        Half-width of the intervals in standard errors.
     """
     value = np.array([row.value for row in rows])
     ends = interval(value, critical * error, np.array([row.one_way for row in rows]))
@@ -82,10 +90,21 @@ def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> 
 
 
 def interval(value: NDArray, half: NDArray, one_way: NDArray) -> NDArray:
-    """Return the ends of intervals about values (p,) with half-widths (p,): (p, 2).
+    """Return the ends of confidence intervals.
 
-    What is ``one_way`` (p,), play, a stiffness or a time constant, is never negative, however
-    little is known of it.
+    Parameters
+    ----------
+    value : (p,) array
+        Values.
+    half : (p,) array
+        Half-widths.
+    one_way : (p,) bool array
+        Whether a value is never negative, as a play, a stiffness or a time constant is.
+
+    Returns
+    -------
+    (p, 2) array
+        Lower and upper end, in the unit of the value.
     """
     low = value - half
     return np.stack(

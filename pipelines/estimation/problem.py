@@ -1,5 +1,4 @@
-"""What is to be estimated from what: some columns of a model, from the training runs of some
-kinds."""
+"""An estimation problem: columns of a model, fitted to the training runs of some kinds."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,27 +20,26 @@ class Training:
 
     runs: tuple[Run, ...]
     model: Model
-    """Of all kinds of run; what a run has not is a column of zeros there."""
+    """Model of all kinds of run; a term that does not act in a run has columns of zeros there."""
     own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
-    """By a run's file, the model's terms as they are there: another zero, another onset; None of
-    what never came."""
+    """By a run's file, the model's terms in that run, such as another zero or onset; None for a
+    term that is absent."""
     bodies: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict)
-    """By the kind of run, whose loads a term may go with: what hangs behind the drive trains, and
-    the limb."""
+    """By the kind of run, parameters of the rigid bodies from which loads are computed: the body
+    behind the drive trains, and the limb."""
     reversals: bool = False
-    """Whether samples near reversals are fitted, too."""
+    """Whether samples near reversals are fitted too."""
     cutoff_hz: float | None = None
-    """Above which nothing is fitted, if there is one."""
+    """Frequency above which nothing is fitted; None for no limit."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of run there are, exo_alone first."""
+        """Kinds of run that occur, exo_alone first."""
         return kinds_of(self.runs)
 
     @cached_property
     def layout(self) -> ParameterLayout:
-        """The p linear parameters; one that differs from run to run is there for each run that has
-        it."""
+        """Layout of the p linear parameters, with a column per run for those that differ by run."""
         absent = [
             (term, number)
             for number, run in enumerate(self.runs)
@@ -52,24 +50,22 @@ class Training:
         return ParameterLayout.of(effects, [run.run for run in self.runs], absent)
 
     def terms_of(self, run: Run) -> tuple[Term | None, ...]:
-        """Return the model's terms as they are in a run."""
+        """Return the model's terms in a run; None for a term that is absent."""
         return self.own.get(run.file, self.model.terms)
 
     def number_of(self, run: Run) -> int | None:
-        """Return the number of a run among those to train on, by its file; None where it is none of
-        them."""
+        """Return the number of a training run by its file; None if it is no training run."""
         return next(
             (number for number, other in enumerate(self.runs) if other.file == run.file), None
         )
 
     def model_of(self, run: Run, values: NDArray) -> Model:
-        """Return the model of one run with the columns' values, (p,)."""
+        """Return the model of one run with the values of all columns, (p,)."""
         terms = (self.term_of(run, i, values) for i in range(len(self.model.terms)))
         return Model(tuple(term for term in terms if term is not None))
 
     def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
-        """Return a term as a run has it, with the columns' values, (p,); None where it never
-        came."""
+        """Return a term in a run with the values of all columns, (p,); None if it is absent."""
         own = self.terms_of(run)[term]
         if own is None:
             return None
@@ -77,7 +73,7 @@ class Training:
         return Term(own.effect, np.append(linear, own.shape))
 
     def reshaped(self, term: int, shape: int, step: float, files: Sequence[str]) -> "Training":
-        """Return the same with one shape of a term larger by a step in some runs."""
+        """Return the same with one shape value of a term larger by a step in some runs."""
         own = {run.file: list(self.terms_of(run)) for run in self.runs}
         for file in files:
             before = own[file][term]
@@ -86,7 +82,7 @@ class Training:
         return replace(self, own={file: tuple(terms) for file, terms in own.items()})
 
     def loaded(self, run: Run) -> Run:
-        """Return a run with the loads that are known."""
+        """Return a run with its joint loads, if the bodies are known."""
         return run.whole().loaded(*self.bodies[run.run]) if self.bodies else run
 
     def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
@@ -109,15 +105,15 @@ class Training:
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
-        """Each run's rows on all columns; they are gone through once, whatever is fitted to them.
+        """Rows of each run on all columns, computed once for every fit.
 
         Raises
         ------
         InputError
-            Where the torque of a joint is nought in all of them.
+            If the torque of a joint is zero in all of them.
         """
         parts = tuple(compress(self.regressions(run)) for run in self.runs)
-        # Of triangles only nought is told from a constant; the diagnosis sees the samples.
+        # Compressed rows show a torque of zero, but not a constant one: that needs the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
             if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
                 raise silent_torque(self.runs, joint, 0.0)
@@ -131,20 +127,19 @@ class Training:
 
 @dataclass(frozen=True)
 class Problem:
-    """``torque = regressor @ parameters + noise``, p parameters, some of which are fitted and the
-    others held."""
+    """``torque = regressor @ parameters + noise`` in p parameters, some fitted, others held."""
 
     training: Training
     kinds: tuple[str, ...]
-    """Of the runs that are fitted."""
+    """Kinds of run that are fitted."""
     fitted: NDArray
     """(k,) columns that are fitted."""
     held: NDArray
-    """(p,) values of the columns that are held; those of the fitted ones say nothing."""
+    """(p,) values of the columns that are held; the entries of fitted columns are ignored."""
 
     @property
     def names(self) -> list[str]:
-        """What messages call the fitted parameters."""
+        """Names of the fitted parameters in messages."""
         runs, columns = self.training.runs, self.training.layout.columns
         return [
             column.name if column.run is None else f"{column.name} of {runs[column.run].file}"
@@ -153,7 +148,7 @@ class Problem:
 
     @property
     def runs(self) -> list[tuple[int, Run]]:
-        """Number and run of those that are fitted."""
+        """Number and run of the runs that are fitted."""
         return [
             (number, run) for number, run in enumerate(self.training.runs) if run.run in self.kinds
         ]
@@ -179,7 +174,7 @@ class Problem:
         return replace(self, training=self.training.whole)
 
     def completed(self, values: NDArray) -> NDArray:
-        """Return the values of all columns, (p,), for those of the fitted ones."""
+        """Return the values of all columns, (p,), with the fitted ones (k,) in their places."""
         every = self.held.copy()
         every[self.fitted] = values
         return every

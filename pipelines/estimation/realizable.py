@@ -1,13 +1,13 @@
-"""Physically realizable least squares: the least residual among the models that can exist.
+"""Physically realizable least squares: the least residual of the models that can exist.
 
-That the mass matrix is positive definite at every angle is a linear matrix inequality in the
-inertial parameters, and friction that takes energy is a sign, so the fit is a convex program with
-one answer (Sousa and Cortesão, 2014, Int. J. Robotics Research 33(6); Wensing, Kim and Slotine,
+A mass matrix that is positive definite at every angle is a linear matrix inequality in the inertial
+parameters, and friction that takes energy is a sign constraint. So the fit is a convex program with
+one solution (Sousa and Cortesão, 2014, Int. J. Robotics Research 33(6); Wensing, Kim and Slotine,
 2018, IEEE RA-L 3(1)). Clarabel solves it.
 
-Moving to the nearest point of a convex set that holds the truth brings a fit no farther from it, in
-the norm of the normal matrix; the covariance of the free fit is kept, and intervals are rather too
-wide than too narrow where a constraint is active.
+A projection onto a convex set that contains the truth does not increase the error, in the norm of
+the normal matrix. So the covariance of the free fit is kept; where a constraint is active,
+intervals are rather too wide than too narrow.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,11 +25,10 @@ from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.problem import Problem
 
 MARGIN = 1e-6
-"""Least eigenvalue of a body's inertia form over its trace: a boundary that rounding does not
-cross."""
+"""Least eigenvalue of a body's inertia form over its trace, so that rounding does not cross the
+boundary."""
 MOVED = 1e-3
-"""Standard errors of independent blocks by which a value has to move before a constraint is called
-active."""
+"""Change of a value that makes a constraint active, in standard errors of independent blocks."""
 
 
 class Realizable(Estimator):
@@ -39,7 +38,7 @@ class Realizable(Estimator):
     title = "physically realizable least squares"
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once, then go to the nearest model that can exist."""
+        """Fit all runs at once, then find the nearest model that can exist."""
         free = WeightedLeastSquares().fit(problem)
         values = nearest(problem, free.values, free.normal)
         moved = np.abs(values - free.values) > MOVED * np.sqrt(np.diag(free.sensitivity))
@@ -51,26 +50,37 @@ class Realizable(Estimator):
             for joint, before, after in zip(problem.runs[0][1].joints, *rises, strict=True)
         )
         remark = (
-            "least squares alone finds no machine that can exist; the nearest that can leaves more"
-            f" torque: {raised}. That is evidence of an effect that the model lacks: `exoid"
-            " diagnose` looks for it"
+            "least squares alone gives a machine that cannot exist; the nearest that can has a"
+            f" larger residual: {raised}. The model lacks an effect: run `exoid diagnose`"
         )
         about = {**free.about, "constrained": True, "least_squares_values": free.values.tolist()}
         return replace(free, values=values, about=about, remarks=(remark,))
 
 
 def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
-    """Return the realizable values (k,) nearest to ``values`` in the norm of the ``normal`` matrix
-    (k, k).
+    """Return the realizable values nearest to some values, in the norm of a normal matrix.
 
-    For least-squares values and their normal matrix these leave the least residual.
+    For least-squares values and their normal matrix, the result has the least residual.
+
+    Parameters
+    ----------
+    problem : Problem
+        Which columns are fitted.
+    values : (k,) array
+        Values of the free fit.
+    normal : (k, k) array
+        Normal matrix.
+
+    Returns
+    -------
+    (k,) array
 
     Raises
     ------
     NotIdentifiable
-        Where the program finds none.
+        If no realizable values exist.
     """
-    # In standard errors about the free fit: numbers near one, whatever the units.
+    # The unit is a standard error of the free fit, so that all numbers are near one.
     size = np.sqrt(np.diag(np.linalg.inv(normal)))
     blocks, cones = zip(*_constraints(problem, values, size), strict=True)
     rows = np.concatenate([slope for slope, _ in blocks])
@@ -83,9 +93,8 @@ def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
     ).solve()
     if str(solution.status) not in ("Solved", "AlmostSolved"):
         raise NotIdentifiable(
-            f"no realizable model was found near the fit ({solution.status}): with the values that"
-            " are held none can exist; choose --method weighted_least_squares and look at what it"
-            " says of realizability"
+            f"no realizable model exists with the values that are held ({solution.status})."
+            " Choose --method weighted_least_squares and read its warnings on realizability"
         )
     return values + size * np.array(solution.x)
 
@@ -96,7 +105,7 @@ Constraint = tuple[tuple[NDArray, NDArray], object]
 def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[Constraint]:
     """Yield slope (r, k) and bound (r,) with ``slope @ step + bound`` in a cone, and the cone.
 
-    ``step`` is that from ``values``, in units of ``size``.
+    ``step`` is the step from ``values`` in units of ``size``.
     """
     every = problem.completed(values)
     for form in _inertia_forms(problem):
@@ -118,8 +127,7 @@ def _takes_energy(problem: Problem, column: int) -> bool:
 
 
 def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
-    """Yield for each body that is fitted (p, m, m): of all parameters, what is positive definite of
-    a real one."""
+    """Yield the inertia form (p, m, m) of each fitted body; a real body's is positive definite."""
     run = problem.training.runs[0]
     forms = run.machine.mechanism.inertia_forms(run.geometry)
     layout, fitted = problem.training.layout, set(problem.fitted)
@@ -131,8 +139,7 @@ def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
 
 
 def _triangle(matrix: NDArray) -> Sequence[float]:
-    """Return the upper triangle, column by column, off-diagonal elements times √2, as Clarabel has
-    it."""
+    """Return the upper triangle column by column, off-diagonal elements times √2, for Clarabel."""
     n = len(matrix)
     return [
         matrix[i, j] * (1.0 if i == j else np.sqrt(2.0)) for j in range(n) for i in range(j + 1)

@@ -1,5 +1,4 @@
-"""A run as a linear regression: torque and regressor behind the same filter, and which rows to
-trust."""
+"""A run as a linear regression: torque and regressor through one filter, with the rows to use."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,12 +15,13 @@ from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
 REVERSAL_SPEED = 0.04
-"""rad/s below which the sign of an exoskeleton's speed, and so friction, is not known; others go
-slower or faster."""
+"""Speed in rad/s below which the sign of an exoskeleton's velocity, and so its friction, is
+uncertain; scaled for other machines."""
 TURN_S = 0.075
-"""Beside a turn, where measured forces and the filtered acceleration are not of the same moment."""
+"""Time on both sides of a turn in which measured forces and filtered acceleration are not
+simultaneous."""
 REVERSAL_PADDING_S = 0.08
-"""What a joint that stuck still does after it has come free."""
+"""Time for which a joint is disturbed after it has stuck."""
 
 
 @dataclass(frozen=True)
@@ -29,33 +29,41 @@ class Regression:
     """m blocks of a run, J joints, p parameters: ``torque = regressor @ parameters + noise``."""
 
     time: NDArray
-    """(m,) s, the middle of each block."""
+    """(m,) s, middle of each block."""
     segment: NDArray
+    """(m,) number of the unbroken stretch of each block."""
     regressor: NDArray
-    """(m, J, p)."""
+    """(m, J, p) N·m per unit."""
     torque: NDArray
     """(m, J) N·m."""
     valid: NDArray
-    """(m,) bool: every sample of the block is trusted."""
+    """(m,) bool: whether every sample of the block is valid."""
     usable: NDArray
-    """(m, J) bool: valid, and away from that joint's reversals."""
+    """(m, J) bool: whether the block is valid and away from that joint's reversals."""
     state: tuple[NDArray, NDArray, NDArray]
-    """q, dq, ddq, (m, J) each."""
+    """q, dq, ddq, (m, J) each; rad, rad/s, rad/s²."""
 
     @property
     def scored(self) -> NDArray:
-        """(m,) bool: usable at every joint, as the RMSE counts it."""
+        """(m,) bool: whether the block is usable at every joint, as the RMSE counts it."""
         return np.asarray(self.usable.all(axis=1))
 
 
 def residual_of(r: Regression, values: NDArray) -> NDArray:
-    """Return measured less predicted torque, (m, J) N·m."""
+    """Return measured less predicted torque, (m, J) N·m, for parameters (p,)."""
     return r.torque - r.regressor @ values
 
 
 def by_segment(segment: NDArray, scores: NDArray) -> Iterator[tuple[int, NDArray]]:
-    """Yield each segment's number and its part of the blocks' ``scores`` (m, k), whose segments
-    (m,) follow in turn."""
+    """Yield each segment's number and its scores.
+
+    Parameters
+    ----------
+    segment : (m,) array
+        Segment of each block, in order.
+    scores : (m, k) array
+        Scores of each block.
+    """
     begins = np.flatnonzero(np.diff(segment)) + 1
     for rows in np.split(np.arange(len(scores)), begins):
         if len(rows):
@@ -63,8 +71,13 @@ def by_segment(segment: NDArray, scores: NDArray) -> Iterator[tuple[int, NDArray
 
 
 def block_average(motion: Run) -> BlockAverage:
-    """Return the regression filter that the motion's file asks for; a filter of another kind is
-    refused."""
+    """Return the regression filter of a motion's file.
+
+    Raises
+    ------
+    InputError
+        If the file asks for a filter of another kind.
+    """
     chosen = motion.metadata.get("regression_filter") or {}
     kind = chosen.get("kind", "block_average")
     if kind != "block_average":
@@ -79,13 +92,18 @@ def block_average(motion: Run) -> BlockAverage:
 
 
 def reversal_speeds(machine: Machine) -> NDArray:
-    """Return the speed of each joint below which its sign is not known, (J,) rad/s, m/s at a
-    prismatic joint."""
+    """Return the speed of each joint below which its sign is uncertain.
+
+    Returns
+    -------
+    (J,) array
+        rad/s; m/s at a prismatic joint.
+    """
     return np.array([REVERSAL_SPEED * machine.scale(joint).speed for joint in machine.names])
 
 
 def mask_in_words(machine: Machine) -> str:
-    """Say which samples are left out for being near a reversal."""
+    """Describe the samples that are left out for being near a reversal."""
     speeds = reversal_speeds(machine)
     units = [joint.unit("velocity") for joint in machine.joints]
     parts = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
@@ -98,36 +116,34 @@ def mask_in_words(machine: Machine) -> str:
 
 
 def away_from_reversals(motion: Motion) -> NDArray:
-    """Tell for each sample and joint whether it moves, and has moved for a while: (n, J) bool."""
+    """Return whether each joint moves at each sample, and has moved for a while: (n, J) bool."""
     slow = np.abs(motion.dq) < reversal_speeds(motion.machine)
     return ~np.column_stack([dilate(column, padding(motion)) for column in slow.T])
 
 
 def padding(run: Run) -> int:
-    """Return how many samples beside a reversal are left out."""
+    """Return the number of samples on each side of a reversal that are left out."""
     return round(REVERSAL_PADDING_S * run.sample_rate_hz)
 
 
 def away_from_turns(motion: Motion) -> NDArray:
-    """Tell for each sample whether no joint turns round within ``TURN_S``, (n,) bool.
+    """Return whether no joint turns within ``TURN_S`` of each sample, (n,) bool.
 
-    Where a joint stops, friction jumps and so does the acceleration of every link; filtered,
-    neither is at its time.
+    Where a joint turns, its friction jumps, and so does the acceleration of every link. After
+    filtering, neither is at its time.
     """
     return np.asarray(~dilate(np.any(turns(motion), axis=1), round(TURN_S * motion.sample_rate_hz)))
 
 
 def turns(motion: Motion) -> NDArray:
-    """Tell for each sample and joint whether it has turned round since the sample before: (n, J)
-    bool."""
+    """Return whether each joint has turned since the sample before, (n, J) bool."""
     turned = np.zeros(motion.dq.shape, dtype=bool)
     turned[1:] = np.diff(motion.dq > 0, axis=0)
     return turned
 
 
 def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Iterator[Regression]:
-    """Yield a run as one linear regression, piece by piece; where there is a cut-off, only what is
-    slower."""
+    """Yield a run as one linear regression, piece by piece, below a cut-off if there is one."""
     reach = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
     for piece in run.pieces(block_average(run).decimation + padding(run) + reach):
         yield regress(piece, model, cutoff_hz)
@@ -136,8 +152,8 @@ def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Itera
 def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regression:
     """Compute the regressor at full rate, then average it and the torque over the same blocks.
 
-    Both go through the same low-pass before, where there is a cut-off. A block belongs to the piece
-    in whose core it begins; what it needs beyond stands in the margin.
+    If there is a cut-off, both pass the same low-pass before. A block belongs to the piece in whose
+    core it begins; its remaining samples are in the margin.
     """
     motion, core = piece.motion, piece.core
     block = block_average(motion)

@@ -1,4 +1,4 @@
-"""Filtering: a recording made fit for regression, and what there is to say about it."""
+"""Filter a recording for regression, and summarize the result."""
 
 from pipelines.filtering.summary import Summary
 from pipelines.mechanics.kinematics import filtered

@@ -1,4 +1,4 @@
-"""What is said of a filtered recording, gathered while its rows pass."""
+"""Summarize a filtered recording while its rows pass."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,7 +10,7 @@ from pipelines.mechanics.kinematics import FilteredRecording
 
 
 class Summary:
-    """How a recording fared in the filter; every array (J,)."""
+    """Quality of a filtered recording; every array is (J,)."""
 
     def __init__(self, motion: FilteredRecording) -> None:
         self.cutoff_hz = motion.cutoff.hz
@@ -23,7 +23,7 @@ class Summary:
         self._velocity = _MeanSquare(len(motion.joints))
 
     def passing(self, pieces: Iterable[pa.Table]) -> Iterator[pa.Table]:
-        """Yield the motion's rows as they are, once they have been looked at."""
+        """Yield the motion's rows unchanged, and gather their statistics."""
         for piece in pieces:
             self._add(piece)
             yield piece
@@ -49,19 +49,17 @@ class Summary:
 
     @property
     def noise(self) -> NDArray:
-        """Rms of measured less filtered angle, (J,) rad: the encoder's noise and what the filter
-        took."""
+        """Rms of measured less filtered angle, (J,) rad."""
         return self._noise.root
 
     @property
     def velocity_difference(self) -> NDArray | None:
-        """Rms of the drive's own velocity less the filtered one, (J,) rad/s; None where the drive
-        gave none."""
+        """Rms of the drive's less the filtered velocity, (J,) rad/s; None if not recorded."""
         return self._velocity.root if self._velocity.count.any() else None
 
 
 class _MeanSquare:
-    """A root mean square over what comes piece by piece (n, J), missing values left out."""
+    """Accumulate a root mean square over pieces (n, J), without missing values."""
 
     def __init__(self, columns: int) -> None:
         self.count = np.zeros(columns)

@@ -1,4 +1,4 @@
-"""The model that all stages share: effects with values, a regressor, and its columns' layout."""
+"""The model that all stages share: effects with values, their regressor, and its column layout."""
 
 from pipelines.model.baseline import BASELINE, baseline
 from pipelines.model.model import BY_NAME, Model, Motions, Term, effect_named, term_from

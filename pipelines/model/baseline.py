@@ -1,4 +1,4 @@
-"""What every lab's model holds: rigid bodies and friction."""
+"""The baseline model: rigid bodies and friction."""
 
 from collections.abc import Collection, Iterable
 
@@ -20,20 +20,20 @@ def baseline(
 ) -> tuple[Effect, ...]:
     """Return the effects that every model starts with.
 
-    The machine and its wearer have a rigid body each where data tell them apart: by runs with and
-    without the wearer, or by cuff forces. With one kind of run and no cuff forces there is one body
-    for all that moves.
+    The machine and its wearer have a rigid body each if the data separate them: by runs with and
+    without the wearer, or by cuff forces. With one kind of run and no cuff forces, one body stands
+    for both.
 
     Parameters
     ----------
     machine : Machine
-        The machine that has them.
+        The machine that has the effects.
     kinds : collection of str
         Kinds of run to be explained.
     known : iterable of Effect
-        What else the machine is known to have, without shape parameters to be fitted.
+        Further effects that the machine is known to have, without shape parameters to be fitted.
     cuffs : bool
-        Whether cuff forces are fitted, whose sensors then have zeros.
+        Whether cuff forces are fitted; their sensors then have zeros.
     """
     wearer = [RigidBody(run="with_human", on=machine)] * (len(kinds) == 2 or cuffs)
     friction = (Friction(joint=joint, on=machine) for joint in machine.names)

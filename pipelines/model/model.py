@@ -1,4 +1,4 @@
-"""A model: a tuple of effects with their values, which every stage asks for its physics."""
+"""A model: effects with values, from which every stage computes torques."""
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -25,12 +25,12 @@ class Term:
     values: NDArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Fill in the defaults of what was left out."""
+        """Fill in the defaults of missing values."""
         object.__setattr__(self, "values", self.effect.completed(self.values))
 
     @classmethod
     def of(cls, effect: Effect, shape: Iterable[float] = ()) -> "Term":
-        """Return an effect of some shape whose linear parameters are zero."""
+        """Return an effect with some shape values and linear parameters of zero."""
         return cls(effect, np.append(np.zeros(len(effect.linear)), list(shape)))
 
     @property
@@ -51,37 +51,34 @@ class Term:
 
 
 class Motions(NamedTuple):
-    """A measured motion, corrected for what sensors, transmissions and cuffs do to it."""
+    """A measured motion, corrected for sensors, transmissions and cuffs."""
 
     motor: Motion
-    """As the motors move: what drive effects act on."""
+    """Motion of the motors, on which drive effects act."""
     link: Motion
-    """As the machine's links move; the cuffs' force sensors sit on them."""
+    """Motion of the machine's links, to which the cuffs' force sensors are fixed."""
     limb: Motion
-    """As the wearer's limb moves."""
+    """Motion of the wearer's limb."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Terms whose torques add up.
-
-    They act on a motion that is corrected for what sensors and transmissions do to it.
-    """
+    """Terms whose torques add up, on a motion corrected for sensors and transmissions."""
 
     terms: tuple[Term, ...]
 
     @classmethod
     def of(cls, effects: Iterable[Effect]) -> "Model":
-        """Return the model of some effects whose linear parameters are zero."""
+        """Return the model of some effects with linear parameters of zero."""
         return cls(tuple(Term.of(effect) for effect in effects))
 
     def __iter__(self) -> Iterator[Term]:
-        """Go through the terms."""
+        """Iterate over the terms."""
         return iter(self.terms)
 
     @property
     def linear_parameters(self) -> list[tuple[Effect, Parameter]]:
-        """Effect and parameter behind each column of the regressor, in its order."""
+        """Effect and parameter of each column of the regressor, in its order."""
         return [(term.effect, parameter) for term in self.terms for parameter in term.effect.linear]
 
     @property
@@ -90,37 +87,43 @@ class Model:
         return np.concatenate([term.linear for term in self.terms])
 
     def with_linear(self, values: NDArray) -> "Model":
-        """Return the model with other linear parameters, (p,)."""
+        """Return the model with other linear parameters.
+
+        Parameters
+        ----------
+        values : (p,) array
+            In the order of the regressor's columns, SI units.
+        """
         values = np.asarray(values, dtype=float)
         chosen = zip(self.terms, self._columns, strict=True)
         return Model(tuple(Term(t.effect, np.append(values[own], t.shape)) for t, own in chosen))
 
     @cached_property
     def _columns(self) -> list[slice]:
-        """Each term's columns in the regressor."""
+        """Columns of each term in the regressor."""
         ends = np.cumsum([0, *(len(term.effect.linear) for term in self.terms)]).tolist()
         return [slice(start, stop) for start, stop in itertools.pairwise(ends)]
 
     def for_run(self, run: str) -> "Model":
-        """Return the terms that are there in a kind of run."""
+        """Return the model of the terms that act in a kind of run."""
         return Model(tuple(term for term in self.terms if term.effect.acts(run)))
 
     def motions(self, motion: Motion) -> Motions:
-        """Return a measured motion as it is of the motors, the links and the wearer's limb."""
+        """Return a measured motion as motors, links and the wearer's limb perform it."""
         motor = self.sensed(motion)
         link = self.behind_motors(motor)
         return Motions(motor, link, self.behind_cuffs(link))
 
     def sensed(self, motion: Motion) -> Motion:
-        """Undo what encoders did: the motion of the motors."""
+        """Undo the encoders' errors: return the motion of the motors."""
         return self._corrected(motion, lambda effect: effect.side is Side.SENSOR)
 
     def behind_motors(self, motor: Motion) -> Motion:
-        """Undo what transmissions did to the motors' motion: that of the machine's links."""
+        """Return the motion of the machine's links for a motion of its motors."""
         return self._corrected(motor, lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
 
     def behind_cuffs(self, link: Motion) -> Motion:
-        """Undo what cuffs did to the links' motion: that of the wearer's limb."""
+        """Return the motion of the wearer's limb for a motion of the machine's links."""
         return self._corrected(link, lambda effect: effect.side is Side.HUMAN)
 
     def _corrected(self, motion: Motion, chosen: Callable[[Effect], bool]) -> Motion:
@@ -138,23 +141,23 @@ class Model:
     ) -> NDArray:
         """Return the measured torque per unit of each linear parameter.
 
-        Drive effects see the motors' motion, those on the wearer's side of the cuffs the limb's,
-        all others the links'. The torque sensors then make of all these torques, one sensor effect
-        after the other, what they measure.
+        Drive effects see the motors' motion, effects on the wearer's side of the cuffs the limb's,
+        and all others the links'. The torque sensors then act on the sum of all these torques, one
+        sensor effect after the other.
 
         Parameters
         ----------
         motion : Motion
-            As it was measured, n samples of J joints.
+            Measured motion, n samples of J joints.
         cuffs : bool
-            Whether rows for the torque that the cuffs measure follow those for the drives.
+            Whether to append rows for the torque that the cuffs measure.
         motions : Motions, optional
-            ``self.motions(motion)``, for a caller that has them.
+            ``self.motions(motion)``, if the caller has it already.
 
         Returns
         -------
-        NDArray
-            (n, J, p) N·m per unit, (n, 2 J, p) with the cuffs' rows.
+        (n, J, p) array
+            Torque in N·m per unit of each parameter; (n, 2 J, p) with the cuffs' rows.
         """
         motor, link, limb = motions or self.motions(motion)
         n, joints = motion.q.shape
@@ -166,7 +169,7 @@ class Model:
             if not effect.explains(motion):
                 continue
             at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
-            # Columns that are still to come are in there too: they are written over.
+            # This includes columns of later terms; they are overwritten.
             measured = effect.observed(drives, motion, shape)
             if measured is not drives:
                 drives[:] = measured
@@ -177,30 +180,43 @@ class Model:
         return out
 
     def observed(self, columns: NDArray, motion: Motion) -> NDArray:
-        """Return what the sensors make of torques (n, J, k) along a motion."""
+        """Return the torques that the sensors report.
+
+        Parameters
+        ----------
+        columns : (n, J, k) array
+            Torques, or torque per unit of k parameters.
+        motion : Motion
+            Motion of n samples.
+
+        Returns
+        -------
+        (n, J, k) array
+            The same after all sensor effects.
+        """
         for term in self.terms:
             if term.effect.side is Side.SENSOR:
                 columns = term.effect.observed(columns, motion, term.shape)
         return columns
 
     def delivered(self, motion: Motion) -> NDArray:
-        """Return what drives deliver where sensors measured ``motion.torque``, (n, J) N·m."""
+        """Return the drives' true torque where sensors measured ``motion.torque``, (n, J) N·m."""
         torque = motion.torque
         for term in reversed(self.terms):
             torque = term.effect.delivered(torque, motion, term.values)
         return torque
 
     def torque(self, motion: Motion) -> NDArray:
-        """Torque that the sensors should measure along a motion, (n, J) N·m."""
+        """Return the torque that the sensors should measure along a motion, (n, J) N·m."""
         return self.regressor(motion) @ self.linear_values
 
 
 def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     """Return an effect's columns along a motion, (n, J, k).
 
-    Friction, and what else depends on the motion alone, is the same in each of the thousand fits of
-    one motion, so it is computed once. Rigid bodies mostly move otherwise than the motors, in each
-    fit anew.
+    Columns that depend on the motion alone, such as friction's, are computed once and kept with the
+    motion, because a diagnosis fits the same motion a thousand times. Rigid bodies are left out:
+    mostly they move differently from the motors, and that motion is new in each fit.
     """
     if effect.shape or effect.reads_load or effect.inertial:
         return effect.columns(motion, shape)
@@ -211,12 +227,12 @@ def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
 
 
 def effect_named(name: str) -> type[Effect]:
-    """Look an effect up by the name that files use.
+    """Return the effect of a name, as files spell it.
 
     Raises
     ------
     InputError
-        Where there is none of this name.
+        If no effect has this name.
     """
     if name not in BY_NAME:
         raise InputError(f"there is no effect {name!r}; {suggestion(name, list(BY_NAME))}")
@@ -224,12 +240,12 @@ def effect_named(name: str) -> type[Effect]:
 
 
 def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
-    """Return a term from the values that a file gives to ``effect.parameters``.
+    """Build a term from the values of ``effect.parameters`` in a file.
 
     Raises
     ------
     InputError
-        Where values are missing, or others than the effect's.
+        If values are missing, or belong to no parameter of the effect.
     """
     effect = effect.with_parts_named(values)
     known = {parameter.name: parameter for parameter in effect.parameters}

@@ -1,8 +1,8 @@
-"""Which column of a regression over several runs is which parameter, and which runs have it.
+"""Assign the columns of a regression over several runs to parameters and runs.
 
 The regressor of one run has a column for each linear parameter of each term. In a fit of several
-runs a parameter that differs from run to run has a column for each run that has its term; any other
-has one column, which the runs share. Nothing else counts columns.
+runs, a parameter that differs from run to run has a column for each run that has its term. Any
+other parameter has one column, which the runs share.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -24,11 +24,11 @@ class TermColumns:
 
     effect: Effect
     per_run: tuple[bool, ...]
-    """(k,) which of the columns that the term has in a run are that run's own."""
+    """(k,) whether each column of the term belongs to one run alone."""
     runs: tuple[int, ...]
     """Numbers of the runs that have the term."""
     start: int = 0
-    """Its first column among all."""
+    """Number of its first column in the layout."""
 
     @classmethod
     def of(
@@ -40,7 +40,7 @@ class TermColumns:
     ) -> "TermColumns":
         """Return the columns of an effect in runs of some kinds.
 
-        They are those of its linear parameters, unless ``per_run`` tells of others.
+        They are those of its linear parameters, unless ``per_run`` is given.
         """
         if per_run is None:
             per_run = (parameter.per_run for parameter in effect.linear)
@@ -49,7 +49,7 @@ class TermColumns:
 
     @cached_property
     def columns(self) -> tuple[tuple[int, int | None], ...]:
-        """Which of the k a column is, and of which run; None where runs share it."""
+        """Parameter number and run of each column; the run is None if all runs share the column."""
         shared = [(k, None) for k, own in enumerate(self.per_run) if not own]
         own = [(k, run) for run in self.runs for k, own in enumerate(self.per_run) if own]
         return (*shared, *own)
@@ -61,29 +61,62 @@ class TermColumns:
 
     @property
     def slice(self) -> slice:
-        """Its columns among all."""
+        """The term's columns in the layout."""
         return slice(self.start, self.start + self.width)
 
     def places(self, run: int | None) -> NDArray:
-        """Return the column of each of the k in a run, (k,), -1 where no column tells of it.
+        """Return the columns of the k parameters in one run.
 
-        ``run`` is None for a run that was not fitted: of that only shared columns tell.
+        Parameters
+        ----------
+        run : int or None
+            Number of the run; None for a run that was not fitted, which has shared columns only.
+
+        Returns
+        -------
+        (k,) int array
+            Column numbers, -1 for a parameter without a column in that run.
         """
         at = {column: self.start + i for i, column in enumerate(self.columns)}
-        # No column is of run -1.
+        # -1 is the number of no run.
         runs = ((-1 if run is None else run) if own else None for own in self.per_run)
         return np.array([at.get(column, -1) for column in enumerate(runs)], dtype=int)
 
     def select(self, values: NDArray, run: int | None, otherwise: NDArray) -> NDArray:
-        """Return the k values in a run, (k,), from those of all columns.
+        """Select the values of one run.
 
-        ``otherwise``, (k,), is taken where no column tells of one.
+        Parameters
+        ----------
+        values : (p,) array
+            Values of all columns.
+        run : int or None
+            Number of the run; None for a run that was not fitted.
+        otherwise : (k,) array
+            Values of parameters that have no column in that run.
+
+        Returns
+        -------
+        (k,) array
+            Values of the term's parameters in that run.
         """
         places = self.places(run)
         return np.where(places < 0, otherwise, values[places])
 
     def expand(self, columns: NDArray, run: int) -> NDArray:
-        """Put the term's columns in one run, (m, O, k), where they belong, (m, O, width)."""
+        """Expand the term's columns of one run to its width in the layout.
+
+        Parameters
+        ----------
+        columns : (m, O, k) array
+            Columns of one run.
+        run : int
+            Number of the run.
+
+        Returns
+        -------
+        (m, O, width) array
+            The same columns in their places; the others are zero.
+        """
         places = self.places(run)
         return _spread(columns, np.where(places < 0, -1, places - self.start), self.width)
 
@@ -94,11 +127,11 @@ class Column(NamedTuple):
     effect: Effect
     parameter: Parameter
     run: int | None
-    """Number of the run whose own it is; None where runs share it."""
+    """Number of the run that the column belongs to; None if runs share it."""
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         effect, name = self.effect, self.parameter.name
         if isinstance(effect, RigidBody):
             return f"the person's {name}" if effect.run == "with_human" else name
@@ -127,9 +160,10 @@ class ParameterLayout:
         effects : iterable of Effect
             In the order of the terms.
         kinds : sequence of str
-            The kind of each run that is fitted.
+            Kind of each run that is fitted.
         absent : collection of (int, int)
-            Numbers of a term and of a run that lacks it although its kind could have it.
+            Pairs of a term's and a run's number: runs that lack a term although their kind may have
+            it.
         """
         terms: list[TermColumns] = []
         start = 0
@@ -153,12 +187,12 @@ class ParameterLayout:
 
     @property
     def per_run(self) -> NDArray:
-        """(q,) which of the columns of one run's regressor are its own."""
+        """(q,) whether each column of one run's regressor belongs to that run alone."""
         return np.array([own for term in self.terms for own in term.per_run], dtype=bool)
 
     @property
     def bodies(self) -> NDArray:
-        """Columns of each rigid body, (bodies, parameters), the machine's first."""
+        """Columns of each rigid body, (bodies, parameters); the machine's body is first."""
         return np.array([t.places(None) for t in self.terms if isinstance(t.effect, RigidBody)])
 
     def bodies_in(self, kind: str) -> NDArray:
@@ -171,7 +205,7 @@ class ParameterLayout:
         return names.index((effect, joint, parameter))
 
     def acting_in(self, kind: str) -> NDArray:
-        """Tell which columns act in a kind of run, (p,) bool."""
+        """Return which columns act in a kind of run, (p,) bool."""
         acts = (
             column.effect.acts(kind) if column.run is None else self.kinds[column.run] == kind
             for column in self.columns
@@ -179,13 +213,26 @@ class ParameterLayout:
         return np.array(list(acts), dtype=bool)
 
     def shapes(self, term: int) -> slice:
-        """Return the places of a term's shapes, where all terms' shapes follow the p columns."""
+        """Return the places of a term's shape values in a vector of p columns and all shapes."""
         counts = [len(one.effect.shape) for one in self.terms]
         start = self.size + sum(counts[:term])
         return slice(start, start + counts[term])
 
     def select(self, values: NDArray, run: int | None) -> NDArray:
-        """Return the values of one run's regressor, (q,), zero where no column tells of one."""
+        """Return the values of one run's regressor, zero for parameters without a column.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of all columns.
+        run : int or None
+            Number of the run; None for a run that was not fitted.
+
+        Returns
+        -------
+        (q,) array
+            In the order of that run's regressor.
+        """
         parts = [term.select(values, run, np.zeros(len(term.per_run))) for term in self.terms]
         return np.concatenate(parts)
 
@@ -195,10 +242,21 @@ class ParameterLayout:
         run: int | None,
         terms: Iterable[int] | None = None,
     ) -> NDArray:
-        """Put the columns of one run's regressor, (m, O, q), where they belong, (m, O, p).
+        """Expand the columns of one run's regressor to the whole layout.
 
-        ``terms`` are the numbers of the terms that the regressor has, all unless given; ``run`` is
-        None for a run that was not fitted.
+        Parameters
+        ----------
+        columns : (m, O, q) array
+            Regressor of one run.
+        run : int or None
+            Number of the run; None for a run that was not fitted.
+        terms : iterable of int, optional
+            Numbers of the terms that the regressor has; all by default.
+
+        Returns
+        -------
+        (m, O, p) array
+            The same columns in their places; the others are zero.
         """
         chosen = self.terms if terms is None else [self.terms[term] for term in terms]
         places = np.concatenate([term.places(run) for term in chosen])
@@ -206,9 +264,9 @@ class ParameterLayout:
 
 
 def _spread(columns: NDArray, places: NDArray, width: int) -> NDArray:
-    """Put columns, (m, O, k), in places, (k,), among others that are zero, (m, O, width).
+    """Place columns (m, O, k) among zeros, (m, O, width).
 
-    Those whose place is -1 are left out.
+    ``places`` (k,) are their places; those at -1 are dropped.
     """
     if np.array_equal(places, np.arange(width)):
         return columns

@@ -1,4 +1,4 @@
-"""Models out of ``parameters/1`` tables, and what no real machine could have of them."""
+"""Build models from ``parameters/1`` tables, and check that their rigid bodies are realizable."""
 
 import pandas as pd
 
@@ -12,14 +12,21 @@ from pipelines.model.model import Model, Term, effect_named, term_from
 
 
 def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_LEG) -> Model:
-    """Rebuild the model of one kind of run of a machine from a ``parameters/1`` table.
+    """Build the model of one kind of run from a ``parameters/1`` table.
 
-    ``run`` is a kind of run, or ``human`` for the wearer's own rigid body.
+    Parameters
+    ----------
+    frame : DataFrame
+        Rows of the table.
+    run : str
+        A kind of run, or ``human`` for the wearer's own rigid body.
+    machine : Machine
+        The machine that the table describes.
 
     Raises
     ------
     InputError
-        Where the table has no rigid body for that run.
+        If the table has no rigid body for that kind of run.
     """
     is_body = frame["effect"] == RigidBody.name
     if not (is_body & (frame["run"] == run)).any():
@@ -30,7 +37,7 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     ]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
-        # Machine and limb move apart: each needs its own.
+        # Machine and limb move separately, so each needs its own body.
         parts = [
             (RigidBody(on=machine), bodies["exo_alone"]),
             (RigidBody(run="with_human", on=machine), bodies["human"]),
@@ -41,27 +48,26 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
 
 
 def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
-    """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the
-    rows that tell it.
+    """Return every term of a ``parameters/1`` table except rigid bodies, with its rows.
 
     Raises
     ------
     InputError
-        Where it tells of effects or joints that there are not, or not of all their values.
+        If an effect or a joint is unknown, or if values are missing or occur twice.
     """
     rest = frame[frame["effect"] != RigidBody.name]
     if (twice := rest[["effect", "joint", "run", "name"]].duplicated()).any():
         row = rest[twice].iloc[0]
         raise InputError(
-            f"the parameters table: row {row.name} tells {row['name']} of {row['effect']} again,"
-            " expected every value once; delete one of both rows"
+            f"the parameters table: row {row.name} repeats {row['name']} of {row['effect']},"
+            " expected every value once; delete one of the two rows"
         )
     others = rest.groupby(["effect", "joint", "run"], sort=False, dropna=False)
     return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
 
 
 def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
-    """Return the effect that a parameters table tells of in some rows, all of one cause."""
+    """Return the effect that some rows of a parameters table describe."""
     first = rows.iloc[0]
     joint, run = (first[key] if isinstance(first[key], str) else None for key in ("joint", "run"))
     of = effect_named(str(first["effect"]))
@@ -83,8 +89,10 @@ def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
 
 
 def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
-    """Say why no real machine has the rigid bodies of a ``parameters/1`` table; empty when one
-    may."""
+    """Explain why no real machine has the rigid bodies of a ``parameters/1`` table.
+
+    Empty if they are realizable.
+    """
     bodies = parameters[parameters["effect"] == RigidBody.name]
     return [
         f"{run}: {reason}"
@@ -94,12 +102,11 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
 
 
 def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
-    """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence
-    each.
+    """Report first moments of mass that lie above their axes, a sentence each.
 
-    Empty where gravity does not act: nothing is above then. Angles count from hanging straight
-    down. A link may be overbalanced, or stand; where none is, the zero or a sign is wrong, or what
-    is taken for gravity is a spring.
+    Angles count from hanging straight down. A link may be overbalanced, or stand up. Otherwise its
+    zero or a sign is wrong, or a spring is mistaken for gravity. Empty if gravity does not act on
+    the mechanism.
     """
     if not machine.mechanism.has_gravity:
         return []

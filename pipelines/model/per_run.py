@@ -1,5 +1,4 @@
-"""Which values one run has of a cause that every run has its own of: an encoder's zero, an onset, a
-phase."""
+"""Values that differ from run to run: an encoder's zero, an onset, a phase."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,12 +12,20 @@ from pipelines.model import Model, Term, term_from
 def with_own_values(
     model: Model, table: Table, recording: Path | None
 ) -> tuple[Model, tuple[str, ...]]:
-    """Return a model with the values of the run that it is of, and what had to be guessed of them.
+    """Return a model with the values of one run, and remarks on values that were guessed.
 
-    A run that the diagnosis has seen gets what ``parameters/1`` tells of it; what never came there
-    is left out. Any other, and a loop that is of no recording, keeps the values in the table's
-    rows, the first training run's: nobody knows its own, and those of one run are as good a guess
-    as another's.
+    A run that the diagnosis used has its values in the metadata of ``parameters/1``; a term that is
+    absent there is dropped. Any other run, and a control loop without a recording, keeps the values
+    in the table's rows, which are those of the first training run.
+
+    Parameters
+    ----------
+    model : Model
+        Model with the values of the table's rows.
+    table : Table
+        The ``parameters/1`` table.
+    recording : Path, optional
+        File of the run; None for a control loop.
     """
     this = recording_behind(recording) if recording else None
     terms = [(own_term(term, table, this), guess(term, table, this, recording)) for term in model]
@@ -28,8 +35,23 @@ def with_own_values(
 
 
 def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
-    """Return a term as the recording of a hash has it; as it is where the table tells none, None if
-    it never came."""
+    """Return a term with the values of one recording.
+
+    Parameters
+    ----------
+    term : Term
+        Term with the values of the table's rows.
+    table : Table
+        The ``parameters/1`` table.
+    sha256 : str, optional
+        Hash of the recording.
+
+    Returns
+    -------
+    Term or None
+        ``term`` itself if the table has no values for the recording; None if the term is absent
+        there.
+    """
     values = _stated(term, table, sha256)
     if values is None:
         return term
@@ -37,15 +59,17 @@ def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
 
 
 def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) -> str | None:
-    """Say what ``own_term`` had to take in the place of a recording's own values; None where it had
-    not."""
+    """Explain the fallback used when the table has no values for this recording.
+
+    None if no fallback was needed.
+    """
     own = [p.name for p in term.effect.parameters if p.per_run]
     if not own or _stated(term, table, sha256) is not None:
         return None
     label, runs = term.effect.label, _runs(term, table)
-    of = f"that of {runs[0]['name']}, the first run it tells of" if runs else "that of its rows"
-    why = f"{table.path} tells none of {recording}" if recording else "this loop is no recorded run"
-    return f"{label}: each run has its own {' and '.join(own)}, and {why}; taken is {of}"
+    source = f"that of {runs[0]['name']}, its first run," if runs else "that of its rows"
+    reason = f"{table.path} has none for {recording}" if recording else "this loop has no recording"
+    return f"{label}: each run has its own {' and '.join(own)}, but {reason}; {source} is used"
 
 
 def _runs(term: Term, table: Table) -> list[dict[str, Any]]:

@@ -1,1 +1,1 @@
-"""Signals as arrays: filtering, differentiation, blocks, noise floors. Knows nothing of legs."""
+"""Process signals as arrays: filters, derivatives, block averages, spectra."""

@@ -1,33 +1,33 @@
-"""The running mean of one quantity along another: what stands in equally wide bins, averaged."""
+"""Average one quantity over equally wide bins of another."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 BINS, FEWEST = 40, 8
-"""Of a running mean, and the values that a mean is of at least."""
+"""Number of bins, and the least number of values in a mean."""
 
 
 def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArray, NDArray]:
-    """Return the mean of a quantity in equally wide bins along another, neighbours joined until
-    each has enough.
+    """Average a quantity in equally wide bins along another.
 
-    Enough is half of what bins have on average, and ``FEWEST``.
+    Neighbouring bins are joined until each holds enough values: half the average number per bin,
+    and at least ``FEWEST``.
 
     Parameters
     ----------
     x, y : (n,) array
-        Any order; what lies outside the bins is left out.
+        Positions and values, in any order. Values outside the bins are ignored.
     low, high : float
-        Where the bins begin and end, in the unit of ``x``.
+        Start of the first bin and end of the last, in the unit of ``x``.
 
     Returns
     -------
-    places, means : (k,) array
-        Means of ``x`` and of ``y``, k from 0, where all bins together hold too few, to ``BINS``.
+    positions, means : (k,) array
+        Means of ``x`` and of ``y``; k is at most ``BINS``, and 0 if all bins together hold too few.
     """
     edges = np.linspace(low, high, BINS + 1)
     number = np.searchsorted(edges, x, side="right") - 1
-    number = np.where(x == high, BINS - 1, number)  # the last bin has both its ends
+    number = np.where(x == high, BINS - 1, number)  # The last bin includes both ends.
     inside = (number >= 0) & (number < BINS)
     sums = np.array(
         [np.bincount(number[inside], weights, BINS) for weights in (None, x[inside], y[inside])]
@@ -38,7 +38,7 @@ def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArra
         if joined[-1][0] >= enough:
             joined.append(np.zeros(3))
         joined[-1] = joined[-1] + bin_sums
-    if joined[-1][0] < enough:  # what is left over at the end goes with those before
+    if joined[-1][0] < enough:  # The last bins join the mean before them.
         rest = joined.pop()
         if joined:
             joined[-1] = joined[-1] + rest

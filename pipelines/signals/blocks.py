@@ -1,8 +1,7 @@
-"""The regression filter: averages over short blocks, applied to torque and every regressor column
-alike.
+"""The regression filter: block averages of the torque and of every regressor column.
 
-Filtering the torque alone would leave a faultless fit with up to four times the noise; both sides
-alike, and kept away from reversals by short blocks, leave the noise itself
+Filtering the torque alone would multiply the noise of a perfect fit by up to four. Filtering both
+sides alike, in blocks too short to reach a reversal, keeps the noise as it is
 (docs/identification.md).
 """
 
@@ -19,13 +18,13 @@ HALF_POWER = 0.443
 
 @dataclass(frozen=True)
 class BlockAverage:
-    """Means over ``decimation`` samples; a block never reaches across a gap."""
+    """Average over blocks of ``decimation`` samples; no block spans a gap."""
 
     decimation: int
 
     @classmethod
     def lasting(cls, seconds: float, rate_hz: float) -> "BlockAverage":
-        """Return the filter whose blocks last about ``seconds``."""
+        """Return the filter with blocks of about ``seconds``."""
         return cls(max(1, round(seconds * rate_hz)))
 
     def cutoff_hz(self, rate_hz: float) -> float:
@@ -33,7 +32,7 @@ class BlockAverage:
         return HALF_POWER * rate_hz / self.decimation
 
     def as_metadata(self, rate_hz: float) -> dict[str, Any]:
-        """Return what a motion's metadata say of this filter (CONTRACTS, motion/1)."""
+        """Return the filter's entry in the metadata of ``motion/1``."""
         return {
             "kind": "block_average",
             "order": 1,
@@ -42,9 +41,19 @@ class BlockAverage:
         }
 
     def starts(self, segment: NDArray, before: int = 0) -> NDArray:
-        """Return the first sample of each whole block, given each sample's segment number (n,).
+        """Return the first sample of each whole block.
 
-        Where the first segment began earlier, ``before`` samples of it have gone already.
+        Parameters
+        ----------
+        segment : (n,) array
+            Segment number of each sample; each segment begins a new block.
+        before : int
+            Samples of the first segment that precede the array.
+
+        Returns
+        -------
+        (blocks,) array
+            Indices of samples.
         """
         first = np.flatnonzero(np.diff(segment, prepend=segment[0] - 1))
         last = np.append(first[1:], len(segment))
@@ -55,7 +64,20 @@ class BlockAverage:
         )
 
     def mean(self, x: NDArray, starts: NDArray) -> NDArray:
-        """Average ``x`` (n, ...) over the blocks: (blocks, ...)."""
+        """Average over each block.
+
+        Parameters
+        ----------
+        x : (n, ...) array
+            Samples, in any unit.
+        starts : (blocks,) array
+            First sample of each block.
+
+        Returns
+        -------
+        (blocks, ...) array
+            Means, in the unit of ``x``.
+        """
         if self.decimation == 1:
             return x[starts]
         total = np.zeros((len(starts), *x.shape[1:]))
@@ -64,7 +86,19 @@ class BlockAverage:
         return total / self.decimation
 
     def all(self, x: NDArray, starts: NDArray) -> NDArray:
-        """Tell for each block whether every sample of boolean ``x`` (n, ...) is true."""
+        """Return whether every sample of each block is true.
+
+        Parameters
+        ----------
+        x : (n, ...) bool array
+            Samples.
+        starts : (blocks,) array
+            First sample of each block.
+
+        Returns
+        -------
+        (blocks, ...) bool array
+        """
         whole = np.ones((len(starts), *x.shape[1:]), dtype=bool)
         for offset in range(self.decimation):
             whole &= x[starts + offset]
@@ -72,5 +106,5 @@ class BlockAverage:
 
 
 def dilate(x: NDArray, samples: int) -> NDArray:
-    """Spread every true sample of a boolean (n,) array by ``samples`` to both sides."""
+    """Spread every true value of a (n,) bool array by ``samples`` to both sides."""
     return maximum_filter1d(x.astype(np.uint8), 2 * samples + 1, mode="constant").astype(bool)

@@ -1,4 +1,4 @@
-"""Where a signal ends and its noise begins: the cut-off a low-pass should have."""
+"""Choose the cut-off of a low-pass: the frequency at which a signal sinks into its noise."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,27 +11,27 @@ from pipelines.signals.welch import Welch
 
 WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
-"""Share of the Nyquist frequency where an angle holds nothing but noise."""
+"""Band, as shares of the Nyquist frequency, in which an angle holds only noise."""
 HIGHEST_HZ = 12.5
-"""Highest cut-off, within the limits of ``HIGHEST_SHARE``: above it there is only what sticking
-joints do at reversals, which no fit uses."""
+"""Highest cut-off, within the limits of ``HIGHEST_SHARE``. Above it is only the motion of joints
+that stick at reversals, and no fit uses that."""
 HIGHEST_SHARE = (0.125, 0.25)
-"""Limits of the highest cut-off, shares of the Nyquist frequency; they act above 200 Hz and below
+"""Limits of the highest cut-off as shares of the Nyquist frequency. They act above 200 Hz and below
 100 Hz."""
 SLOW_SHARE = 0.9999
-"""Of the signal's power: the motion itself, which the filter must leave alone."""
+"""Share of the signal's power that counts as motion; the filter must not change it."""
 BEFORE_NOISE = 0.7
-"""Cut-off over the frequency where signal and noise meet: in acceleration noise outweighs signal
-well before."""
+"""Cut-off over the frequency where signal and noise meet. In acceleration, noise exceeds the signal
+well below that frequency."""
 QUIET_HZ = 3.0
-"""Width of noise after which no more signal is expected."""
+"""Width of a noise band above which no more signal is expected."""
 CLEAR = 3.0
-"""A spectrum this many times its floor is signal."""
+"""Ratio to the noise floor above which a spectrum is signal."""
 
 
 @dataclass(frozen=True)
 class Cutoff:
-    """A cut-off and why it was chosen."""
+    """A cut-off and the reason for it."""
 
     hz: float
     reason: str
@@ -39,7 +39,7 @@ class Cutoff:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral density of one channel and the level of its noise."""
+    """The power spectral density of one channel, with the level of its noise."""
 
     frequency_hz: NDArray
     density: NDArray
@@ -51,12 +51,22 @@ class Spectrum:
 
 
 def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
-    """Find where the spectrum of one channel, both arrays (f,), sinks into its noise floor."""
+    """Find where the spectrum of one channel sinks into its noise floor.
+
+    Parameters
+    ----------
+    frequency : (f,) array
+        Frequencies, Hz.
+    density : (f,) array
+        Power spectral density, unit²/Hz.
+    rate_hz : float
+        Sample rate.
+    """
     nyquist = rate_hz / 2
     band = (frequency >= NOISE_BAND[0] * nyquist) & (frequency <= NOISE_BAND[1] * nyquist)
     floor = float(np.median(density[band]))
     above = uniform_filter1d(density, max(1, len(frequency) // 100), mode="nearest") > CLEAR * floor
-    # A periodic motion has gaps between its lines; its end is where nothing follows for a while.
+    # A periodic motion has gaps between its lines: it ends where a wide band holds only noise.
     ahead = max(1, int(QUIET_HZ / frequency[1]))
     quiet = ~maximum_filter1d(above, ahead, origin=-(ahead // 2), mode="nearest")
     meets = frequency[np.argmax(quiet)] if quiet.any() else nyquist
@@ -68,11 +78,21 @@ def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
 def choose_cutoff(
     pieces: Iterable[NDArray], samples: int, rate_hz: float, channels: tuple[str, ...]
 ) -> Cutoff:
-    """Choose one cut-off for all channels of a signal that comes in pieces (n, channels),
-    ``samples`` in all.
+    """Choose one cut-off for all channels of a signal.
 
-    The noisiest channel decides, for the acceleration of one joint stands in the torque of both;
-    but twice the frequency of the fastest motion passes, whatever the noise.
+    The noisiest channel decides, because the acceleration of one joint enters the torque of both.
+    Twice the highest frequency of the fastest motion always passes.
+
+    Parameters
+    ----------
+    pieces : iterable of (n, channels) array
+        The signal, piece by piece.
+    samples : int
+        Samples in all pieces together.
+    rate_hz : float
+        Sample rate.
+    channels : tuple of str
+        Names of the channels, for the reason.
     """
     welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
     for piece in pieces:
@@ -91,8 +111,8 @@ def choose_cutoff(
             needed, f"{reason}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz"
         )
     if chosen > highest:
-        return Cutoff(highest, f"{reason}; above {highest:g} Hz is only what reversals leave")
+        return Cutoff(highest, f"{reason}; above {highest:g} Hz there are only reversals")
     return Cutoff(
         max(chosen, 2.0 * rate_hz / samples),
-        f"{reason}; in acceleration noise outweighs signal before that",
+        f"{reason}; in acceleration, noise exceeds the signal below that",
     )

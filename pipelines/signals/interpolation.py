@@ -1,4 +1,4 @@
-"""Interpolation between samples."""
+"""Interpolate between samples."""
 
 from typing import TypeVar
 
@@ -10,8 +10,18 @@ Place = TypeVar("Place", float, NDArray[np.float64])
 
 
 def cubic_weights(x: Place) -> tuple[Place, Place, Place, Place]:
-    """Return the weights of the samples at -1, 0, 1 and 2 for a place between 0 and 1: Lagrange's
-    cubic."""
+    """Return the weights of Lagrange's cubic interpolation.
+
+    Parameters
+    ----------
+    x : float or (n,) array
+        Position between the samples at 0 and 1.
+
+    Returns
+    -------
+    four of float or (n,) array
+        Weights of the samples at -1, 0, 1 and 2.
+    """
     return (
         -x * (x - 1) * (x - 2) / 6,
         (x + 1) * (x - 1) * (x - 2) / 2,
@@ -21,15 +31,19 @@ def cubic_weights(x: Place) -> tuple[Place, Place, Place, Place]:
 
 
 def between_readings(x: NDArray, longest: int) -> NDArray:
-    """Return what is read only now and then at every sample, (n, k), along Akima's curve through
-    its readings.
+    """Interpolate a slowly read quantity to every sample, along Akima's curve.
 
     Parameters
     ----------
-    x : NDArray
-        (n, k); a row with a NaN is no reading.
+    x : (n, k) array
+        Readings; a row with a NaN is no reading.
     longest : int
-        Readings further apart than so many samples tell nothing of what is between them: NaN.
+        Longest interval between two readings that is filled, in samples; longer ones are NaN.
+
+    Returns
+    -------
+    (n, k) array
+        Interpolated values; ``x`` itself if it has fewer than two readings, or one at every sample.
     """
     read = np.flatnonzero(np.isfinite(x).all(axis=1))
     if len(read) in (0, 1, len(x)):

@@ -1,7 +1,4 @@
-"""Zero-phase low-pass and the derivatives of what it leaves.
-
-scipy.signal, which is slow to import, is imported by the functions that filter.
-"""
+"""A zero-phase low-pass and derivatives of its output."""
 
 from functools import lru_cache
 
@@ -10,18 +7,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
 ORDER = 4
-"""Order of one pass; forwards and backwards the filter falls with twice this."""
+"""Order of one pass. Forwards and backwards together have twice this order."""
 
 DERIVATIVE_STENCIL = 5
-"""Samples in the difference formula: exact for polynomials of degree 4."""
+"""Samples in the difference formula; it is exact for polynomials of degree 4."""
 
 NEGLIGIBLE = 1e-18
-"""Of a cut in the data, what the filter may still feel of it: less than rounding."""
+"""Share of a cut's influence that is ignored; it is below rounding."""
 
 
 def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
-    """Return how many samples away a cut in the data is no longer felt: it fades as the slowest
-    pole does."""
+    """Return the samples over which a cut in the data influences the filter.
+
+    The influence decays with the slowest pole.
+    """
     from scipy.signal import butter
 
     _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
@@ -36,20 +35,31 @@ def _padding(rate_hz: float, cutoff_hz: float) -> int:
 
 
 def shortest(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the fewest samples a stretch needs to be filtered: one time constant's padding on each
-    side."""
+    """Return the least number of samples of a stretch that can be filtered.
+
+    Each side needs padding of one time constant.
+    """
     return max(DERIVATIVE_STENCIL, int(np.ceil(rate_hz / cutoff_hz))) + 1
 
 
 def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -> NDArray:
-    """Filter forwards and backwards along the first axis, so that nothing is delayed.
+    """Filter forwards and backwards along the first axis, without delay.
 
     Parameters
     ----------
     x : (n, ...) array
         Uniform samples of one unbroken stretch, at least ``shortest(rate_hz, cutoff_hz)`` of them.
-    rate_hz, cutoff_hz : float
-        Sample rate; frequency at which one pass has fallen by 3 dB, below half the sample rate.
+    rate_hz : float
+        Sample rate.
+    cutoff_hz : float
+        Frequency at which one pass has fallen by 3 dB, below half the sample rate.
+    order : int
+        Order of one pass.
+
+    Returns
+    -------
+    (n, ...) array
+        Filtered samples, in the unit of ``x``.
     """
     from scipy.signal import sosfiltfilt
 
@@ -60,8 +70,10 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
 
 @lru_cache
 def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
-    """Return the filter's second-order sections: their design takes longer than a short stretch's
-    filtering."""
+    """Return the filter's second-order sections, (order / 2, 6).
+
+    They are cached because their design takes longer than filtering a short stretch.
+    """
     from scipy.signal import butter
 
     return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
@@ -69,7 +81,7 @@ def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
 
 @lru_cache
 def _differences(order: int) -> NDArray:
-    """Return the weights of a stencil's samples in the derivative at each of them, per sample."""
+    """Return the weights (5, 5) of the derivative at each sample of a stencil, at 1 Hz."""
     from scipy.signal import savgol_coeffs
 
     size = DERIVATIVE_STENCIL
@@ -79,17 +91,30 @@ def _differences(order: int) -> NDArray:
 
 
 def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
-    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central
-    differences.
+    """Differentiate uniform samples along the first axis by central differences.
 
-    ``scipy.signal.savgol_filter`` does the same, and fits a polynomial at both ends of each stretch
-    anew.
+    ``scipy.signal.savgol_filter`` computes the same, but fits a polynomial again at both ends of
+    each stretch.
+
+    Parameters
+    ----------
+    x : (n, ...) array
+        Uniform samples.
+    rate_hz : float
+        Sample rate.
+    order : int
+        Order of the derivative, 1 or 2.
+
+    Returns
+    -------
+    (n, ...) array
+        Derivative, in the unit of ``x`` per s or s².
     """
     weights = _differences(order) * rate_hz**order
     half = DERIVATIVE_STENCIL // 2
     out = correlate1d(x, weights[half], axis=0, mode="nearest")
-    # Summed in one order whatever the shape of x, so that a column alone gives the same to the last
-    # digit.
+    # The order of summation is independent of the shape of x, so that results are reproducible
+    # column by column.
     for end, samples in (
         (slice(half), x[:DERIVATIVE_STENCIL]),
         (slice(-half, None), x[-DERIVATIVE_STENCIL:]),

@@ -1,5 +1,7 @@
-"""The power spectral density of a signal that comes piece by piece (Welch, 1967, IEEE Trans. Audio
-15(2))."""
+"""Estimate a power spectral density piece by piece.
+
+Source: Welch (1967), IEEE Trans. Audio 15(2).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,13 +9,15 @@ from scipy.signal import welch
 
 
 class Welch:
-    """An average over windows that overlap by half, across the pieces as if they were one.
+    """Average the spectra of windows that overlap by half, across pieces.
 
-    A Blackman-Harris window, because the leakage of a slow motion would otherwise hide the noise
-    floor.
+    A Blackman-Harris window is used, because leakage of a slow motion would otherwise hide the
+    noise floor.
 
     Parameters
     ----------
+    rate_hz : float
+        Sample rate.
     length : int
         Samples in a window.
     """
@@ -28,7 +32,7 @@ class Welch:
         self.frequency_hz: NDArray = np.fft.rfftfreq(length, 1.0 / rate_hz)
 
     def add(self, x: NDArray) -> None:
-        """Take the next samples (n, channels)."""
+        """Add the next samples, (n, channels)."""
         x = x if self._rest is None else np.concatenate([self._rest, x])
         windows = max(0, (len(x) - self._length) // self._hop + 1)
         if windows:
@@ -47,5 +51,5 @@ class Welch:
 
     @property
     def density(self) -> NDArray:
-        """(f, channels) unit²/Hz; at least one window's samples must have been added."""
+        """Power spectral density, (f, channels) unit²/Hz; needs at least one window."""
         return np.asarray(self._total / self._windows)

@@ -91,7 +91,7 @@ def test_the_realizable_fit_of_unreal_data_is_the_nearest_on_the_boundary_by_bru
     assert min(np.abs(on_boundary)) < 1e-5
     assert (
         fit.about["constrained"]
-        and "least squares alone finds no machine that can exist" in fit.remarks[0]
+        and "least squares alone gives a machine that cannot exist" in fit.remarks[0]
     )
 
     def rise(values):

@@ -327,7 +327,7 @@ def test_intervals_hold_where_a_sensor_is_tared_anew_in_each_run(tared, truth, t
 def test_a_run_that_the_diagnosis_did_not_see_is_told_to_have_anothers_zero(tared, tmp_path):
     runs, files = tared
     extension = named(told_of(files, lambda f: "train" in f.stem, tmp_path), runs, files)
-    told = [r for r in identify(runs, extension=extension).remarks if "tells none of" in r]
+    told = [r for r in identify(runs, extension=extension).remarks if "has none for" in r]
     assert len(told) == 2
     assert "exo_alone_validate.parquet" in told[0]
 

@@ -246,10 +246,9 @@ def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_value
     )
     assert effects["encoder_offset@knee"] == {"offset": 0.1} and strayed > 1e-3
     assert (
-        err
-        == f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none"
-        f" of {recording}; taken is that of recording.parquet, the first run it tells of. The"
-        " errors contain the difference"
+        err == f"warning: encoder_offset@knee: each run has its own offset, but {parameters} has"
+        f" none for {recording}; that of recording.parquet, its first run, is used. The errors"
+        " contain the difference"
     )
 
 
@@ -278,8 +277,8 @@ def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_t
     )
     _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
     assert err.startswith(
-        f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of"
-        f" {recording}; taken is that of its rows"
+        f"warning: payload_change@knee: each run has its own time, but {parameters} has none for"
+        f" {recording}; that of its rows is used"
     )
 
 
