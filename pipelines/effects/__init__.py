@@ -1,4 +1,4 @@
-"""Every effect exoid knows, in plain sight. Adding one is a file and a line here."""
+"""All effects of exoid, in one tuple. A new effect needs a file and a line here."""
 
 from pipelines.effects.backlash import Backlash
 from pipelines.effects.base_tilt import BaseTilt

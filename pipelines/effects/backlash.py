@@ -12,27 +12,26 @@ from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
-"""N·m/rad of hard teeth in contact; stiff against every joint, soft enough for the integration
-step."""
+"""Stiffness of hard teeth in contact, N·m/rad; much above that of any joint, but low enough for the
+integration step."""
 
 SHAFT_STIFFNESS = 4000.0
-"""N·m/rad of teeth on a shaft that twists. Only then a measured motion tells how the link strikes
-them."""
+"""Stiffness of teeth on a shaft that twists, N·m/rad. Only at this stiffness does a measured motion
+determine the link's impacts."""
 
 STRIKING_RATIO = 1.0
-"""Damping ratio at which the link is let strike the teeth behind a measured motion: how it bounces
-no motion tells."""
+"""Damping ratio of the link's impacts behind a measured motion, which does not determine how it
+bounces."""
 
 CONTACT_DAMPING_RATIO = 0.3
-"""Of the motor's swing on its teeth."""
+"""Damping ratio of the motor's swing on its teeth."""
 
 CROSSING_TORQUE = 2.0
-"""N·m on both sides of zero within which the estimate of the transmitted torque does not tell the
-side."""
+"""Transmitted torque in N·m below which its estimate does not determine the side."""
 
 
 class Backlash(Effect):
-    """The link hangs on that side of the play towards which the torque pushes it."""
+    """The transmitted torque pushes the link to one side of the play."""
 
     name = "backlash"
     title = "Backlash"
@@ -69,7 +68,7 @@ class Backlash(Effect):
 
     @spring
     def spring(twist, twist_rate, values):
-        """Return nothing within the play; beyond it teeth that push and never pull."""
+        """Return zero within the play; beyond it, the torque of teeth that push and never pull."""
         half = 0.5 * values[0]
         damping = 2.0 * CONTACT_DAMPING_RATIO * sqrt(values[1] * MOTOR_INERTIA)
         if twist > half:
@@ -79,11 +78,11 @@ class Backlash(Effect):
         return 0.0
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the link, which falls through the play and strikes the teeth.
+        """Return the motion of the link, which crosses the play and strikes the teeth.
 
-        Where these are hard, or the link's mass is unknown, it hangs on that side towards which the
-        transmitted torque pushes it, at the motor's speed: a motor that hard teeth strike jumps
-        faster than it is sampled.
+        If the teeth are hard, or the link's mass is unknown, the link lies on the side towards
+        which the transmitted torque pushes it, at the motor's speed: after an impact of hard teeth,
+        a motor jumps faster than it is sampled.
         """
         values = self.completed(shape)
         if motion.link_swing is not None and values[1] < max(self.shape[1].forms):

@@ -1,4 +1,4 @@
-"""A machine that does not stand upright."""
+"""A machine whose base is not level."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,9 @@ from pipelines.mechanics.motion import Motion
 
 
 class BaseTilt(Effect):
-    """Gravity's direction is off, so every segment's angle from the vertical is.
+    """The direction of gravity is off, and so is every segment's angle from the vertical.
 
-    Inertia does not depend on the hip angle: a tilt is the same as a hip angle counted from another
-    direction.
+    Inertia does not depend on the hip angle, so a tilt equals a shift of the hip angle's zero.
     """
 
     name = "base_tilt"
@@ -21,13 +20,13 @@ class BaseTilt(Effect):
     side = Side.STRUCTURE
     family = Family.ANGLE
     resembles = ("angle", "other_angle", "both_angles")
-    forms_differ = "a real base gives way under load, so its tilt changes with the motion"
+    forms_differ = "a real base yields under load, so its tilt changes with the motion"
     equation = "hip angle from the vertical = hip angle from the base + tilt"
     source = (
         "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the"
         " base's frame)"
     )
-    looks_like = "gravity torque that leads or lags the first joint's angle in every run alike"
+    looks_like = "gravity torque that leads or lags the first joint's angle equally in every run"
     confirm = (
         "put a spirit level on the base, or let the machine hang freely and read its first angle"
     )
@@ -39,13 +38,12 @@ class BaseTilt(Effect):
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return it where the first joint turns: a tilt adds to an angle, not to where a slide
-        stands."""
+        """Return ``[None]`` if the first joint is revolute, and nothing otherwise."""
         return super().possible(machine) if machine.joints[0].kind == "revolute" else []
 
     @reading
     def reading(angle, values, joint):
-        """Count the hip's angle from the base."""
+        """Measure the hip's angle from the base."""
         angle[0] -= values[0]
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:

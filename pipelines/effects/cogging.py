@@ -22,7 +22,7 @@ def _amplitudes(number: str) -> tuple[Parameter, ...]:
 
 
 def _cycles(number: str) -> Parameter:
-    meaning = "waves in a turn of the joint"
+    meaning = "waves per turn of the joint"
     return Parameter(f"cycles_per_turn{number}", "1/turn", meaning, "n", ORDERS)
 
 
@@ -34,7 +34,7 @@ def _reported(number: str) -> tuple[Parameter, ...]:
         Parameter(
             f"phase{number}",
             "rad",
-            "of the wave at angle zero",
+            "phase of the wave at angle zero",
             "phi",
             turn,
             of_joint=False,
@@ -46,30 +46,30 @@ def _reported(number: str) -> tuple[Parameter, ...]:
 class Cogging(Effect):
     """Magnets against slots, teeth against teeth: a ripple fixed to the joint's angle.
 
-    A gear may ripple at up to four unrelated numbers of cycles a turn. Further lines have the
+    A gear may ripple at up to four unrelated numbers of cycles per turn. Further lines have the
     parameters ``amplitude_2``, ``cycles_per_turn_2``, ``phase_2``, and so on up to ``_4``.
     """
 
     lines: int = 1
-    """How many lines it has."""
+    """Number of its lines."""
 
     name = "cogging"
     title = "Cogging"
     side = Side.DRIVE
     family = Family.ANGLE
     resembles = ("angle",)
-    forms_differ = "a real ripple may differ forward and back, and grow with the load"
+    forms_differ = "a real ripple may depend on the direction of motion, and grow with the load"
     equation = "tau = A sin(n q) + B cos(n q), one such term for each line"
     source = "Holtz, Springob (1996), IEEE TIE 43(2); Tuttle, Seering (1996), IEEE T-RA 12(3)"
     looks_like = "residual against angle: a wave that is the same forward and backward"
-    confirm = "move the joint slowly and evenly, plot torque against the way, and count the waves"
+    confirm = "move the joint slowly and evenly, plot torque against angle, and count the waves"
     linear = _amplitudes("")
     shape = (_cycles(""),)
     reported = _reported("")
     parity = Parity.EVEN
 
     def __post_init__(self) -> None:
-        """Take the parameters of all lines."""
+        """Use the parameters of all lines."""
         numbers = ["", *(f"_{k}" for k in range(2, self.lines + 1))]
         if len(numbers) > 1:
             linear = tuple(p for number in numbers for p in _amplitudes(number))
@@ -88,20 +88,20 @@ class Cogging(Effect):
             out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
 
     def with_parts_named(self, names: Collection[str]) -> "Cogging":
-        """Return the effect with as many lines as the names of values tell of."""
+        """Return the effect with as many lines as the names of its values require."""
         numbers = range(2, MOST_LINES + 1)
         present = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]
         return replace(self, lines=max(present, default=1))
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line."""
+        """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line, (p,)."""
         values = np.asarray(values, dtype=float)
         sine, cosine = values[: 2 * self.lines].reshape(-1, 2).T
         cycles = values[2 * self.lines :]
         return np.column_stack([np.hypot(sine, cosine), cycles, np.arctan2(cosine, sine)]).ravel()
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sine and cosine of each line, then the cycles per turn."""
+        """Return the amplitudes of sine and cosine of each line, then the cycles per turn, (p,)."""
         amplitude, cycles, phase = np.reshape(physical, (-1, 3)).T
         waves = np.column_stack([amplitude * np.cos(phase), amplitude * np.sin(phase)])
         return np.concatenate([waves.ravel(), cycles])

@@ -5,7 +5,7 @@ from pipelines.effects.kernel import reaction
 
 
 class CoulombAsymmetry(Effect):
-    """More Coulomb friction one way than the other."""
+    """More Coulomb friction in one direction than in the other."""
 
     name = "coulomb_asymmetry"
     title = "Coulomb asymmetry"
@@ -19,7 +19,7 @@ class CoulombAsymmetry(Effect):
         "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive"
         " chain's offset"
     )
-    looks_like = "a constant while the joint moves, whichever way; at standstill it is gone"
+    looks_like = "a constant while the joint moves in either direction, and zero at standstill"
     confirm = (
         "move the empty joint slowly both ways through the same range: the mean torque less gravity"
         " is the asymmetry"

@@ -9,25 +9,23 @@ from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
 RELAXATION_S = 0.02
-"""Damping over stiffness of soft tissue under a strap."""
+"""Damping over stiffness of soft tissue under a strap, s."""
 
 MACHINE_INERTIA = 0.02
-"""kg·m² on the machine's side, so that the joint has some where a model counts all of its mass as
-the limb's."""
+"""Inertia on the machine's side, kg·m²; a joint needs some even if a model assigns all mass to the
+limb."""
 
 
 class CuffCompliance(Effect):
-    """Soft tissue and straps: the limb lags the exoskeleton by the torque between them over a
-    stiffness.
+    """Soft tissue and straps: the limb lags the exoskeleton by torque over stiffness.
 
-    What sits on the wearer's side of the cuffs, and only that, sees the limb's motion: human
-    effects, and the rigid body bound to ``with_human`` runs. Where that body counts machine and
-    human together, as a fit of each kind of run for itself has it, the stiffness comes out too high
-    by the machine's share of the mass; with the machine's body of its own beside the human's it is
-    exact.
+    Only effects on the wearer's side of the cuffs see the limb's motion: human effects, and the
+    rigid body bound to ``with_human`` runs. If that body holds machine and human together, as in a
+    fit of each kind of run by itself, the stiffness is overestimated by the machine's share of the
+    mass. With a separate body of the machine it is exact.
 
-    Forward dynamics knows the shank that goes with the thigh only; ``shank_held`` is for what was
-    measured.
+    Forward dynamics supports only a shank that moves with the thigh; ``shank_held`` is for measured
+    motions.
     """
 
     name = "cuff_compliance"
@@ -57,7 +55,7 @@ class CuffCompliance(Effect):
         Parameter(
             "shank_held",
             "1",
-            "1 where the shank's own cuff holds it while the thigh moves",
+            "1 if the shank's own cuff holds it while the thigh moves",
             "e",
             (0.0, 1.0),
             default=0.0,
@@ -85,8 +83,7 @@ class CuffCompliance(Effect):
         return values[0] * (twist * (1.0 + values[2] * twist * twist) + RELAXATION_S * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the limb; it follows its torque at once where its mass is
-        unknown."""
+        """Return the motion of the limb; without its mass, it follows its torque immediately."""
         stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
         if motion.limb_swing is not None:
@@ -100,9 +97,9 @@ class CuffCompliance(Effect):
         return motion.with_state(q, dq, ddq)
 
     def _direction(self, motion: Motion, shank_held: bool) -> NDArray:
-        """Return how the limb's joints turn per unit of twist, (n, J).
+        """Return the rotation of the limb's joints per unit of twist, (n, J).
 
-        A thigh that moves in its cuff moves the knee. The shank goes with it, or pivots in a cuff
+        A thigh that moves in its cuff moves the knee. The shank moves with it, or pivots in a cuff
         that is firm.
         """
         j = self.column(motion)

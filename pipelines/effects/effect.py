@@ -1,13 +1,13 @@
-"""The interface of an effect: one physical phenomenon, its equation stated once.
+"""The interface of an effect: one physical phenomenon, with its equation written once.
 
-An effect says where it acts by which hooks it has:
+An effect acts through the hooks that it defines:
 
 ==================  ===========================================================
 ``reaction``        torque the drives must supply; linear in ``linear``, any function of ``shape``
 ``derivative``      rate of the memory (``states`` of it) that ``reaction`` reads
 ``spring``          torque across a joint that is not rigid
-``reading``         what the encoders make of the angles
-``torque_reading``  what the torque sensors make of the torque
+``reading``         angles that the encoders report for true angles
+``torque_reading``  torques that the torque sensors report for true torques
 ``corrected``       the inverse of ``spring`` or ``reading`` for a measured motion
 ==================  ===========================================================
 
@@ -36,9 +36,9 @@ DIFFERENCE = 1e-6
 
 
 WIDE = 4.0
-"""Ratio of a typical range's ends above which a parameter changes by factors."""
+"""Ratio of a typical range's ends above which a parameter varies by factors."""
 LEAST_WARMING_C = 1.0
-"""Change of a motor's temperature without which nothing that depends on it can be seen."""
+"""Least change of a motor's temperature, °C, from which a dependence on it can be fitted."""
 
 
 class Side(StrEnum):
@@ -51,8 +51,7 @@ class Side(StrEnum):
 
 
 class Family(StrEnum):
-    """The kind of law that an effect follows, as a reader who does not know the catalogue names
-    it."""
+    """The kind of law that an effect follows, in words that need no catalogue."""
 
     ANGLE = "angle"
     SPEED = "speed"
@@ -97,7 +96,7 @@ friction_over_time      friction that changes slowly with time
 time                    a torque that wanders with time, in each run in its own way
 hum                     a line at a fixed frequency
 across_joints           torques of both joints, the slopes of one elastic energy of both angles
-quantisation            what rounding to coarse steps adds to the measured torque
+quantisation            error of a measured torque that is rounded to coarse steps
 ======================= ==========================================================================
 """
 
@@ -107,7 +106,7 @@ FAMILY_OF_SIDE = {
     Side.SENSOR: Family.SENSOR,
     Side.HUMAN: Family.PERSON,
 }
-"""The family of an effect that states none."""
+"""Family of an effect that defines none."""
 
 LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
     Family.ANGLE: ("angle", "both_angles"),
@@ -119,11 +118,11 @@ LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
     Family.SENSOR: ("angle", "load"),
     Family.PERSON: ("angle", "both_angles", "speed"),
 }
-"""What an effect that states none ``resembles``."""
+"""Laws that an effect ``resembles`` if it defines none."""
 
 
 class Parity(IntEnum):
-    """What becomes of a torque when the same path is run backwards in time."""
+    """Sign of a torque when the same path is traversed backwards in time."""
 
     EVEN = 1
     ODD = -1
@@ -138,44 +137,43 @@ class Parameter:
     meaning: str
     symbol: str
     typical: tuple[float, float]
-    """The range seen on exoskeletons; a search for a shape parameter spans it."""
+    """Range on exoskeletons; a search for a shape parameter spans it."""
     per_run: bool = False
-    """True where each run has a value of its own, as an onset time has."""
+    """True if each run has a value of its own, such as an onset time."""
     default: float | None = None
-    """What it is where nobody says; a shape parameter that has one may be held in a fit."""
+    """Default value; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
-    """Values that stand for the known members of a family of shapes; empty where the range is all
-    there is."""
+    """Values of the known members of a family of shapes; empty if there are none besides the
+    range."""
     between_forms: bool = True
-    """False where only the forms exist, as of a sign or a switch."""
+    """False if only the forms exist, as for a sign or a switch."""
     grain: float = 1.0
-    """Step of a search along what an effect oscillates with."""
+    """Step of a search along an oscillating effect."""
     swept: bool = False
-    """True where it is a place on the joint's way: a search spans what the motion sweeps, not
-    ``typical``."""
+    """True for a position of the joint: a search then spans the motion's range, not ``typical``."""
     of_joint: bool = True
-    """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic
-    joint too."""
+    """False if its unit does not depend on the joint: a phase is an angle at a prismatic joint
+    too."""
 
     @property
     def neutral(self) -> float:
-        """Value at which its effect is not there; of a stiffness, the end that it never reaches."""
+        """Value at which its effect vanishes; for a stiffness, the end that it never reaches."""
         return 1.0 if self.unit == "1" and self.typical[0] > 0 else 0.0
 
     @property
     def by_factors(self) -> bool:
-        """Whether it changes by factors: its typical range is positive and wide."""
+        """Whether it varies by factors: its typical range is positive and wide."""
         low, high = self.typical
         return low > 0.0 and high / low > WIDE
 
     def off_middle(self, value: float) -> float:
-        """Return how far a value is off the middle of the typical range, in halves of the range."""
+        """Return the distance of a value from the middle of the typical range, in half ranges."""
         ends = np.array([*self.typical, value])
         low, high, at = np.log(np.maximum(ends, np.finfo(float).tiny)) if self.by_factors else ends
         return float((2.0 * at - low - high) / (high - low))
 
     def at(self, machine: Machine, joint: str) -> "Parameter":
-        """Return the parameter as it is at a joint of a machine."""
+        """Return the parameter with unit and ranges of a joint of a machine."""
         if not self.of_joint:
             return self
         scale, (low, high) = machine.scale(joint).of(self.unit), self.typical
@@ -191,16 +189,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """A physical effect, bound to a joint (and, if asked, to one kind of run)."""
+    """A physical effect, bound to a joint and optionally to one kind of run."""
 
     joint: str | None = None
-    """The joint it acts at; None for an effect of the whole leg."""
+    """Joint at which it acts; None for an effect of the whole leg."""
     run: str | None = None
-    """The only kind of run whose torque it explains; None for all it acts in."""
+    """The only kind of run in which it acts; None for all in ``acts_in``."""
     on: Machine = THE_LEG
-    """The machine that has it."""
+    """Machine that has it."""
     each_run: bool = False
-    """True where its values are others in every run; only of effects that ``may_differ``."""
+    """True if its values differ from run to run; only for effects that ``may_differ``."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -208,68 +206,66 @@ class Effect(ABC):
     equation: ClassVar[str]
     source: ClassVar[str]
     looks_like: ClassVar[str]
-    """What it leaves in a plot of the residual."""
+    """Its signature in a plot of the residual."""
     confirm: ClassVar[str]
-    """How to make sure of it on the rig."""
+    """Instructions to confirm it on the rig."""
     family: ClassVar[Family]
-    """The kind of law it follows; one that states none has the family of its side
-    (``FAMILY_OF_SIDE``)."""
+    """Kind of law that it follows; by default that of its side (``FAMILY_OF_SIDE``)."""
     any_form: ClassVar[str] = ""
-    """The smooth law that is this effect whatever its form; empty where only forms near its own
-    are."""
+    """Smooth law that equals this effect whatever its form; empty if only similar forms do."""
     resembles: ClassVar[tuple[str, ...]]
-    """Smooth laws of its joint (``LAWS``) that contain it approximately: as such a law a verdict
-    tells of a real effect that is too far from our equation. One that states none has those of its
-    family (``LAWS_OF_FAMILY``)."""
+    """Smooth laws of its joint (``LAWS``) that contain it approximately. A verdict reports such a
+    law if the real effect is too far from the equation. By default those of its family
+    (``LAWS_OF_FAMILY``)."""
     forms_differ: ClassVar[str] = ""
-    """How the real effect may differ from the equation, a sentence without its full stop; empty
-    where nobody said."""
+    """How the real effect may differ from the equation: a sentence without its full stop, or
+    empty."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
-    """Places of joints at which another parameter takes it up whole, and which."""
+    """By the place of a joint, the other parameter that absorbs it completely there."""
     needs_temperature: ClassVar[bool] = False
-    """True where it is known only in runs in which its motor's temperature was read."""
+    """True if it acts only in runs whose motor temperature was measured."""
     by_angle: ClassVar[bool] = False
-    """True where it shows only in a torque that depends on where its joint stands, as gravity's
-    does; at the whole machine, on where the first one does."""
+    """True if it shows only in a torque that depends on the joint's position, such as gravity's.
+    For the whole machine, the first joint counts."""
     holds: ClassVar[bool] = False
-    """True where it raises what can hold a joint that stands."""
+    """True if it increases the torque that can hold a joint at rest."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
-    """Amplitudes, as a fit solves for them."""
+    """Amplitudes, in the form that a fit solves for."""
     shape: ClassVar[tuple[Parameter, ...]] = ()
-    """What the torque is a nonlinear function of; those with a default come last."""
+    """Parameters of which the torque is a nonlinear function; those with a default come last."""
     reported: ClassVar[tuple[Parameter, ...] | None] = None
-    """What files say of it where that is not what a fit solves for, as amplitude and phase of sine
-    and cosine."""
+    """Parameters in files, if they differ from those of a fit, such as amplitude and phase instead
+    of sine and cosine."""
 
     parity: ClassVar[Parity | None] = None
-    """Of the torque in velocity; None where it has none, or has a memory."""
+    """Parity of the torque in velocity; None if it has none, or has a memory."""
     dissipative: ClassVar[bool] = False
-    """True where positive amplitudes never feed energy into the joint."""
+    """True if positive amplitudes never feed energy into the joint."""
     states: ClassVar[int] = 0
     inertial: ClassVar[bool] = False
-    """True where ``reaction`` depends on acceleration: it then adds to the mass matrix."""
+    """True if ``reaction`` depends on acceleration, and so adds to the mass matrix."""
     motor_inertia: ClassVar[float] = 0.0
     """kg·m² on the motor's side of ``spring``."""
     known_to: ClassVar[float] = 0.0
-    """Relative standard error that the effect's approximation of itself adds to its first shape,
-    whatever the data."""
+    """Relative standard error of its first shape parameter due to the effect's own
+    approximations."""
     may_differ: ClassVar[str] = ""
-    """What is set anew at every start, so that each run may have another; empty where all runs
-    share it."""
+    """The thing that is set at every start, so that each run may have another value; empty if all
+    runs share one."""
     at_cuff: ClassVar[bool] = False
-    """True where ``spring`` stands between machine and limb, not between motor and link."""
+    """True if ``spring`` lies between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False
-    """True where ``corrected`` lets the load swing on the spring: what it does then depends on its
+    """True if ``corrected`` lets the load swing on the spring, so that its motion depends on
     frequency."""
     reads_load: ClassVar[bool] = False
-    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has
-    to be smoothed.
+    """True if ``reaction`` depends on the transmitted torque.
 
-    Of others, columns are computed once for motions that differ in their loads alone.
+    Along a measured motion, that torque must be smoothed. The columns of other effects are computed
+    once for motions that differ in their loads alone.
     """
     reading_states: ClassVar[int] = 0
     reaction: ClassVar[Callable[..., Any] | None] = None
@@ -279,7 +275,7 @@ class Effect(ABC):
     torque_reading: ClassVar[Callable[..., Any] | None] = None
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Complete what the class leaves unsaid of its family."""
+        """Fill in the family and the laws that the class does not define."""
         super().__init_subclass__(**options)
         side = getattr(cls, "side", None)
         if side is None:
@@ -290,8 +286,7 @@ class Effect(ABC):
             cls.resembles = LAWS_OF_FAMILY[cls.family]
 
     def __post_init__(self) -> None:
-        """Say in the machine's own units and equations what the class says of a leg, and what each
-        run has."""
+        """Adapt units and equations to the machine, and mark parameters that differ by run."""
         if self.each_run:
             for role in ("linear", "shape"):
                 object.__setattr__(
@@ -309,8 +304,10 @@ class Effect(ABC):
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return the joints of a machine that can have it and show it; ``[None]`` where it is the
-        whole machine's."""
+        """Return the joints of a machine that can have the effect and show it.
+
+        ``[None]`` if it belongs to the whole machine.
+        """
         mechanism = machine.mechanism
         if cls.name in mechanism.absorbs:
             return []
@@ -332,61 +329,58 @@ class Effect(ABC):
 
     @property
     def scale(self) -> Scale:
-        """The scale of its joint, beside an exoskeleton's."""
+        """Scale of its joint relative to an exoskeleton's."""
         return self.on.scale(self.joint) if self.joint else Scale()
 
     @property
     def fitted(self) -> tuple[Parameter, ...]:
-        """Linear parameters, then shape parameters: the order of a term's values everywhere."""
+        """Linear, then shape parameters: the order of a term's values everywhere."""
         return self.linear + self.shape
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What files and reports call its parameters, CONTRACTS' names among them."""
+        """Parameters as files and reports name them."""
         return self.fitted if self.reported is None else self.reported
 
     @property
     def label(self) -> str:
-        """``effect@joint``, as tables of candidates name it."""
+        """``effect@joint``, as in tables of candidates."""
         return f"{self.name}@{self.joint}" if self.joint else self.name
 
     @property
     def per_run(self) -> bool:
-        """Tell whether each run has some value of it for itself, as an onset or a phase."""
+        """Whether some value differs from run to run, such as an onset or a phase."""
         return any(p.per_run for p in self.fitted)
 
     @property
-    def goes_with_time(self) -> bool:
-        """Tell whether its torque goes with wall time, as a rhythm's and a drift's do: more than a
-        zero set anew."""
+    def depends_on_time(self) -> bool:
+        """Whether the torque depends on wall time, as that of a rhythm or a drift does."""
         return self.per_run and not self.each_run
 
     @property
     def sized_each_run(self) -> bool:
-        """Tell whether each run has a size of it for itself, so that one run says nothing of
-        another's."""
+        """Whether the size differs from run to run, so that no run predicts another's."""
         return self.each_run or any(p.per_run for p in self.linear)
 
     @property
     def rings(self) -> bool:
-        """Tell whether it is a transmission that swings on its load."""
+        """Whether it is a transmission whose load can swing."""
         return self.spring is not None
 
     @property
     def on_limb(self) -> bool:
-        """Tell whether it sits on the wearer's side of the cuffs."""
+        """Whether it acts on the wearer's side of the cuffs."""
         return self.side is Side.HUMAN or self.run == "with_human"
 
     def explains(self, motion: Motion) -> bool:
-        """Tell whether the effect is there in this run, and what it depends on was read."""
+        """Return whether the effect acts in this run, with all measurements that it depends on."""
         known = not self.needs_temperature or bool(
             np.isfinite(motion.motor_temperature[:, self.column(motion)]).all()
         )
         return known and self.acts(motion.run)
 
     def shows_in(self, motions: Sequence[Motion]) -> bool:
-        """Tell whether runs hold what the effect depends on, so that it can be asked for in
-        them."""
+        """Return whether runs hold the measurements that the effect depends on."""
         if self.needs_temperature and not self.temperature_varies(
             [m for m in motions if self.acts(m.run)]
         ):
@@ -394,24 +388,23 @@ class Effect(ABC):
         return any(self.explains(motion) for motion in motions)
 
     def temperature_varies(self, motions: Sequence[Motion]) -> bool:
-        """Tell whether every run has its motor's temperature, and not the same one throughout all
-        of them."""
+        """Return whether every run has its motor's temperature, and the temperatures vary."""
         read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
         ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
-        return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)  # NaN is not
+        # Missing temperatures are NaN, and the comparison is then false.
+        return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return shapes in proportion to which the effect transforms the measurement; empty where
-        it is not linear.
+        """Return shapes for which the effect is linear; empty if it is not.
 
-        Each set of shapes (s,) is a candidate that has one column for each of them: the effect of
-        any combination is that combination of the columns, so that no grid of shapes needs to be
+        Each set of shapes (s,) is a candidate with one column per shape. The effect of any
+        combination is the same combination of the columns, so that no grid of shapes must be
         searched.
         """
         return ()
 
     def acts(self, kind: str) -> bool:
-        """Tell whether the effect is there in a kind of run."""
+        """Return whether the effect acts in a kind of run."""
         return kind in self.acts_in and self.run in (None, kind)
 
     def column(self, motion: Motion) -> int:
@@ -423,13 +416,14 @@ class Effect(ABC):
         return np.asarray(values, dtype=float)
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the values of ``fitted`` for those of ``parameters``, (p,) each: the inverse of
-        ``physical``."""
+        """Return the values of ``fitted`` for those of ``parameters``, (p,) each.
+
+        The inverse of ``physical``.
+        """
         return np.asarray(physical, dtype=float)
 
     def jacobian(self, values: NDArray) -> NDArray:
-        """Return how ``physical`` changes with ``values``, (parameters, fitted), to carry intervals
-        over."""
+        """Return the derivative of ``physical``, (parameters, fitted), at values (fitted,)."""
         values = np.asarray(values, dtype=float)
         if type(self).physical is Effect.physical:
             return np.eye(len(values))
@@ -439,30 +433,31 @@ class Effect(ABC):
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
 
     def with_parts_named(self, names: Collection[str]) -> "Effect":
-        """Return the effect with as many parts as the names of some values tell of; of most effects
-        there is one."""
+        """Return the effect with as many parts as the names of its values require.
+
+        Most effects have one part.
+        """
         return self
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
-        """Return values of ``fitted``, (p,), with the defaults of those that are left out at the
-        end."""
+        """Return values of ``fitted``, (p,), with defaults for those missing at the end."""
         rest = [p.default for p in self.fitted[len(values) :]]
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Return the measured torque per unit of each linear parameter.
+        """Return the effect's part of the measured torque per unit of each linear parameter.
 
         Parameters
         ----------
         motion : Motion
-            n samples of J joints.
-        shape : (s,) array, optional
-            The nonlinear parameters of this run, in the order of ``self.shape``.
+            Motion of n samples and J joints.
+        shape : (s,) array
+            Shape values in this run, in the order of ``self.shape``.
 
         Returns
         -------
         (n, J, p) array
-            N·m per unit.
+            N·m per unit of each linear parameter.
         """
         columns = np.zeros((*motion.q.shape, len(self.linear)))
         if not self.linear or not self.explains(motion):
@@ -501,25 +496,58 @@ class Effect(ABC):
             )
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:
-        """Torque that the effect adds to what is measured, (n, J) N·m."""
+        """Return the effect's part of the measured torque.
+
+        Parameters
+        ----------
+        motion : Motion
+            Motion of n samples and J joints.
+        values : (p + s,) array
+            Linear, then shape values.
+
+        Returns
+        -------
+        (n, J) array
+            N·m.
+        """
         linear, shape = np.split(np.asarray(values, dtype=float), [len(self.linear)])
         return self.columns(motion, shape) @ linear
 
     def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray | None:
-        """Return the torque that the cuffs measure of the effect per unit of each linear parameter.
+        """Return the torque that the cuffs measure of the effect, per unit of each parameter.
 
-        ``columns``, (n, J, p), is what the drives measure of it along the same motion. Cuffs
-        measure what is on the wearer's side of them, (n, J, p) too, and nothing else: then it is
-        None.
+        Parameters
+        ----------
+        motion : Motion
+            Motion of n samples and J joints.
+        columns : (n, J, p) array
+            Torque that the drives measure along the same motion.
+
+        Returns
+        -------
+        (n, J, p) array or None
+            None for an effect on the machine's side of the cuffs, which they do not measure.
         """
         return columns if self.on_limb else None
 
     def observed(
         self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()
     ) -> NDArray:
-        """Return what the torque sensors make of torques that the drives deliver, both (n, J, p).
+        """Return the torques that the torque sensors report, without the effect's own ``columns``.
 
-        What they add of their own is in ``columns``.
+        Parameters
+        ----------
+        columns : (n, J, p) array
+            Torques that the drives deliver.
+        motion : Motion
+            Motion of n samples and J joints.
+        shape : (s,) array
+            Shape values in this run.
+
+        Returns
+        -------
+        (n, J, p) array
+            Reported torques.
         """
         if self.torque_reading is None or not self.shape or not self.explains(motion):
             return columns
@@ -548,14 +576,32 @@ class Effect(ABC):
         return out
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Return what the drives deliver where their sensors say ``torque`` (n, J): the inverse of
-        the reading."""
+        """Return the torques that the drives deliver: the inverse of the sensors' reading.
+
+        Parameters
+        ----------
+        torque : (n, J) array
+            Reported torques, N·m.
+        motion : Motion
+            Motion of n samples.
+        values : (p + s,) array
+            Linear, then shape values.
+
+        Returns
+        -------
+        (n, J) array
+            N·m.
+        """
         return torque - self.torque(motion, values) if self.torque_reading is not None else torque
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion as it would have been measured without this effect in the sensor or
-        transmission.
+        """Return the motion as it is without this effect in the sensor or transmission.
 
-        ``shape`` (s,) holds the nonlinear parameters of this run, in the order of ``self.shape``.
+        Parameters
+        ----------
+        motion : Motion
+            Measured motion.
+        shape : (s,) array
+            Shape values in this run, in the order of ``self.shape``.
         """
         return motion

@@ -12,14 +12,15 @@ from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
 NEWTON_STEPS = 8
-"""From the measured angle to the true one; each squares the error, which begins below 0.1 rad."""
+"""Steps from the measured angle to the true one; each squares the error, which begins below 0.1
+rad."""
 PHASE = (-np.pi, np.pi)
 
 
 class EncoderEccentricity(Effect):
-    """The measured angle errs once a turn, and twice where tracks or windings are unequal.
+    """The measured angle errs once per turn, and twice if tracks or windings are unequal.
 
-    Over less than half a turn the errors resemble an encoder's offset and a scale of the angle.
+    Over less than half a turn, the errors resemble an encoder's offset and a scale of the angle.
     """
 
     name = "encoder_eccentricity"
@@ -27,10 +28,10 @@ class EncoderEccentricity(Effect):
     side = Side.SENSOR
     family = Family.SENSOR
     resembles = ("angle", "other_angle", "both_angles", "inertia_by_angle", "friction_by_angle")
-    forms_differ = "a real scale also errs at higher multiples of a turn, and where it was spliced"
+    forms_differ = "a real scale also errs at higher multiples of a turn, and at its splice"
     equation = "measured angle = q + a sin(q + phi) + b sin(2 q + psi), q the true angle"
     source = "Lu, Graetz, Amin-Shahidi, Smeds (2010), CIRP Annals 59(1): self-calibrated encoders"
-    looks_like = "gravity and inertia torques off by a share that changes along the joint's way"
+    looks_like = "gravity and inertia torques off by a share that changes with the joint's angle"
     confirm = "turn the joint to marks of known angle all the way round, and read the encoder"
     shape = (
         Parameter("sine", "rad", "amplitude of sin(q)", "A1", (-0.06, 0.06)),
@@ -39,15 +40,24 @@ class EncoderEccentricity(Effect):
         Parameter("cosine_twice", "rad", "amplitude of cos(2 q)", "B2", (-0.03, 0.03), default=0.0),
     )
     reported = (
-        Parameter("amplitude", "rad", "of the error once a turn", "a", (0.005, 0.06)),
-        Parameter("phase", "rad", "of that error at angle zero", "phi", PHASE),
-        Parameter("amplitude_twice", "rad", "of that twice a turn", "b", (0.0, 0.03), default=0.0),
-        Parameter("phase_twice", "rad", "of that at angle zero", "psi", PHASE, default=0.0),
+        Parameter("amplitude", "rad", "amplitude of the error once per turn", "a", (0.005, 0.06)),
+        Parameter("phase", "rad", "phase of that error at angle zero", "phi", PHASE),
+        Parameter(
+            "amplitude_twice",
+            "rad",
+            "amplitude of the error twice per turn",
+            "b",
+            (0.0, 0.03),
+            default=0.0,
+        ),
+        Parameter(
+            "phase_twice", "rad", "phase of that error at angle zero", "psi", PHASE, default=0.0
+        ),
     )
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return the joints that turn: what slides has no turns."""
+        """Return the revolute joints."""
         joints = super().possible(machine)
         return [name for name in joints if name and machine.joint(name).kind == "revolute"]
 
@@ -73,23 +83,26 @@ class EncoderEccentricity(Effect):
         return motion.with_state(q, dq, ddq)
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return sine and cosine once a turn, and the same with those twice a turn."""
+        """Return sine and cosine once per turn, and the same with those twice per turn."""
         units = 0.01 * np.eye(4)
         every = tuple(tuple(unit.tolist()) for unit in units)
         return every[:2], every
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude and phase, once and twice a turn."""
+        """Return amplitude and phase, once and twice per turn, (4,)."""
         sines, cosines = np.reshape(values, (2, 2)).T
         return np.column_stack([np.hypot(sines, cosines), np.arctan2(cosines, sines)]).ravel()
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sines and cosines."""
+        """Return the amplitudes of sines and cosines, (4,)."""
         amplitudes, phases = np.reshape(physical, (2, 2)).T
         return np.column_stack([amplitudes * np.cos(phases), amplitudes * np.sin(phases)]).ravel()
 
     def jacobian(self, values: NDArray) -> NDArray:
-        """Return how amplitudes and phases change; an error that is zero has no phase to change."""
+        """Return the derivatives (4, 4) of amplitudes and phases.
+
+        Those of a phase are zero if its amplitude is.
+        """
         jacobian = np.zeros((4, 4))
         for k in (0, 2):
             sine, cosine = values[k : k + 2]

@@ -1,4 +1,4 @@
-"""An encoder whose zero is not where the joint's is."""
+"""An encoder whose zero differs from the joint's."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,10 @@ from pipelines.mechanics.motion import Motion
 
 
 class EncoderOffset(Effect):
-    """The measured angle is the true one plus a constant; another at each start, where the joint is
-    zeroed there."""
+    """The measured angle is the true one plus a constant.
+
+    A joint that is zeroed at each start has another constant in each run.
+    """
 
     name = "encoder_offset"
     title = "Encoder offset"
@@ -28,12 +30,12 @@ class EncoderOffset(Effect):
         " angle"
     )
     confirm = (
-        "hold the links where a level or a stop tells their angles, and read them; one that is"
-        " zeroed at each start reads zero wherever it then hangs: let it hang freely after a run,"
-        " or home it on an index mark"
+        "hold the links at angles known from a level or a stop, and read them; an encoder that is"
+        " zeroed at each start reads zero wherever the joint hangs then: let it hang freely after"
+        " a run, or home it on an index mark"
     )
     by_angle = True
-    may_differ = "a joint that is zeroed anew at every start"
+    may_differ = "a joint that is zeroed at every start"
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
 
     @reading

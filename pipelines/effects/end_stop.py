@@ -4,14 +4,14 @@ from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 DEPTH = 0.1
-"""rad (m where the joint slides) beyond the contact at which ``stiffness`` is told."""
+"""Depth beyond the contact at which ``stiffness`` is stated, rad (m at a prismatic joint)."""
 
 
 class EndStop(Effect):
     """A bumper, a strap or a cover that is pressed beyond an angle, on one side.
 
-    The stiffness is torque per angle at a depth of 0.1 rad (0.1 m where the joint slides), so that
-    it has one unit at every exponent; a flat bumper has the exponent 1, two spheres 1.5.
+    The stiffness is torque per angle at a depth of 0.1 rad (0.1 m at a prismatic joint), so that
+    its unit is the same for every exponent. A flat bumper has the exponent 1, two spheres 1.5.
     """
 
     name = "end_stop"
@@ -19,11 +19,11 @@ class EndStop(Effect):
     side = Side.STRUCTURE
     family = Family.ANGLE
     resembles = ("angle", "both_angles")
-    forms_differ = "a real stop has damping, and may bring in a second part at a greater depth"
+    forms_differ = "a real stop has damping, and may engage a second part at a greater depth"
     equation = "tau = s k w (s (q - q0) / w)^p where s (q - q0) > 0, else 0; w = 0.1 rad"
     source = "Hunt, Crossley (1975), ASME J. Applied Mechanics 42(2), eq. 7: contact force k x^p"
     looks_like = "residual against angle: zero up to a kink, then steep, the same both ways"
-    confirm = "switch the drive off, move the joint slowly by hand, and feel where it first resists"
+    confirm = "switch the drive off, move the joint slowly by hand, and note where it first resists"
     linear = (
         Parameter(
             "stiffness",
@@ -45,7 +45,7 @@ class EndStop(Effect):
         Parameter(
             "direction",
             "1",
-            "the way that it stops: 1 forward, -1 backward",
+            "direction that it stops: 1 forward, -1 backward",
             "s",
             (-1.0, 1.0),
             default=1.0,

@@ -8,16 +8,16 @@ from pipelines.mechanics.motion import Motion
 
 
 class ForceSensorZero(Effect):
-    """Constant forces that the cuffs' sensors read; front and back sensor together.
+    """Constant forces that the cuffs' sensors read, front and back sensor together.
 
-    Part of every model whose cuff forces are fitted, and no cause that a diagnosis could name.
+    It is part of every model whose cuff forces are fitted, and no cause of a diagnosis.
     """
 
     name = "force_sensor_zero"
     title = "Force sensor zeros"
     side = Side.SENSOR
     equation = "knee: d_s F_sy; hip: d_t F_ty + d_s F_sy + L1 (F_sy cos q2 + F_sx sin q2)"
-    source = "docs/contracts.md, recording/1: the cuffs' torque on the leg"
+    source = "docs/contracts.md, recording/1: torque of the cuffs on the leg"
     whole_leg = True
     acts_in = ("with_human",)
     linear = (

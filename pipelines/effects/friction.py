@@ -1,12 +1,11 @@
-"""Coulomb and viscous friction of a drive: the baseline every other drive effect is judged
-against."""
+"""Coulomb and viscous friction of a drive: the baseline of every other drive effect."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
 class Friction(Effect):
-    """A constant torque against the motion and one in proportion to speed."""
+    """A constant torque against the motion, and one proportional to speed."""
 
     name = "friction"
     title = "Coulomb and viscous friction"

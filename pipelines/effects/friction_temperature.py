@@ -6,11 +6,11 @@ from pipelines.mechanics.instant import REFERENCE_C
 
 
 class FrictionTemperature(Effect):
-    """Friction that changes in proportion to the recorded temperature, in all runs alike.
+    """Friction that changes with the recorded temperature, in all runs alike.
 
-    The baseline's friction is then that at 25 °C. A run without temperatures cannot show it. The
-    virtual rig warms by its own ``[plant.temperature]``; other simulations take the recorded
-    temperature, or 25 °C where there is none.
+    The baseline's friction is then that at 25 °C. A run without temperatures does not show it. The
+    virtual rig warms by its own ``[plant.temperature]``; other simulations use the recorded
+    temperature, or 25 °C if there is none.
     """
 
     name = "friction_temperature"
@@ -28,11 +28,11 @@ class FrictionTemperature(Effect):
         Parameter(
             "viscous_per_degree",
             "N·m·s/(rad·°C)",
-            "of viscous friction",
+            "change of viscous friction",
             "cv",
             (-0.4, 0.1),
         ),
-        Parameter("coulomb_per_degree", "N·m/°C", "of Coulomb friction", "cs", (-0.2, 0.1)),
+        Parameter("coulomb_per_degree", "N·m/°C", "change of Coulomb friction", "cs", (-0.2, 0.1)),
     )
     parity = Parity.ODD
 

@@ -13,10 +13,10 @@ from pipelines.mechanics.motion import Motion
 
 
 class GainDrift(Effect):
-    """A torque constant that fades as the magnets warm, or a sensor whose gain drifts.
+    """A torque constant that falls as the magnets warm, or a sensor whose gain drifts.
 
-    It changes with the time since the run began, evenly or towards a limit, or with the recorded
-    temperature. At the run's begin, and at 25 °C, the gain is 1; a temperature that was not
+    The gain changes with the time since the run's begin, linearly or towards a limit, or with the
+    recorded temperature. It is 1 at the run's begin and at 25 °C; a temperature that was not
     recorded counts as 25 °C.
     """
 
@@ -38,7 +38,7 @@ class GainDrift(Effect):
         Parameter(
             "time_constant",
             "s",
-            "time in which the change falls to 1/e; 0 for one that goes on evenly",
+            "time in which the change falls to 1/e; 0 for a linear change",
             "Tc",
             (0.0, 120.0),
             default=0.0,
@@ -56,25 +56,25 @@ class GainDrift(Effect):
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
-        """Multiply the torque by the gain of the moment."""
+        """Multiply the torque by the present gain."""
         since = t
         if values[1] > 0.0:
             since = values[1] * (1.0 - exp(-(t / values[1])))
         gain = 1.0 + values[0] * since
         above = temperature[joint] - REFERENCE_C
-        # A temperature that nobody read is NaN, which differs from itself.
+        # A temperature that was not measured is NaN, which differs from itself.
         if values[2] != 0.0 and above == above:
             gain += values[2] * above
         torque[joint] *= gain
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return a drift with time in each form, and one with temperature where it was read."""
+        """Return a drift with time in each form, and one with temperature if it was measured."""
         with_time = tuple(((0.001, form, 0.0),) for form in self.shape[1].forms)
         with_temperature = (((0.0, 0.0, 0.002),),) if self.temperature_varies(motions) else ()
         return (*with_time, *with_temperature)
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Divide by the gain of the moment."""
+        """Divide by the present gain."""
         true, unit = torque.copy(), np.zeros((*torque.shape, 1))
         unit[:, self.column(motion)] = 1.0
         true /= np.where(unit, self._read(unit, motion, values), 1.0)[:, :, 0]

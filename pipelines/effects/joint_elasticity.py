@@ -1,4 +1,4 @@
-"""A joint that twists: the encoder sits on the motor's side and the link hangs behind a spring."""
+"""A joint that twists: the encoder is on the motor's side, the link behind a spring."""
 
 from math import sqrt
 
@@ -10,14 +10,14 @@ from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
 
 MOTOR_INERTIA = 0.1
-"""kg·m², reflected to the joint; what little of a rigid drive's inertia stays with the motor."""
+"""Inertia that stays with the motor, kg·m² at the joint; a small part of a rigid drive's."""
 
 DAMPING_RATIO = 0.1
-"""Of the motor's swing on the spring: a harmonic drive's flexspline."""
+"""Damping ratio of the motor's swing on the spring, as of a harmonic drive's flexspline."""
 
 SWING_RATIO = 0.05
-"""Damping ratio at which the link is let swing behind a measured motion; more forgets, less errs
-for longer."""
+"""Damping ratio of the link's swing behind a measured motion. A larger one damps the true swing, a
+smaller one lets errors persist."""
 
 
 class JointElasticity(Effect):
@@ -59,8 +59,10 @@ class JointElasticity(Effect):
         return values[0] * twist * (1.0 + values[1] * twist * twist) + damping * twist_rate
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the link behind the spring; it follows its torque at once where its
-        mass is unknown."""
+        """Return the motion of the link behind the spring.
+
+        Without its mass, the link follows its torque immediately.
+        """
         if motion.link_swing is not None:
             return link_behind_motor(
                 motion, motion.link_swing, self, self.completed(shape), SWING_RATIO

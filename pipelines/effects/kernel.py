@@ -1,8 +1,8 @@
-"""The compiled form of an effect's equation, one scalar kernel each.
+"""The compiled form of an effect's equation: one scalar kernel each.
 
-A kernel is written once and used by everybody: ``columns`` evaluates it along a measured motion,
+A kernel is written once and has two users: ``columns`` evaluates it along a measured motion, and
 the forward dynamics evaluates it at every integration step. All kernels of a kind share one
-signature, so that the dynamics can hold a tuple of them without being compiled anew for each model.
+signature, so that the dynamics can hold a tuple of them without compilation for each model.
 """
 
 import warnings
@@ -24,24 +24,25 @@ from pipelines.mechanics.instant import reaction as reaction
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 DERIVATIVE = void(INSTANT, vector, vector, vector, int64, vector)
-"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to
-``out``.
+"""derivative(at, state, values, geometry, joint, out): write the memory's rate to ``out``.
 
-It may depend on the shape values, never on the linear ones: torque would then not be linear in
-them."""
+It may depend on the shape values, but not on the linear ones, or torque would not be linear in
+them.
+"""
 
 SPRING = float64(float64, float64, vector)
 """spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
 
 READING = void(vector, vector, int64)
-"""reading(angle, values, joint): turn true angles into what the encoders say, in place."""
+"""reading(angle, values, joint): turn true angles into those that the encoders report, in place."""
 
 TORQUE_READING = void(float64, vector, vector, int64, vector, vector)
-"""torque_reading(t, torque, values, joint, state, temperature): turn what the drives deliver into
-what their sensors say, in place.
+"""torque_reading(t, torque, values, joint, state, temperature): apply a sensor in place.
 
-Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first;
-``temperature`` is the motors', °C, NaN where it was not read."""
+It turns delivered torques into those that the sensors report. It is called once per sample, in
+order. ``state`` is the sensor's memory, zero before the first sample; ``temperature`` is that of
+the motors in °C, NaN where it was not measured.
+"""
 
 
 def derivative(function):
@@ -55,13 +56,12 @@ def spring(function):
 
 
 def reading(function):
-    """Compile what an encoder makes of the angle."""
+    """Compile an encoder's reading of the angle."""
     return staticmethod(njit(READING, cache=True)(function))
 
 
 def torque_reading(function):
-    """Compile what a torque sensor makes of the torque; one that needs no temperature may leave out
-    that argument."""
+    """Compile a torque sensor's reading; the argument temperature is optional."""
     if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
         return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
     return staticmethod(njit(TORQUE_READING, cache=True)(function))
@@ -76,9 +76,9 @@ def _at_any_temperature(kernel):
 
 @cache
 def address(kernel) -> int:
-    """Return where a kernel's machine code stands in memory.
+    """Return the address of a kernel's machine code.
 
-    Handing the kernels themselves to compiled code costs 60 µs each, at every call.
+    Passing the kernels themselves to compiled code costs 60 µs each, at every call.
     """
     (compiled,) = kernel.overloads.values()
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
@@ -89,7 +89,7 @@ def _kernel_at(signature):
 
     @intrinsic
     def kernel_at(typing_context, where):
-        """Return the kernel that stands at an address, for compiled code to call."""
+        """Return the kernel at an address, for compiled code to call."""
 
         def lower(context, builder, signature, arguments):
             function = cgutils.create_struct_proxy(kind)(context, builder)
@@ -131,31 +131,30 @@ _READ_ALONG = void(
 _SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
 MEMORY_SUBSTEPS = 8
-"""Steps per sample along a measured motion: a presliding state turns over within a few
+"""Steps per sample along a measured motion: a presliding state changes within a few
 milliseconds."""
 
 SETTLING_S = 2.0
-"""For so long a measured motion is taken to have gone on at its first velocity before it begins: a
-memory that began from nothing would be wrong until the first reversal."""
+"""Time for which a motion is assumed to have run at its first velocity before it begins. A memory
+that began at zero would be wrong until the first reversal."""
 
 SWING_SUBSTEPS = 4
-"""Steps per sample of a load on its spring; the rule is stable at any stiffness, and true up to
+"""Steps per sample of a load on its spring. The rule is stable at any stiffness, and accurate up to
 some 30 Hz."""
 
 WIDEST_TWIST = 1.0
-"""rad within which a swinging load begins at rest."""
+"""Largest twist, rad, with which a swinging load begins at rest."""
 
 TORN = np.pi
-"""rad that no transmission twists by. A load that a fit has made of too little, whose gravity
-pushes up or whose mass is negative, would run away from its spring within a second: here it stays.
-"""
+"""Limit of a twist, rad, that no real transmission reaches. A load of negative mass or gravity,
+which a fit may try, would diverge from its spring within a second; here it stops."""
 
 NUDGE = 1e-7
-"""rad and rad/s of the difference quotients of a spring."""
+"""Step of a spring's difference quotients, rad and rad/s."""
 
 ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
-"""How functions are compiled whose arrays are all arguments: numba then leaves out counting
-references to them, which would take most of their time."""
+"""Options for functions whose arrays are all arguments. Without reference counting they take a
+fraction of the time."""
 
 
 @njit(inline="always")
@@ -174,10 +173,10 @@ def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
 def columns_along(
     where, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out
 ):
-    """Evaluate the reaction kernel at an address along a motion, into ``out`` (n, J, p) N·m per
-    unit.
+    """Evaluate the reaction kernel at an address along a motion.
 
-    It has no memory. ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
+    The kernel has no memory. ``out`` is (n, J, p) N·m per unit. ``values`` hold the shape, and
+    zeros for the rest; ``scratch`` is (2 J,).
     """
     kernel = reaction_at(where)
     joints = q.shape[1]
@@ -191,8 +190,7 @@ def columns_along(
 
 @njit(inline="always")
 def _between(time, q, dq, ddq, load, k, share, at):
-    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (5, J); return
-    its time."""
+    """Write the motion between sample ``k`` and the next into ``at`` (5, J); return its time."""
     for j in range(q.shape[1]):
         at[0, j] = q[k, j] + share * (q[k + 1, j] - q[k, j])
         at[1, j] = dq[k, j] + share * (dq[k + 1, j] - dq[k, j])
@@ -204,8 +202,7 @@ def _between(time, q, dq, ddq, load, k, share, at):
 
 @njit(inline="always")
 def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
-    """Advance a memory by the midpoint rule, from the instant ``at``; ``ahead`` is half a step
-    later."""
+    """Advance a memory by the midpoint rule from ``at``; ``ahead`` is half a step later."""
     rate(at, state, values, geometry, joint, slope)
     for m in range(state.shape[0]):
         middle[m] = state[m] + 0.5 * h * slope[m]
@@ -231,13 +228,11 @@ def columns_along_with_memory(
     memory,
     out,
 ):
-    """Evaluate the reaction kernel at an address along one unbroken stretch, into ``out`` (n, J,
-    p).
+    """Evaluate the reaction kernel at an address along one unbroken stretch.
 
-    The rate of its memory, which settles first, is the kernel at the other address.
-
-    Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3,
-    states), the first row zero.
+    The kernel at the other address is the rate of its memory, which settles first. Between samples,
+    the motion is linear in time. ``out`` is (n, J, p) N·m per unit, ``scratch`` is (11, J), and
+    ``memory`` is (3, states) with a first row of zeros.
     """
     kernel, rate = reaction_at(where), derivative_at(where_rate)
     state, middle, slope = memory[0], memory[1], memory[2]
@@ -266,10 +261,10 @@ def columns_along_with_memory(
 
 @njit(_READ_ALONG, **ALLOCATING_NOTHING)
 def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
-    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J,
-    p), N·m.
+    """Apply a sensor, the kernel at an address, to p torques of one unbroken stretch.
 
-    The sensor is the kernel at an address; ``at_once`` has room for J, ``state`` for its memory.
+    ``torque`` and ``out`` are (n, J, p) N·m, ``at_once`` is (J,), and ``state`` is the sensor's
+    memory.
     """
     kernel = torque_reading_at(where)
     for i in range(torque.shape[2]):
@@ -297,14 +292,28 @@ def _twist_at_rest(kernel, values, torque, stiffness):
 
 @njit(_SWING_ALONG, **ALLOCATING_NOTHING)
 def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffness, out):
-    """Let a load swing on a spring along one unbroken stretch, from rest, the twist (n,) rad into
-    ``out``.
+    """Integrate a load that swings on a spring along one unbroken stretch, from rest.
 
-    inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque, each but
-    the spring given by sample and linear between samples; ``ratio`` is that of damping added to
-    what the spring has, ``least`` the inertia that any load has: a fit may make it negative where a
-    light link hardly shows. The midpoint rule, linearised at each step's begin, neither damps nor
-    excites, and is stable however stiff the spring. The spring is the kernel at an address.
+    inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque. All but the
+    spring are given by sample, and are linear between samples. The midpoint rule, linearised at
+    each step's begin, neither damps nor excites, and is stable however stiff the spring.
+
+    Parameters
+    ----------
+    where : int
+        Address of the spring's kernel.
+    values : (k,) array
+        Parameters of the spring.
+    ratio : float
+        Damping ratio in addition to the spring's own.
+    least : float
+        Least inertia of a load, kg·m²; a fit may make that of a light link negative.
+    h : float
+        Sample interval, s.
+    torque, inertia, damping, stiffness : (n,) array
+        Of the load; N·m, kg·m², N·m·s/rad, N·m/rad.
+    out : (n,) array
+        Twist, rad.
     """
     kernel = spring_at(where)
     twist, rate = _twist_at_rest(kernel, values, torque[0], stiffness[0]), 0.0

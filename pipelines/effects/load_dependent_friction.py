@@ -1,4 +1,4 @@
-"""Friction in proportion to the load on the gear's teeth."""
+"""Friction proportional to the load on the gear's teeth."""
 
 from dataclasses import replace
 
@@ -16,15 +16,15 @@ class LoadDependentFriction(Effect):
     resembles = ("load", "speed", "friction_by_angle")
     forms_differ = "a real share changes with the speed and along the gear"
     holds = True
-    equation = "tau = mu abs(T) (sgn(v) + k sgn(T)), T the transmitted torque, k = 0 unless said"
+    equation = "tau = mu abs(T) (sgn(v) + k sgn(T)), T the transmitted torque, k = 0 by default"
     source = (
         "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity, in four"
         " quadrants"
     )
     looks_like = "a square wave with the motion's direction whose height follows the load"
     confirm = (
-        "hang weights on the joint, move it slowly both ways, and plot half the difference against"
-        " the load; half the sum, less gravity, shows the driving excess"
+        "hang weights on the joint, move it slowly both ways, and plot half the torque difference"
+        " against the load; half the sum, less gravity, shows the driving excess"
     )
     linear = (
         Parameter(
@@ -35,7 +35,7 @@ class LoadDependentFriction(Effect):
         Parameter(
             "driving_excess",
             "1",
-            "share by which friction is larger where the drive moves the load, and smaller where"
+            "share by which friction is larger when the drive moves the load, and smaller when"
             " the load moves it",
             "k",
             (-1.0, 1.0),
@@ -47,8 +47,7 @@ class LoadDependentFriction(Effect):
     reads_load = True
 
     def __post_init__(self) -> None:
-        """Hold the excess at zero on a machine of one joint, where its torque is one of the rigid
-        body's."""
+        """Hold the excess at zero on a machine of one joint, where the rigid body absorbs it."""
         super().__post_init__()
         if len(self.on.names) == 1:
             (excess,) = self.shape

@@ -1,4 +1,4 @@
-"""A segment whose centre of mass lies beside its axis."""
+"""A segment whose centre of mass lies off its axis."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.mechanics.mechanisms.leg import LEG
@@ -7,9 +7,9 @@ from pipelines.mechanics.mechanisms.leg import LEG
 class MassOffAxis(Effect):
     """A foot, a motor housing: a first moment of mass across the segment.
 
-    A mass across the axis is one along it, turned forward by a right angle: with Y the moment
-    across, kinetic and potential energy have Y where they have X3 (shank) or X4 (thigh), and the
-    segment's absolute angle plus pi/2 where they have that angle. Its moment of inertia is in X1
+    A mass across the axis equals one along it, turned forward by a right angle. With Y the moment
+    across, kinetic and potential energy have Y in place of X3 (shank) or X4 (thigh), and the
+    segment's absolute angle plus pi/2 in place of that angle. Its moment of inertia is part of X1
     and X2.
     """
 

@@ -1,4 +1,4 @@
-"""Effects that other packages bring: entry points of the group ``exoid.effects``.
+"""Load effects of other packages: entry points of the group ``exoid.effects``.
 
 A package names its class in its own pyproject.toml::
 
@@ -16,7 +16,7 @@ from pipelines.errors import InputError
 GROUP = "exoid.effects"
 
 STATED = ("name", "title", "side", "equation", "source", "looks_like", "confirm")
-"""What every effect says of itself."""
+"""Attributes that every effect must have."""
 
 
 def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
@@ -25,7 +25,7 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
     Raises
     ------
     InputError
-        Where one cannot be loaded, is not an effect, or takes a name that is already there.
+        If one cannot be loaded, is not an effect, or has the name of another.
     """
     taken = {effect.name: effect.__module__ for effect in known}
     effects = []
@@ -34,7 +34,7 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
         if effect.name in taken:
             raise _broken(
                 entry,
-                f"its name {effect.name} is already that of {taken[effect.name]}",
+                f"its name {effect.name} is already used by {taken[effect.name]}",
                 "rename it",
             )
         taken[effect.name] = effect.__module__
@@ -47,11 +47,13 @@ def _loaded(entry: EntryPoint) -> type[Effect]:
         effect = entry.load()
     except Exception as error:
         raise _broken(
-            entry, f"loading it failed: {type(error).__name__}: {error}", "mend it"
+            entry, f"loading it failed: {type(error).__name__}: {error}", "correct it"
         ) from error
     if not (inspect.isclass(effect) and issubclass(effect, Effect)):
         raise _broken(
-            entry, f"it is {effect!r}, expected a subclass of pipelines.effects.Effect", "mend it"
+            entry,
+            f"it is {effect!r}, expected a subclass of pipelines.effects.Effect",
+            "correct it",
         )
     silent = [name for name in STATED if not hasattr(effect, name)]
     if silent:

@@ -1,4 +1,4 @@
-"""A spring beside the drive."""
+"""A spring in parallel with the drive."""
 
 from dataclasses import replace
 
@@ -11,18 +11,18 @@ from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
 
 CONFIRM_A_SLIDES = (
-    "take the drive off, or switch it off, and hold the joint at several positions with a spring"
-    " balance: the force grows evenly along the way, where a weight's is the same everywhere"
+    "remove the drive, or switch it off, and hold the joint at several positions with a spring"
+    " balance: the force of a spring grows along the way, that of a weight is constant"
 )
 
 CONFIRM_WITHOUT_GRAVITY = (
-    "put a spirit level on the axis first: about one that leans, gravity does nearly what a spring"
-    " does; then switch the drive off and hold the joint at several angles"
+    "put a spirit level on the axis first, because gravity about a leaning axis resembles a spring;"
+    " then switch the drive off and hold the joint at several angles"
 )
 
 
 class ParallelSpring(Effect):
-    """A torque in proportion to the joint's angle: a balancing spring, a cable, a cover."""
+    """A torque proportional to the joint's angle: a balancing spring, a cable, a cover."""
 
     name = "parallel_spring"
     title = "Parallel spring"
@@ -47,13 +47,13 @@ class ParallelSpring(Effect):
     )
     reported = (
         linear[0],
-        Parameter("rest_angle", "rad", "angle at which it pulls neither way", "q0", (-1.0, 1.0)),
+        Parameter("rest_angle", "rad", "angle at which its torque is zero", "q0", (-1.0, 1.0)),
     )
     parity = Parity.EVEN
 
     @reaction
     def about_rest(at, state, values, geometry, joint, out):
-        """Add k (q - q0) at the joint, where the rest angle is no amplitude."""
+        """Add k (q - q0) at the joint, with a rest angle that is no amplitude."""
         out[joint] += values[0] * (at.q[joint] - values[1])
 
     @reaction
@@ -62,11 +62,9 @@ class ParallelSpring(Effect):
         out[joint] += values[0] * at.q[joint] - values[1]
 
     def __post_init__(self) -> None:
-        """Take the rest angle as nought where the mechanism's own parameters take up a constant
-        torque.
+        """Set the rest angle to zero if the mechanism's parameters absorb a constant torque.
 
-        What the spring pulls with at angle zero is then part of them, and no motion tells its
-        share.
+        The spring's torque at angle zero is then part of them, and no motion separates it.
         """
         super().__post_init__()
         if self.joint is None or self.on == THE_LEG:
@@ -88,14 +86,17 @@ class ParallelSpring(Effect):
                 object.__setattr__(self, name, value)
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return stiffness and rest angle; without stiffness there is no rest angle."""
+        """Return stiffness and rest angle, (2,).
+
+        The rest angle is NaN if the stiffness is zero.
+        """
         if self.reported is None:
             return super().physical(values)
         stiffness, preload = values
         return np.array([stiffness, preload / stiffness if stiffness != 0.0 else np.nan])
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return stiffness and preload."""
+        """Return stiffness and preload, (2,)."""
         if self.reported is None:
             return super().values_from(physical)
         stiffness, rest_angle = physical

@@ -9,8 +9,8 @@ from pipelines.effects.kernel import reaction
 class PassiveJointTorque(Effect):
     """Ligaments and stretched muscles: a torque that grows exponentially beyond an angle.
 
-    One formula for both ends: a negative width acts below the onset. A wide one is a straight
-    spring beyond the onset, a narrow one a hard stop.
+    One formula covers both ends of the range: a negative width acts below the onset. A large width
+    is a linear spring beyond the onset, a small one a hard stop.
     """
 
     name = "passive_joint_torque"

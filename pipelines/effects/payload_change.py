@@ -8,8 +8,10 @@ from pipelines.mechanics.mechanisms.leg import LEG
 
 
 class PayloadChange(Effect):
-    """A point mass on the segment's axis from some time on; negative where it is lost. Where a
-    joint slides, a mass."""
+    """A point mass on the segment's axis from some time on; negative if it is lost.
+
+    At a prismatic joint, it is a mass.
+    """
 
     name = "payload_change"
     title = "Payload change"
@@ -25,13 +27,13 @@ class PayloadChange(Effect):
         "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
     )
     looks_like = "gravity residual that begins at one instant and stays"
-    confirm = "ask what was picked up or fell off then; weigh it"
+    confirm = "ask what was picked up or fell off at that time, and weigh it"
     linear = (
         Parameter("mass_moment", "kg·m", "mass times distance along the segment", "p", (-1.0, 1.0)),
     )
     shape = (
         Parameter(
-            "time", "s", "when it comes, from the run's begin", "t0", (0.0, 120.0), per_run=True
+            "time", "s", "when it is added, from the run's begin", "t0", (0.0, 120.0), per_run=True
         ),
         Parameter(
             "distance", "m", "from the segment's joint to the mass", "r", (0.1, 0.45), default=0.3
@@ -42,11 +44,9 @@ class PayloadChange(Effect):
     reaction = staticmethod(LEG.reactions["payload_change"])
 
     def __post_init__(self) -> None:
-        """Take it for a mass where the joint slides: along a way no distance matters."""
+        """Use a mass at a prismatic joint, where no distance matters."""
         super().__post_init__()
         if self.joint and self.on != THE_LEG and self.on.joint(self.joint).kind == "prismatic":
             moment, time = self.linear[0], self.shape[0]
-            object.__setattr__(
-                self, "linear", (replace(moment, meaning="mass that comes", symbol="m"),)
-            )
+            object.__setattr__(self, "linear", (replace(moment, meaning="added mass", symbol="m"),))
             object.__setattr__(self, "shape", (time,))

@@ -1,11 +1,11 @@
-"""Dry friction that depends on where the joint stands."""
+"""Dry friction that depends on the joint's position."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
 class PositionDependentFriction(Effect):
-    """A Coulomb level that changes along the joint's way: misaligned bearings, a worn gear.
+    """A Coulomb level that changes with position, due to misaligned bearings or a worn gear.
 
     The level at angle zero is the baseline's Coulomb friction.
     """
@@ -23,7 +23,7 @@ class PositionDependentFriction(Effect):
     looks_like = "residual against angle: two branches, forward and back, whose distance changes"
     confirm = (
         "move the empty joint slowly both ways through its range, "
-        "and plot half the difference of the torques against where it is"
+        "and plot half the difference of the torques against position"
     )
     linear = (
         Parameter("slope", "N·m/rad", "growth of the Coulomb level with angle", "c1", (-4.0, 4.0)),

@@ -1,12 +1,11 @@
-"""Presliding: after a reversal friction builds up over a small travel, like a spring that
-yields."""
+"""Presliding: after a reversal, friction builds up over a small travel, like a yielding spring."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import derivative, reaction
 
 
 class PreslidingHysteresis(Effect):
-    """Dahl's friction, its memory z the share of the torque already built up, in [-1, 1]."""
+    """Dahl's friction; its memory z in [-1, 1] is the share of the torque already built up."""
 
     name = "presliding_hysteresis"
     title = "Presliding hysteresis"
@@ -15,12 +14,12 @@ class PreslidingHysteresis(Effect):
     resembles = ("speed", "friction_by_angle")
     forms_differ = "a real loop depends on where the joint turned before, and how long it stood"
     holds = True
-    equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 unless said"
+    equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 by default"
     source = "Dahl (1976), AIAA Journal 14(12), eq. 4"
     looks_like = "friction against angle: a loop whose corners are rounded after each reversal"
     confirm = (
         "move the empty joint to and fro by a few hundredths of its travel and plot torque against"
-        " where it is"
+        " position"
     )
     linear = (Parameter("friction_torque", "N·m", "friction torque once sliding", "F", (0.5, 8.0)),)
     shape = (

@@ -1,7 +1,6 @@
-"""The pages of docs/effects, written from the effects themselves.
+"""Write the pages of docs/effects from the effects themselves.
 
-``python -m pipelines.effects.reference docs/effects`` brings them up to date; a test says when they
-are not.
+``python -m pipelines.effects.reference docs/effects`` updates them; a test reports outdated pages.
 """
 
 import inspect
@@ -17,11 +16,11 @@ INTRODUCTION = """\
 Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The
 first two are the baseline of every fit; the others are the causes that `exoid diagnose` knows and a
 rig file may name. `exoid effects NAME` prints a page on the terminal. The site that `make docs`
-makes shows beside each what it leaves in a residual, drawn anew from a virtual leg that has it. """
+builds also shows the residual of each effect, drawn from a virtual leg that has it. """
 
 
 def facts(effect: type[Effect]) -> dict[str, Any]:
-    """Return all that an effect says of itself, for programs."""
+    """Return an effect's description as a dictionary, for programs."""
     return {
         "effect": effect.name,
         "title": effect.title,
@@ -53,7 +52,7 @@ def facts(effect: type[Effect]) -> dict[str, Any]:
 
 
 def where(effect: type[Effect]) -> str:
-    """Say at which joints an effect can be."""
+    """Return the joints at which an effect can act, in words."""
     if effect.whole_leg:
         return "whole leg"
     if effect.joints is None:
@@ -67,20 +66,20 @@ def where(effect: type[Effect]) -> str:
 
 
 def typical_size(effect: type[Effect]) -> str:
-    """Say how large an effect is on an exoskeleton: the range of its first parameter."""
+    """Return the typical size of an effect on an exoskeleton: the range of its first parameter."""
     first = effect().parameters[0]
     return f"{first.name} {typical_range(first)}"
 
 
 def typical_range(parameter: Parameter) -> str:
-    """Write the range of a parameter with its unit."""
+    """Return the typical range of a parameter with its unit."""
     low, high = parameter.typical
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     return f"{low:.3g} to {high:.3g}{unit}"
 
 
 def laws_in_words(effect: type[Effect]) -> str:
-    """Name the smooth laws that contain an effect approximately."""
+    """Return the names of the smooth laws that contain an effect approximately."""
     return ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
 
 
@@ -125,9 +124,9 @@ def _paragraph(title: str, text: str) -> list[str]:
 def _row(parameter: Parameter) -> str:
     meaning = parameter.meaning
     if parameter.per_run:
-        meaning += "; each run's own"
+        meaning += "; differs from run to run"
     if parameter.default is not None:
-        meaning += f"; {parameter.default:g} where not said"
+        meaning += f"; {parameter.default:g} by default"
     return (
         f"| `{parameter.name}` | {parameter.symbol} | {parameter.unit} | {meaning} |"
         f" {typical_range(parameter)} |"

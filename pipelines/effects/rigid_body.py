@@ -1,4 +1,4 @@
-"""The rigid links of the machine, with all that moves along with them."""
+"""The rigid links of the machine, with everything that moves along with them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,10 @@ def _equation(mechanism: Mechanism) -> str:
 
 
 class RigidBody(Effect):
-    """Inertia, Coriolis, centrifugal and gravity torque of the links; what is said here is the
-    leg's."""
+    """Inertia, Coriolis, centrifugal and gravity torque of the links.
+
+    Equation and parameters of the class are the leg's.
+    """
 
     name = "rigid_body"
     title = "Rigid body"
@@ -34,7 +36,7 @@ class RigidBody(Effect):
     forms_differ = "real links bend a little, and cables and hoses pull at them"
     equation = _equation(LEG)
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
-    looks_like = "what every fit starts with: torque in step with acceleration and with gravity"
+    looks_like = "torque in step with acceleration and with gravity; every fit starts with it"
     confirm = "weigh the links, or hold the machine still at several angles and read the torque"
     whole_leg = True
     inertial = True
@@ -43,14 +45,13 @@ class RigidBody(Effect):
     reaction = staticmethod(LEG.reactions["rigid_body"])
 
     def __post_init__(self) -> None:
-        """Take the machine's own parameters."""
+        """Use the machine's own parameters."""
         super().__post_init__()
         object.__setattr__(self, "linear", _parameters(self.on.mechanism))
         object.__setattr__(self, "equation", _equation(self.on.mechanism))
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Return the mechanism's regressor, (n, J, p): one pass where the kernel takes one a
-        column."""
+        """Return the mechanism's regressor, (n, J, p), in one pass."""
         if not self.explains(motion):
             return np.zeros((*motion.q.shape, len(self.linear)))
         return self.on.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)

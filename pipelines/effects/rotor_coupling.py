@@ -1,4 +1,4 @@
-"""The rotor that a moving link carries: it turns with the link and in it."""
+"""The rotor that a moving link carries: it turns with the link and within it."""
 
 from typing import ClassVar
 
@@ -7,15 +7,15 @@ from pipelines.effects.kernel import reaction
 
 
 class RotorCoupling(Effect):
-    """The knee's motor on the thigh, its axis along the joints'.
+    """The knee's motor on the thigh, its axis parallel to the joints'.
 
-    A rotor of inertia Ir behind a gear of ratio N has the energy Ir (dq1 + N dq2)² / 2: Ir more in
-    X1, the rotor inertia J = N² Ir at the knee, and between the joints this coupling c = N Ir,
-    negative where the gear reverses.
+    A rotor of inertia Ir behind a gear of ratio N has the energy Ir (dq1 + N dq2)² / 2. It adds Ir
+    to X1, the rotor inertia J = N² Ir at the knee, and between the joints this coupling c = N Ir,
+    which is negative if the gear reverses.
 
-    No motion tells it apart from the others: X2's column is the sum of this one's and
-    ``rotor_inertia``'s. What a fit finds is X2 + c and J - c, the same torques with c = 0; so
-    ``exoid diagnose`` names ``rotor_inertia``, and of a rotor of known Ir and N it is (N² - N) Ir.
+    No motion separates it from the others: X2's column is the sum of this one's and
+    ``rotor_inertia``'s. A fit returns X2 + c and J - c, the same torques with c = 0. So ``exoid
+    diagnose`` names ``rotor_inertia``; for a rotor of known Ir and N, its value is (N² - N) Ir.
     """
 
     name = "rotor_coupling"
@@ -30,7 +30,7 @@ class RotorCoupling(Effect):
         " gear-driven manipulators"
     )
     looks_like = (
-        "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"
+        "no signature of its own: the second rotor's inertia is smaller by c, and X2 larger by c"
     )
     confirm = (
         "look up rotor inertia and gear ratio, and which way the gear turns: c is their product"

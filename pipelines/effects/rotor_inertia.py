@@ -1,4 +1,4 @@
-"""The rotor behind the gear: an inertia that only its own joint's acceleration feels."""
+"""The rotor behind the gear: an inertia that reacts to its own joint's acceleration only."""
 
 from typing import ClassVar
 
@@ -24,7 +24,7 @@ class RotorInertia(Effect):
         "residual in step with its joint's own acceleration; X2 too large for a link of that weight"
     )
     confirm = (
-        "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
+        "look up the rotor's inertia and the gear ratio: J is the inertia times the ratio squared"
     )
     joints = ("knee",)
     absorbed: ClassVar = {"hip": "X1"}

@@ -8,8 +8,7 @@ from pipelines.effects.kernel import reaction
 
 
 class Spasticity(Effect):
-    """Muscle that resists a stretch faster than its threshold, in the direction that stretches
-    it."""
+    """Muscle that resists a stretch faster than its threshold, in one direction."""
 
     name = "spasticity"
     title = "Spasticity"
@@ -38,7 +37,7 @@ class Spasticity(Effect):
         Parameter(
             "threshold_velocity",
             "rad/s",
-            "speed from which it acts; its sign is the way",
+            "speed from which it acts; its sign is the direction",
             "v0",
             (-1.5, 1.5),
         ),
@@ -49,7 +48,7 @@ class Spasticity(Effect):
         Parameter(
             "direction",
             "1",
-            "the way in which it acts: 1 or -1",
+            "direction in which it acts: 1 or -1",
             "sgn v0",
             (-1.0, 1.0),
             default=1.0,
@@ -65,11 +64,11 @@ class Spasticity(Effect):
             out[joint] += values[0] * excess
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return gain, size and direction of the threshold."""
+        """Return gain, size and direction of the threshold, (3,)."""
         gain, threshold = values
         return np.array([gain, abs(threshold), 1.0 if threshold >= 0 else -1.0])
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return gain and signed threshold."""
+        """Return gain and signed threshold, (2,)."""
         gain, speed, direction = physical
         return np.array([gain, speed if direction >= 0 else -speed])

@@ -1,4 +1,4 @@
-"""Stribeck friction: more torque at creeping speed than at speed."""
+"""Stribeck friction: more torque at creeping speed than at higher speed."""
 
 from math import exp
 
@@ -14,9 +14,9 @@ class StribeckFriction(Effect):
     side = Side.DRIVE
     family = Family.SPEED
     resembles = ("speed",)
-    forms_differ = "a real fall may have another exponent, and come back a moment late"
+    forms_differ = "a real fall may have another exponent, and return a moment late"
     holds = True
-    equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
+    equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 by default"
     source = (
         "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7),"
         " eq. 3"

@@ -1,7 +1,7 @@
-"""The motion behind a spring: a load that swings on it, driven by the motion before it.
+"""The motion behind a spring: a load that swings on it.
 
 A soft or loose transmission follows its load only below its own frequency. Above it, and after
-every reversal, the load swings, and a twist of torque over stiffness is wrong in size and sign.
+every reversal, the load swings, and a twist of torque over stiffness has the wrong size and sign.
 """
 
 import numpy as np
@@ -15,10 +15,11 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LEAST_INERTIA = 0.02
-"""kg·m² that any load of an exoskeleton has."""
+"""Least inertia of any load of an exoskeleton, kg·m²."""
 
 ROTOR_INERTIA = 0.17
-"""kg·m² of a rotor that the rigid body's parameters hold: the middle of what is typical."""
+"""Inertia of a rotor that the rigid body's parameters include, kg·m²: the middle of the typical
+range."""
 
 
 def link_behind_motor(
@@ -35,7 +36,7 @@ def link_behind_motor(
 
 
 def rotor_among_links(motion: Motion, joint: str) -> float:
-    """Return the rotor's inertia that the rigid body's parameters count among the links, kg·m²."""
+    """Return the rotor's inertia that the rigid body's parameters include in the links, kg·m²."""
     counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
     return ROTOR_INERTIA if counted else 0.0
 
@@ -54,18 +55,18 @@ def behind_spring(
     Parameters
     ----------
     motion : Motion
-        Before the spring.
+        Motion before the spring.
     load : Load
-        What hangs behind it, along the motion before it.
+        Load behind the spring, along the motion before it.
     direction : (n, J) array
-        How the joints turn per unit of twist.
+        Rotation of the joints per unit of twist.
     effect : Effect
-        Whose ``spring`` it is.
-    values : sequence of float
-        The effect's.
+        Effect with the ``spring``.
+    values : (k,) array
+        Values of the effect.
     ratio : float, optional
-        Damping ratio added to the spring's own. The motion drives a copy of the load: undamped, the
-        copy would swing on with every error of the load for ever.
+        Damping ratio in addition to the spring's own. Without damping, the simulated load would
+        swing on indefinitely with every error of the load.
     with_motor : float, optional
         Inertia in the load that turns with the motor instead, kg·m².
     """
@@ -90,8 +91,7 @@ def behind_spring(
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
         turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]
-        # Behind the filter that the measured motion is behind, or both would not be of the same
-        # moment.
+        # The twist needs the filter of the measured motion, or the two would not be simultaneous.
         turned = low_pass(turned, motion.sample_rate_hz, motion.cutoff_hz)
         moved[0][stretch, joints] -= turned
         for order in (1, 2):

@@ -1,4 +1,4 @@
-"""A torque channel that is late."""
+"""A delayed torque channel."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,18 +8,18 @@ from pipelines.effects.kernel import torque_reading
 from pipelines.mechanics.motion import Motion
 
 SLOTS = 128
-"""Samples that the channel remembers; a longer delay than these is cut to them."""
+"""Samples that the channel remembers; it limits the delay."""
 
 
 class TimeDelay(Effect):
-    """The measured torque is the one of some milliseconds ago: a filter or a bus in its way."""
+    """The measured torque is that of some milliseconds before, due to a filter or a bus."""
 
     name = "time_delay"
     title = "Time delay"
     side = Side.SENSOR
     family = Family.SENSOR
     resembles = ("load", "speed", "inertia_by_angle")
-    forms_differ = "a real channel is a filter, later at one frequency than at another"
+    forms_differ = "a real channel is a filter, whose delay depends on the frequency"
     equation = "measured torque(t) = true torque(t - delay)"
     source = (
         "Björklund (2003), A Survey and Comparison of Time-Delay Estimation Methods in Linear"
@@ -29,14 +29,13 @@ class TimeDelay(Effect):
         "residual in step with the torque's rate of change; friction steps smeared to one side of"
         " reversals"
     )
-    confirm = "knock on the link and compare when the torque and when the encoder answers"
-    shape = (Parameter("delay", "s", "by which the torque channel is late", "T", (0.0, 0.06)),)
+    confirm = "knock on the link and compare the times at which torque and encoder respond"
+    shape = (Parameter("delay", "s", "delay of the torque channel", "T", (0.0, 0.06)),)
     reading_states = 1 + 2 * SLOTS
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
-        """Return the torque of then, in a straight line between samples; the first one's until
-        there is one."""
+        """Return the delayed torque, linear between samples; at first that of the first sample."""
         newest = int(state[0])
         state[0] += 1.0
         slot = 1 + 2 * (newest % SLOTS)
@@ -52,7 +51,7 @@ class TimeDelay(Effect):
             torque[joint] += share * (state[after + 1] - state[before + 1])
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Move the torque earlier; the last one's holds to the end of each stretch."""
+        """Shift the torque, (n, J) N·m, earlier; each stretch ends with its last sample."""
         true, j = torque.copy(), self.column(motion)
         for stretch in motion.segments():
             time = motion.time[stretch]

@@ -1,4 +1,4 @@
-"""A torque channel that also reads the other joint's torque."""
+"""A torque channel that also measures the other joint's torque."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ class TorqueCrossTalk(Effect):
     side = Side.SENSOR
     family = Family.SENSOR
     resembles = ("other_load", "both_angles", "other_angle")
-    forms_differ = "a real sensor may read bending forces that no joint's torque stands for"
+    forms_differ = "a real sensor may also measure bending forces, which no joint torque represents"
     equation = "measured torque = true torque + c * true torque of the other joint"
     source = "Hirose, Yoneda (1990), ICRA: optical six-axial force sensor, interference of its axes"
     looks_like = "residual in step with the other joint's torque, friction steps included"
@@ -27,13 +27,13 @@ class TorqueCrossTalk(Effect):
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return the joints of a machine that has two of one kind; others have no such joint."""
+        """Return the joints of a machine with two joints of one kind; empty for other machines."""
         kinds = [joint.kind for joint in machine.joints]
         two_alike = len(kinds) == 2 and kinds[0] == kinds[1]
         return super().possible(machine) if two_alike else []
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return one small coupling: what it does is in proportion to it."""
+        """Return one small coupling; the effect is proportional to it."""
         return (((0.05,),),)
 
     @torque_reading
@@ -42,7 +42,7 @@ class TorqueCrossTalk(Effect):
         torque[joint] += values[0] * torque[1 - joint]
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Take away the other joint's share."""
+        """Subtract the other joint's share of the torques (n, J), N·m."""
         true, j = torque.copy(), self.column(motion)
         true[:, j] -= values[0] * torque[:, 1 - j]
         return true

@@ -35,8 +35,7 @@ class TorqueDrift(Effect):
     parity = Parity.EVEN
 
     def __post_init__(self) -> None:
-        """Take the level as nought where the mechanism's own parameters take up a constant
-        torque."""
+        """Set the level to zero if the mechanism's parameters absorb a constant torque."""
         super().__post_init__()
         if TorqueOffset.name in self.on.mechanism.absorbs:
             rate, level = self.linear
@@ -45,5 +44,5 @@ class TorqueDrift(Effect):
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
-        """Shift the torque by what has gathered."""
+        """Add the accumulated offset to the torque."""
         torque[joint] += values[0] * t + values[1]

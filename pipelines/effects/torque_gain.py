@@ -8,8 +8,7 @@ from pipelines.mechanics.motion import Motion
 
 
 class TorqueGain(Effect):
-    """The measured torque is the true one times a factor: a wrong torque constant or gear
-    efficiency."""
+    """The measured torque is the true one times a factor: a wrong torque constant or efficiency."""
 
     name = "torque_gain"
     title = "Torque gain"
@@ -23,8 +22,8 @@ class TorqueGain(Effect):
         " drive gains"
     )
     looks_like = (
-        "the joints disagree about the second link: what both carry, X2 and X3, differs between the"
-        " rows"
+        "the joints disagree about the second link: the parameters of both, X2 and X3, differ"
+        " between the rows"
     )
     confirm = "hang a known weight on the joint and compare the change of torque with the weight's"
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
@@ -35,7 +34,7 @@ class TorqueGain(Effect):
         torque[joint] *= values[0]
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Divide by the gain."""
+        """Divide the torque of the joint, in (n, J) N·m, by the gain."""
         true = torque.copy()
         true[:, self.column(motion)] /= values[0]
         return true

@@ -1,12 +1,14 @@
-"""A torque channel whose zero is off."""
+"""A torque channel with a wrong zero."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
 
 
 class TorqueOffset(Effect):
-    """The measured torque is the true one plus a constant; another at each start, where the sensor
-    is tared there."""
+    """The measured torque is the true one plus a constant.
+
+    A sensor that is tared at each start has another constant in each run.
+    """
 
     name = "torque_offset"
     title = "Torque offset"
@@ -19,12 +21,12 @@ class TorqueOffset(Effect):
         "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive"
         " chain's offset"
     )
-    looks_like = "a residual whose mean is not zero, moving or standing"
+    looks_like = "a residual whose mean is not zero, in motion or at rest"
     confirm = (
-        "switch the drive off and read its torque: it should be zero; one that is tared at each"
-        " start reads zero then whatever loads it: take the load off first"
+        "switch the drive off and read its torque: it should be zero; a sensor that is tared at"
+        " each start reads zero then under any load: remove the load first"
     )
-    may_differ = "a torque sensor that is tared anew at every start"
+    may_differ = "a torque sensor that is tared at every start"
     linear = (Parameter("offset", "N·m", "measured less true torque", "o", (-4.0, 4.0)),)
     parity = Parity.EVEN
 

@@ -5,14 +5,14 @@ from pipelines.effects.kernel import reaction
 
 
 class ViscousAsymmetry(Effect):
-    """More viscous friction one way than the other."""
+    """More viscous friction in one direction than in the other."""
 
     name = "viscous_asymmetry"
     title = "Viscous asymmetry"
     side = Side.DRIVE
     family = Family.SPEED
     resembles = ("speed",)
-    forms_differ = "a real slope is not straight either way"
+    forms_differ = "a real slope is not straight in either direction"
     equation = "tau = c abs(v): Km + c forward, Km - c backward"
     source = "Armstrong-Hélouvry (1991), Control of Machines with Friction, Kluwer, ch. 4"
     looks_like = "torque against speed: a V, zero at standstill"

@@ -11,7 +11,7 @@ from pipelines.effects.kernel import reaction
 
 
 class VoluntaryTorque(Effect):
-    """The human helps or resists at a rhythm of their own, which need not be the machine's."""
+    """The wearer helps or resists at a rhythm of their own, independent of the machine's."""
 
     name = "voluntary_torque"
     title = "Voluntary torque"
@@ -22,7 +22,7 @@ class VoluntaryTorque(Effect):
     equation = "tau = A sin(2 pi f t) + B cos(2 pi f t) + c"
     source = "Hogan, Sternad (2007), Experimental Brain Research 181: rhythmic movement"
     looks_like = (
-        "a tone in residual and cuff forces, at a frequency that no period of the motion explains"
+        "a tone in residual and cuff forces, at a frequency that is no harmonic of the motion"
     )
     confirm = (
         "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not"
@@ -35,20 +35,20 @@ class VoluntaryTorque(Effect):
         Parameter(
             "bias",
             "N·m",
-            "mean of a wearer who pushes one way more than the other",
+            "mean torque, if the wearer pushes more in one direction",
             "c",
             (-5.0, 5.0),
             True,
         ),
     )
-    shape = (Parameter("frequency", "Hz", "of the rhythm", "f", (0.1, 3.0)),)
+    shape = (Parameter("frequency", "Hz", "frequency of the rhythm", "f", (0.1, 3.0)),)
     reported = (
         Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.5, 10.0)),
         *shape,
         Parameter(
             "phase",
             "rad",
-            "of the rhythm when the run begins",
+            "phase of the rhythm when the run begins",
             "phi",
             (-np.pi, np.pi),
             True,
@@ -66,12 +66,11 @@ class VoluntaryTorque(Effect):
         out[joint] += values[0] * sin(angle) + values[1] * cos(angle) + values[2]
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, frequency and phase of amplitude sin(2 pi f t + phase), and the
-        bias."""
+        """Return amplitude, frequency and phase of the rhythm's sine, and the bias, (4,)."""
         sine, cosine, bias, frequency = values
         return np.array([np.hypot(sine, cosine), frequency, np.arctan2(cosine, sine), bias])
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sine and cosine, the bias, and the frequency."""
+        """Return the amplitudes of sine and cosine, the bias, and the frequency, (4,)."""
         amplitude, frequency, phase, bias = physical
         return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase), bias, frequency])

@@ -1,4 +1,4 @@
-"""The excitation as a finite Fourier series: periodic, with exact derivatives and exact extrema."""
+"""The excitation as a finite Fourier series: periodic, with exact derivatives and extrema."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,9 +11,9 @@ from pipelines.contracts.joints import HIP_AND_KNEE, Joint
 
 @dataclass(frozen=True)
 class FourierTrajectory:
-    """q(t) = theta0 + sum over k = 1..n of a_k sin(k w t) + b_k cos(k w t) (paper eq. 11, mended).
+    """q(t) = theta0 + sum over k = 1..n of a_k sin(k w t) + b_k cos(k w t).
 
-    J joints, n harmonics, SI units.
+    Source: paper, eq. 11, as corrected in docs/errata.md. J joints, n harmonics, SI units.
     """
 
     theta0: NDArray
@@ -33,18 +33,28 @@ class FourierTrajectory:
 
     @property
     def duration_s(self) -> float:
-        """How long the motion can go on."""
+        """Time for which the motion can run, s."""
         return np.inf
 
     def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
-        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J)
-        each."""
+        """Return angle, velocity and acceleration at some times.
+
+        Parameters
+        ----------
+        time : (n,) array or float
+            Times, s.
+
+        Returns
+        -------
+        q, dq, ddq : (n, J) array
+            rad, rad/s and rad/s².
+        """
         phase = np.exp(1j * np.outer(np.atleast_1d(time), self._frequencies))
         q, dq, ddq = ((phase @ amplitude.T).real for amplitude in self._amplitudes)
         return self.theta0 + q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Return the extremes of angle, velocity and acceleration of each joint, (3, J, 2)."""
+        """Return the least and greatest angle, velocity and acceleration, (3, J, 2)."""
         ranges = np.array(
             [[_range(joint) for joint in amplitude] for amplitude in self._amplitudes]
         )
@@ -57,8 +67,10 @@ class FourierTrajectory:
 
     @cached_property
     def _amplitudes(self) -> NDArray:
-        """Complex amplitudes of q, dq and ddq, (3, J, n): a sin x + b cos x = Re (b - i a) e^(i
-        x)."""
+        """Complex amplitudes of q, dq and ddq, (3, J, n).
+
+        a sin x + b cos x = Re (b - i a) e^(i x).
+        """
         angle = self.b - 1j * self.a
         return np.array([angle * (1j * self._frequencies) ** order for order in range(3)])
 
@@ -66,8 +78,8 @@ class FourierTrajectory:
 def _range(amplitude: NDArray) -> tuple[float, float]:
     """Return the least and the greatest value of Re sum c_k e^(i k x) over all x.
 
-    With z = e^(ix) the derivative is a polynomial of degree 2n over z^n; every extremum lies at the
-    argument of a root. The other roots' arguments do no harm: each is one more place to look at.
+    With z = e^(ix), the derivative is a polynomial of degree 2n over z^n; every extremum lies at
+    the argument of a root. The arguments of the other roots only add points.
     """
     n = len(amplitude)
     slope = 1j * np.arange(1, n + 1) * amplitude

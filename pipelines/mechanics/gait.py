@@ -1,23 +1,25 @@
-"""A gait-like reference: swing of hip and knee at half a stride a second."""
+"""A gait-like reference: hip and knee swing at half a stride per second."""
 
 import numpy as np
 
 from pipelines.mechanics.fourier import FourierTrajectory
 
 OMEGA = np.pi
-"""rad/s: one stride in two seconds."""
+"""Angular frequency, rad/s: one stride in two seconds."""
 
 MEAN = np.array([0.18, -0.46])
 """Mean angle of hip and knee, rad."""
 
 AMPLITUDE = np.array([[0.40, -0.06, 0.0], [-0.28, -0.24, -0.06]])
 PHASE = np.array([[-0.2, 0.6, 0.0], [1.8, 2.6, 3.0]])
-"""Of the cosine of each harmonic, joint x harmonic, rad."""
+"""Phase of the cosine of each harmonic, joint x harmonic, rad."""
 
 
 def gait() -> FourierTrajectory:
-    """Return q = mean + sum over k of amplitude_k cos(k w t + phase_k), the reference case of
-    docs/simulation.md."""
+    """Return the reference case of docs/simulation.md.
+
+    q = mean + sum over k of amplitude_k cos(k w t + phase_k).
+    """
     return FourierTrajectory(
         theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA
     )

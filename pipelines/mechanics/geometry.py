@@ -1,4 +1,4 @@
-"""Lengths and gravity of a machine: what is measured, not identified."""
+"""Lengths and gravity of a machine, which are measured and not identified."""
 
 from dataclasses import asdict, dataclass
 
@@ -8,27 +8,26 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Geometry:
-    """Lengths and gravity that are measured, not identified. SI units."""
+    """Lengths and gravity that are measured, not identified; SI units."""
 
     thigh_length_m: float = 0.38952
-    """First to second joint axis; a machine of one joint has no use for it."""
+    """First to second joint axis; unused for a machine of one joint."""
     gravity_m_s2: float = 9.8
-    """0 where the joints turn about vertical axes; of a prismatic joint, along its axis."""
+    """0 for vertical joint axes; along the axis of a prismatic joint."""
     thigh_cuff_distance_m: float | None = None
-    """Hip axis to thigh cuff; None where there are no cuff forces."""
+    """Hip axis to thigh cuff; None without cuff forces."""
     shank_cuff_distance_m: float | None = None
-    """Knee axis to shank cuff; None where there are no cuff forces."""
+    """Knee axis to shank cuff; None without cuff forces."""
 
     @property
     def has_cuffs(self) -> bool:
-        """Whether it says where both cuffs are."""
+        """Whether the positions of both cuffs are known."""
         return None not in (self.thigh_cuff_distance_m, self.shank_cuff_distance_m)
 
     def metadata(self) -> dict[str, float]:
-        """Return what a file says of it; lengths that are not known are left out."""
+        """Return the geometry for a file's metadata, without unknown lengths."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def array(self) -> NDArray:
-        """Return what compiled kernels receive as ``geometry``, (2,): thigh length (m), gravity
-        (m/s²)."""
+        """Return the argument ``geometry`` of kernels, (2,): thigh length (m), gravity (m/s²)."""
         return np.array([self.thigh_length_m, self.gravity_m_s2])

@@ -1,8 +1,8 @@
-"""What a torque equation sees of a machine at one instant, and how it is compiled.
+"""The state of a machine at one instant, and the compilation of torque equations.
 
-A kernel is written once and used by everybody: along a measured motion, and at every integration
-step of the forward dynamics. All of a kind share one signature, so that compiled code can hold them
-by their address.
+A kernel is written once for all users: it is evaluated along a measured motion, and at every
+integration step of the forward dynamics. All kernels of a kind share one signature, so that
+compiled code can hold them by address.
 """
 
 from typing import NamedTuple
@@ -14,17 +14,16 @@ from numba.core.types import float64, int64, void
 vector = float64[::1]
 
 REFERENCE_C = 25.0
-"""°C at which what depends on temperature is told, and at which a simulation runs that is told no
-other."""
+"""Temperature, °C, to which temperature effects refer, and the default of simulations."""
 
 
 class Instant(NamedTuple):
-    """The machine at one instant, every array (J,) and in SI units.
+    """The machine at one instant; every array is (J,) in SI units.
 
-    ``direction`` is the sign of the velocity where a joint moves; where it sticks, the forward
-    dynamics puts the value in [-1, 1] that holds it. Equations use it wherever theirs says sgn v.
-    ``load`` is the torque that the drive train transmits to the link, N·m; ``temperature`` is the
-    motors', °C, NaN where it was not read.
+    ``direction`` is the sign of the velocity while a joint moves. While it sticks, the forward
+    dynamics sets the value in [-1, 1] that holds it. Equations use it in place of sgn v. ``load``
+    is the torque that the drive train transmits to the link, N·m; ``temperature`` is that of the
+    motors in °C, NaN where it was not measured.
     """
 
     t: float
@@ -39,8 +38,7 @@ class Instant(NamedTuple):
 INSTANT = types.NamedTuple([float64, *(vector,) * 6], Instant)
 
 REACTION = void(INSTANT, vector, vector, vector, int64, vector)
-"""reaction(at, state, values, geometry, joint, out): add the torque the drives must supply to
-``out``."""
+"""reaction(at, state, values, geometry, joint, out): add the drives' torque to ``out``."""
 
 
 def reaction(function):

@@ -1,5 +1,4 @@
-"""From a recording to a motion: zero-phase filtered angles, their derivatives, segments, and what
-to trust."""
+"""Compute a motion from a recording: filtered angles, derivatives, segments, valid samples."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -24,24 +23,21 @@ from pipelines.signals.low_pass import derivative, low_pass, reach, shortest
 EDGE_PERIODS = 1.5
 """Periods of the cut-off frequency at each end of a segment where the filter lacks one side."""
 SPLINE_REACH = 40
-"""Samples away from which a cubic spline no longer feels a cut: its influence falls by 3.7 with
-each."""
+"""Samples over which a cut influences a cubic spline; the influence falls by 3.7 with each."""
 SLOWEST_HZ, FASTEST_HZ = 12.0, 1e6
-"""Rates at which a machine's motion can be looked at: what moves below 5 Hz is seen, and no clock
-was misread."""
+"""Accepted sample rates. Motion below 5 Hz is visible in all of them; a higher rate is a misread
+clock."""
 WINDOW = 2**16
-"""Rows that are filtered at a time; fewer than the filter reaches would cost more than they
-save."""
+"""Rows that are filtered at a time; the filter's margin should be a small part of them."""
 
 
 @dataclass(frozen=True)
 class FilteredRecording:
-    """A ``motion/1`` table that is computed, window by window, each time its rows are gone
-    through."""
+    """A ``motion/1`` table that is computed window by window, each time its rows are read."""
 
     recording: Rows
     metadata: dict[str, Any]
-    """The recording's, and how it is filtered."""
+    """The recording's metadata, with the filter's."""
     cutoff: Cutoff
     stretches: Stretches
 
@@ -52,14 +48,14 @@ class FilteredRecording:
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """The recording's."""
+        """Joints of the recording."""
         return self.recording.joints
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the motion in its order; all columns, or those that are named.
+        """Yield the motion in order, with all columns or the named ones.
 
-        Each window reaches so far beyond what it is about that the result is that of filtering all
-        at once.
+        The margin of each window is long enough that the result equals filtering everything at
+        once.
         """
         rate_hz, order = self.metadata["sample_rate_hz"], self.metadata["filter"]["order"]
         margin = reach(rate_hz, self.cutoff.hz, order) + SPLINE_REACH
@@ -73,8 +69,7 @@ class FilteredRecording:
         q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
         segment, valid = np.zeros(len(time), dtype=np.int64), np.zeros(len(time), dtype=bool)
         edge = _edge(rate_hz, self.cutoff.hz)
-        # Of a stretch that only the margin holds there may be too little to filter, and nothing of
-        # it is kept.
+        # A stretch that lies only in the margin may be too short to filter; it is dropped.
         for s in self.stretches.overlapping(
             window.first + window.core.start, window.first + window.core.stop
         ):
@@ -95,10 +90,10 @@ class FilteredRecording:
 
 
 def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
-    """Make a ``motion/1`` table of a ``recording/1`` table.
+    """Compute the ``motion/1`` table of a ``recording/1`` table.
 
-    Angles are filtered and differentiated; torque, forces and the rest stay as measured; no sample
-    is dropped.
+    Angles are filtered and differentiated. Torque, forces and the rest stay as measured, and no
+    sample is dropped.
     """
     rate_hz = float(recording.metadata["sample_rate_hz"])
     with about(recording.path):
@@ -132,7 +127,7 @@ def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
         )
         raise InputError(
             f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g}"
-            f" MHz, for a joint's motion to be seen; correct {where}, or record it anew"
+            f" MHz, which show a joint's motion; correct {where}, or record it again"
         )
 
 
@@ -153,8 +148,7 @@ def _cutoff(
                 " cut-off from; record longer runs, or set filter.cutoff_hz"
             )
         if not stretches.uniform[stretches.longest]:
-            # A uniform grid has more or fewer places than there are samples; never less than half
-            # as many.
+            # The grid has more or fewer points than there are samples, but at least half as many.
             samples //= 2
         names = tuple(joint.name for joint in recording.joints)
         return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
@@ -202,7 +196,7 @@ def _on_grid(recording: Rows, stretches: Stretches, rate_hz: float) -> Iterator[
 
 
 def _rows_of(s: int, stretches: Stretches, window: Window) -> slice:
-    """Return where in a window's rows a stretch is."""
+    """Return the rows of a stretch within a window."""
     rows = window.rows.num_rows
     return slice(
         *(
@@ -225,7 +219,7 @@ def _motion_columns(
     segment: NDArray,
     valid: NDArray,
 ) -> pa.Table:
-    """Put what was computed beside what was recorded, in the order of ``motion/1``."""
+    """Combine computed and recorded columns in the order of ``motion/1``."""
     columns: dict[str, Any] = {"time_s": rows["time_s"]}
     q, dq, ddq = states
     for j, joint in enumerate(joints):
@@ -240,7 +234,7 @@ def _motion_columns(
 
 
 class _Grid:
-    """The uniform times of one stretch, at which a filter with one transfer function is defined."""
+    """Uniform times of one stretch, on which the filter is defined."""
 
     def __init__(self, stretches: Stretches, number: int, rate_hz: float) -> None:
         self._origin_s = stretches.origin_s[number]
@@ -261,14 +255,12 @@ class _Grid:
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
-        """Return the angles at those uniform times that lie in ``begin_s`` to ``end_s``, that not
-        included."""
+        """Return the angles at uniform times from ``begin_s`` to before ``end_s``."""
         grid, uniform = self._sampled(time, angle)
         return uniform[(grid >= begin_s) & (grid < end_s)]
 
     def _sampled(self, time: NDArray, angle: NDArray) -> tuple[NDArray, NDArray]:
-        """Return uniform times and the angles there; the samples themselves where they are uniform
-        already."""
+        """Return uniform times and the angles there; the samples themselves if they are uniform."""
         if self._uniform:
             return time, angle
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))

@@ -1,4 +1,4 @@
-"""How far an excitation stays from what a joint may do."""
+"""Margins between an excitation and the bounds of its joints."""
 
 from dataclasses import dataclass
 
@@ -10,27 +10,27 @@ from pipelines.settings.design import JointBounds
 
 QUANTITIES = ("angle", "velocity", "acceleration")
 
-# A design that touches its bound has been computed in floating point.
 TOLERANCE = 1e-9
+"""Excess over a bound that is rounding error."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """One joint's range in one quantity, against what it may have."""
+    """The range of one joint in one quantity, with its bounds."""
 
     joint: str
     quantity: str
     unit: str
     low: float
     high: float
-    """The bounds."""
+    """Upper bound."""
     lowest: float
     highest: float
-    """What the motion reaches, between samples too."""
+    """Greatest value of the motion, between samples too."""
 
     @property
     def margin(self) -> float:
-        """Distance to the nearer bound; negative where it is overstepped."""
+        """Distance to the nearer bound; negative beyond it."""
         return min(self.lowest - self.low, self.high - self.highest)
 
     @property
@@ -39,7 +39,7 @@ class Margin:
         return self.margin >= -TOLERANCE
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Describe the margin in one sentence."""
         return (
             f"{self.joint} {self.quantity} goes from {self.lowest:.4g} to {self.highest:.4g}"
             f" {self.unit}, allowed is {self.low:g} to {self.high:g}"

@@ -1,5 +1,4 @@
-"""What a rigid body asks of its joints along a motion, and how that changes where it moves a little
-otherwise."""
+"""The load of a rigid body on its joints along a motion, and its slopes near that motion."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,11 +11,11 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanism import Mechanism
 
 STEP = 1e-4
-"""rad and rad/s of the difference quotients: the torque bends over tenths of a radian."""
+"""Step of the difference quotients, rad and rad/s; the torque bends over tenths of a radian."""
 
 
 class CoordinateLoad(NamedTuple):
-    """Torque of a body on one coordinate along a motion, and its slopes there, (n,) each."""
+    """Torque of a body on one coordinate along a motion, and its slopes, (n,) each."""
 
     torque: NDArray
     """N·m."""
@@ -25,13 +24,15 @@ class CoordinateLoad(NamedTuple):
     damping: NDArray
     """N·m per rad/s: centrifugal and Coriolis torque."""
     stiffness: NDArray
-    """N·m per rad: gravity, and what turns with the body."""
+    """N·m per rad: gravity, and torques that turn with the body."""
 
 
 @dataclass(frozen=True)
 class LoadColumns:
-    """A body's load along a motion (n, J), per unit of each of its p inertial parameters; each is
-    computed once."""
+    """A body's load along a motion (n, J), per unit of each of its p inertial parameters.
+
+    Each column is computed once.
+    """
 
     mechanism: Mechanism
     q: NDArray
@@ -41,18 +42,28 @@ class LoadColumns:
 
     @cached_property
     def torque(self) -> NDArray:
-        """The torque itself, (n, J, p)."""
+        """Torque per unit of each parameter, (n, J, p)."""
         return self._torque(self.q, self.dq, self.ddq)
 
     def torque_of(self, X: NDArray) -> NDArray:
-        """Return the torque of a body with inertial parameters ``X`` (p,), (n, J)."""
-        # Numpy multiplies a matrix twenty times as fast as a stack of them.
+        """Return the torque of a body with inertial parameters ``X`` (p,), (n, J) N·m."""
+        # numpy multiplies one matrix twenty times as fast as a stack of matrices.
         flat = self.torque.reshape(-1, len(X))
         return (flat @ X).reshape(self.q.shape)
 
     def projected(self, direction: NDArray) -> NDArray:
-        """Return torque and slopes, (4, n, p), of one coordinate that turns the joints by
-        ``direction`` (n, J)."""
+        """Return torque and slopes on one coordinate.
+
+        Parameters
+        ----------
+        direction : (n, J) array
+            Rotation of the joints per unit of the coordinate.
+
+        Returns
+        -------
+        (4, n, p) array
+            Torque, inertia, damping and stiffness per unit of each parameter.
+        """
         key = direction.tobytes()
         if key not in self._projected:
             step = STEP * direction
@@ -69,7 +80,7 @@ class LoadColumns:
 
     @cached_property
     def _projected(self) -> dict[bytes, NDArray]:
-        """What was computed, by direction: thousands of fits ask for few directions."""
+        """Results by direction: thousands of fits need few directions."""
         return {}
 
     def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:

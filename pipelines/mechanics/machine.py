@@ -1,4 +1,4 @@
-"""A machine: a mechanism whose joints have names, and what is usual at each of them."""
+"""A machine: a mechanism whose joints have names and scales."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ def _collected() -> tuple[Mechanism, ...]:
     Raises
     ------
     InputError
-        Where a recording's joints and gravity could be those of two.
+        If two mechanisms have the same joints and gravity.
     """
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
@@ -37,40 +37,40 @@ def _collected() -> tuple[Mechanism, ...]:
         if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
             raise InputError(
                 f"two mechanisms have the joints {', '.join(one.kinds)}: {one.name}"
-                f" ({one.joints_in_words}) and {other.name} ({other.joints_in_words}), and no"
-                " recording could say of which it is; remove one of their files from"
-                " pipelines/mechanics/mechanisms, or let has_gravity tell them apart"
+                f" ({one.joints_in_words}) and {other.name} ({other.joints_in_words}), so that no"
+                " recording determines its mechanism. Remove one of their files from"
+                " pipelines/mechanics/mechanisms, or give them a different has_gravity"
             )
     return tuple(mechanisms_of)
 
 
 MECHANISMS = _collected()
-"""All that there are. Adding one is a file in mechanisms/ and nothing else."""
+"""All mechanisms. A new one needs a file in mechanisms/ and nothing else."""
 
 
 def mechanisms_of(joints: Iterable[Joint]) -> tuple[Mechanism, ...]:
-    """Return the mechanisms that have such joints, with gravity and without."""
+    """Return the mechanisms with such joints, with gravity and without."""
     kinds = tuple(joint.kind for joint in joints)
     return tuple(mechanism for mechanism in MECHANISMS if mechanism.kinds == kinds)
 
 
 def known_in_words() -> str:
-    """Return what mechanisms there are, by what their joints are."""
+    """Return the joints of all mechanisms, in words."""
     return "; ".join(mechanism.joints_in_words for mechanism in MECHANISMS)
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A mechanism and its joints' names."""
+    """A mechanism and the names of its joints."""
 
     mechanism: Mechanism = LEG
     joints: tuple[Joint, ...] = HIP_AND_KNEE
     scales: tuple[Scale, ...] = ()
-    """Of each joint; empty where they are an exoskeleton's, or nobody has asked."""
+    """Scale of each joint; empty for an exoskeleton, or if the scales were not computed."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its joints."""
+        """Names of its joints."""
         return tuple(joint.name for joint in self.joints)
 
     def joint(self, name: str) -> Joint:
@@ -82,29 +82,26 @@ class Machine:
         return self.scales[self.names.index(name)] if self.scales else Scale()
 
     def lasting(self, seconds: float) -> float:
-        """Return how long this machine needs for what an exoskeleton does in so many seconds, no
-        longer than that, s.
+        """Return the time in which this machine moves as much as an exoskeleton in ``seconds``, s.
 
-        A pendulum that swings up goes five times as fast: a second of it tells as much.
+        It is never longer. A pendulum that swings up moves five times as fast, so that one second
+        of it holds as much information as five.
         """
         slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
         return seconds * min(1.0, slowest)
 
     def metadata(self, geometry: Geometry) -> dict[str, float]:
-        """Return what a file says of the machine's geometry: no length where none is in its
-        equations."""
+        """Return the geometry for a file's metadata, without lengths that no equation uses."""
         stated = geometry.metadata()
         return stated if self.mechanism.has_length else {"gravity_m_s2": stated["gravity_m_s2"]}
 
     def place(self, name: str) -> str:
-        """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is
-        called."""
+        """Return the place of a joint in the mechanism, such as ``hip`` for a leg's first joint."""
         return self.mechanism.places[self.names.index(name)]
 
     @property
     def is_exoskeleton(self) -> bool:
-        """Whether it is the leg that ranges and thresholds were found on: its joints say so by
-        their names."""
+        """Whether it is the leg of the standard ranges and thresholds, by its joints' names."""
         return self.joints == HIP_AND_KNEE
 
 
@@ -114,12 +111,23 @@ THE_LEG = Machine()
 def machine_of(
     joints: Sequence[Joint], geometry: Geometry, source: Any = "", scales: tuple[Scale, ...] = ()
 ) -> Machine:
-    """Return the machine with these joints; ``source`` begins the message where there is none.
+    """Return the machine with some joints.
+
+    Parameters
+    ----------
+    joints : sequence of Joint
+        Its joints.
+    geometry : Geometry
+        Decides whether gravity acts.
+    source : str, optional
+        Begin of the message.
+    scales : tuple of Scale, optional
+        Scale of each joint.
 
     Raises
     ------
     InputError
-        Where no mechanism has such joints.
+        If no mechanism has such joints.
     """
     for mechanism in mechanisms_of(joints):
         if mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):

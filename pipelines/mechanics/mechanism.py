@@ -1,7 +1,7 @@
-"""A mechanism: which joints there are, and the torque that its rigid bodies ask of them.
+"""A mechanism: its joints, and the torque that its rigid bodies require of them.
 
-Each mechanism is one file that states its regressor, torque = A(q, dq, ddq) X; mass matrix,
-Coriolis matrix and gravity are read off that here, once for all.
+Each mechanism is one file with its regressor, torque = A(q, dq, ddq) X. Mass matrix, Coriolis
+matrix and gravity are computed from it here.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,13 +16,13 @@ from pipelines.mechanics.geometry import Geometry
 
 
 class Inertial(NamedTuple):
-    """One inertial parameter."""
+    """An inertial parameter."""
 
     name: str
     unit: str
     meaning: str
     typical: tuple[float, float]
-    """The range seen on exoskeletons, or on what a bench holds."""
+    """Range on exoskeletons, or on a test bench."""
 
 
 @dataclass(frozen=True)
@@ -30,45 +30,55 @@ class Mechanism:
     """Joints of given kinds and the rigid bodies between them: J joints, p inertial parameters."""
 
     name: str
-    """As exoid.toml has it, ``leg``; what differs by kind of joint or gravity shares it."""
+    """Name in exoid.toml, such as ``leg``; shared by variants in kind of joint or gravity."""
     title: str
-    """What joints it has, and after a colon, if need be, what machines it stands for."""
+    """Its joints, and after an optional colon the machines that it represents."""
     kinds: tuple[Kind, ...]
-    """Of its joints, from the base on."""
+    """Kinds of its joints, from the base on."""
     places: tuple[str, ...]
-    """What effects call its joints, whatever their names are: ``hip``, ``knee``; ``joint``."""
+    """Names of its joints in effects, whatever a file calls them: ``hip``, ``knee``; ``joint``."""
     has_gravity: bool | None
-    """Whether it is the one to take where gravity acts; None where it is the same with and
-    without."""
+    """Whether gravity acts on it; None if it is the same with and without."""
     parameters: tuple[Inertial, ...]
     along: Callable[[NDArray, NDArray, NDArray, NDArray], NDArray]
-    """Compiled: q, dq, ddq, each (n, J), and the geometry's array to the regressor, (n, J, p)."""
+    """Compiled function of q, dq, ddq, (n, J) each, and the geometry's array that returns the
+    regressor, (n, J, p)."""
     bends_at: tuple[str, ...]
-    """Places of the joints whose positions its torque depends on; none where it is of acceleration
-    alone."""
+    """Places of the joints on whose positions its torque depends; empty if it depends on
+    acceleration alone."""
     reactions: Mapping[str, Any] = field(hash=False, compare=False)
-    """Compiled equations of effects that differ from mechanism to mechanism, by the effect's name,
-    ``rigid_body`` among them; an effect that is not listed cannot be there."""
+    """Compiled equations of effects that depend on the mechanism, by the effect's name,
+    ``rigid_body`` included. An effect without one cannot occur."""
     broken: Callable[[NDArray, Geometry], list[str]] = field(hash=False, compare=False)
-    """Say which conditions of a real machine the parameters X break; empty when none."""
+    """Function that lists the conditions of a real machine that the parameters X violate."""
     inertia_forms: Callable[[Geometry], NDArray] = field(hash=False, compare=False)
-    """Symmetric B, (p, m, m): M(q) > 0 at every q if and only if the sum of X_i B_i is, the same
-    conditions as a convex program wants them."""
+    """Function that returns symmetric B, (p, m, m). M(q) > 0 at every q if and only if the sum of
+    X_i B_i is: the same conditions in the form of a convex program."""
     absorbs: Mapping[str, str] = field(default_factory=dict, hash=False, compare=False)
-    """Effects that its own parameters take up whole, by name, and which parameters those are."""
+    """Effects that its own parameters absorb completely, by name, and which parameters those
+    are."""
     has_length: bool = False
-    """Whether the distance between the first two axes, ``thigh_length_m``, is in its equations."""
+    """Whether its equations contain the distance between the first two axes, ``thigh_length_m``."""
 
     @property
     def joints_in_words(self) -> str:
-        """What joints it has, as messages name it."""
+        """Its joints, as messages name them."""
         return self.title.partition(":")[0]
 
     def regressor(self, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> NDArray:
-        """Return A along a motion, (n, J, p): torque (N·m, at a prismatic joint N) per unit of each
-        parameter.
+        """Return the regressor A along a motion.
 
-        q, dq, ddq are (n, J) in rad and s, m and s at a prismatic joint.
+        Parameters
+        ----------
+        q, dq, ddq : (n, J) array
+            Angle, velocity and acceleration in rad and s; m and s at a prismatic joint.
+        geometry : Geometry
+            Lengths and gravity.
+
+        Returns
+        -------
+        (n, J, p) array
+            Torque in N·m (N at a prismatic joint) per unit of each parameter.
         """
         q, dq, ddq = (np.ascontiguousarray(state, dtype=float) for state in (q, dq, ddq))
         return self.along(q, dq, ddq, geometry.array())
@@ -78,8 +88,19 @@ class Mechanism:
         return np.asarray(self.regressor(q, dq, ddq, geometry)[0] @ np.asarray(X, dtype=float))
 
     def mass_matrix(self, q, X, geometry: Geometry) -> NDArray:
-        """M(q), (J, J) kg·m²: what unit acceleration of each joint adds to the torque (Walker and
-        Orin, 1982)."""
+        """Return the mass matrix M(q), (J, J) kg·m².
+
+        Its columns are the torques of unit accelerations (Walker and Orin, 1982).
+
+        Parameters
+        ----------
+        q : (J,) array
+            Angles, rad.
+        X : (p,) array
+            Inertial parameters.
+        geometry : Geometry
+            Lengths.
+        """
         still, weightless = np.zeros(len(self.kinds)), replace(geometry, gravity_m_s2=0.0)
         at_rest = self._torque(q, still, still, X, weightless)
         return np.column_stack(
@@ -87,9 +108,19 @@ class Mechanism:
         )
 
     def coriolis_matrix(self, q, dq, X, geometry: Geometry) -> NDArray:
-        """C(q, dq), (J, J) N·m·s/rad, in Christoffel form, so that dM/dt - 2 C is skew.
+        """Return the Coriolis matrix C(q, dq), (J, J) N·m·s/rad, in Christoffel form.
 
-        The velocity torque is a quadratic form in dq; its polarisation is the Christoffel matrix.
+        dM/dt - 2 C is then skew-symmetric. The velocity torque is a quadratic form in dq, and its
+        polarisation is the Christoffel matrix.
+
+        Parameters
+        ----------
+        q, dq : (J,) array
+            Angles, rad, and velocities, rad/s.
+        X : (p,) array
+            Inertial parameters.
+        geometry : Geometry
+            Lengths.
         """
         still, weightless = np.zeros(len(self.kinds)), replace(geometry, gravity_m_s2=0.0)
         dq = np.asarray(dq, dtype=float)
@@ -104,15 +135,21 @@ class Mechanism:
         )
 
     def gravity_torque(self, q, X, geometry: Geometry) -> NDArray:
-        """G(q), (J,) N·m: the torque that holds the machine still."""
+        """Return the torque G(q), (J,) N·m, that holds the machine at rest."""
         still = np.zeros(len(self.kinds))
         return self._torque(q, still, still, X, geometry)
 
     def least_inertia(self, X, geometry: Geometry) -> tuple[float, float, NDArray]:
-        """Return the least eigenvalue of what ``inertia_forms`` make of X (p,), the largest, and
-        its slope (p,).
+        """Return the extreme eigenvalues of the inertia form of X (p,).
 
-        The least is above nought where masses are, and along its own eigenvector it is linear in X.
+        The least is positive for real masses, and linear in X along its own eigenvector.
+
+        Returns
+        -------
+        least, greatest : float
+            Eigenvalues.
+        slope : (p,) array
+            Derivative of the least one.
         """
         forms = self.inertia_forms(geometry)
         inertias, axes = np.linalg.eigh(np.tensordot(np.asarray(X, dtype=float), forms, 1))
@@ -123,5 +160,5 @@ class Mechanism:
         )
 
     def unrealizable(self, X, geometry: Geometry) -> list[str]:
-        """Say which conditions of a real machine the parameters X (p,) break; empty when none."""
+        """List the conditions of a real machine that the parameters X (p,) violate."""
         return self.broken(np.asarray(X, dtype=float), geometry)

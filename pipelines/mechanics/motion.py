@@ -1,4 +1,4 @@
-"""A measured motion: what regression, diagnosis and replay are computed from."""
+"""A measured motion, from which regressions, diagnoses and replays are computed."""
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field, replace
@@ -21,30 +21,30 @@ from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
-"""Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does
-at 1 Hz."""
+"""Cut-off of a load before it is differentiated twice. Noise at 25 Hz would otherwise have 600
+times the weight of noise at 1 Hz."""
 
 MOST_UNREAD_S = 0.1
-"""Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth
-of its way there."""
+"""Longest interval between two force readings that is interpolated, s. A leg that moves at 1 Hz
+covers a tenth of its range in it."""
 
 SHORTEST_PERIOD = 4
-"""Samples in a period, at least."""
+"""Least number of samples in a period."""
 
 IGNORED_PERIOD = 10
-"""Recording lengths in a period, beyond which it is ignored."""
+"""Ratio of period to recording above which the period is ignored."""
 
-KEPT = ("transmitted", "motor_temperature", "felt")
-"""What does not depend on a motion's kinematics, and is costly to compute."""
+KEPT = ("transmitted", "motor_temperature", "held_forces")
+"""Cached properties that do not depend on the kinematics, and are costly to compute."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One run, every sample of it. n samples, J joints, SI units.
+    """One run with every sample; n samples, J joints, SI units.
 
-    ``torque`` is as measured; ``q``, ``dq`` and ``ddq`` come from the zero-phase filter.
+    ``torque`` is measured; ``q``, ``dq`` and ``ddq`` come from the zero-phase filter.
     """
 
     time: NDArray
@@ -61,29 +61,28 @@ class Motion:
     joints: tuple[str, ...] = ("hip", "knee")
     geometry: Geometry = field(default_factory=Geometry)
     forces: NDArray | None = None
-    """(n, 4, 3) N as read, cuffs in the order of ``CUFFS``; None where they were not read."""
+    """(n, 4, 3) N as measured, cuffs in the order of ``CUFFS``; None if they were not measured."""
     reference: NDArray | None = None
     """(n, J) commanded angle."""
     measured_angle: NDArray | None = None
-    """(n, J) as the encoders gave it, before any filter."""
+    """(n, J) angle of the encoders, before any filter."""
     sequence: NDArray | None = None
-    """(n,) the device's sample counter."""
+    """(n,) sample counter of the device."""
     temperature: NDArray | None = None
-    """(n, J) deg C."""
+    """(n, J) °C."""
     cutoff_hz: float = 12.0
-    """Of the zero-phase filter that made q."""
+    """Cut-off of the zero-phase filter."""
     load: NDArray | None = None
-    """(n, J) N·m that the drive trains pass on to the links, where a fit has estimated it."""
+    """(n, J) N·m that the drive trains transmit to the links, if a fit has estimated it."""
     limb_load: NDArray | None = None
-    """(n, J) N·m of the machine on the wearer's limb, where a fit has estimated it."""
+    """(n, J) N·m of the machine on the wearer's limb, if a fit has estimated it."""
     body: NDArray | None = None
-    """(p,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated
+    """(p,) inertial parameters of everything behind the drive trains, if a fit has estimated
     them."""
     limb_body: NDArray | None = None
-    """(p,) the same of the wearer's limb alone."""
+    """(p,) the same for the wearer's limb alone."""
     scales: tuple[Scale, ...] = ()
-    """Of each joint beside an exoskeleton's (``mechanics/scale.py``); empty for an
-    exoskeleton's."""
+    """Scale of each joint relative to an exoskeleton's; empty for an exoskeleton."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -93,21 +92,20 @@ class Motion:
 
     @cached_property
     def machine(self) -> Machine:
-        """The machine that moved: its joints tell."""
+        """The machine that moved, by its joints."""
         return machine_of(joints_of(self.metadata), self.geometry, self.file, self.scales)
 
     @property
     def joint_metadata(self) -> list[dict[str, str]]:
-        """What a file computed from this motion says of its joints."""
+        """Joints for the metadata of files computed from this motion."""
         return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
 
     def pieces(self, margin: int) -> Iterator["Piece"]:
-        """Yield the run in pieces of which each knows ``margin`` samples to both sides: here one,
-        for all is there."""
+        """Yield the run as a single piece, because all of it is in memory."""
         yield Piece(self, slice(0, len(self)), 0)
 
     def whole(self) -> "Motion":
-        """Return all of it, every channel, in memory: there it is."""
+        """Return the motion itself, which is in memory."""
         return self
 
     def joint_index(self, joint: str) -> int:
@@ -122,10 +120,9 @@ class Motion:
 
     @cached_property
     def held_forces(self) -> NDArray | None:
-        """Cuff forces at every sample, (n, 4, 3) N, for sensors are often read less often than
-        drives.
+        """Cuff forces at every sample, (n, 4, 3) N, interpolated if they were read less often.
 
-        NaN where readings are too far apart to know; None where there are none.
+        NaN where readings are too far apart; None without readings.
         """
         if self.forces is None or np.isfinite(self.forces).all():
             return self.forces
@@ -137,10 +134,9 @@ class Motion:
 
     @cached_property
     def motor_temperature(self) -> NDArray:
-        """Temperature of each joint's motor at every sample, (n, J) °C, in straight lines between
-        readings.
+        """Temperature of each joint's motor at every sample, (n, J) °C, linear between readings.
 
-        NaN at a joint whose motor's was never read.
+        NaN at a joint without readings.
         """
         read = (
             np.full(self.q.shape, np.nan) if self.temperature is None else self.temperature.copy()
@@ -153,17 +149,15 @@ class Motion:
 
     @property
     def on_segments(self) -> NDArray | None:
-        """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there
-        are none."""
+        """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N, or None."""
         return (
             None if self.held_forces is None else self.held_forces.reshape(-1, 2, 2, 3).sum(axis=2)
         )
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
-        """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not
-        known.
+        """Return the torque of the cuffs on a limb at angles ``q`` (n, 2), (n, 2) N·m.
 
-        None where it was not measured.
+        NaN where it is unknown; None if it was not measured.
         """
         forces = self.on_segments
         if forces is None or self.machine.mechanism is not LEG or not self.geometry.has_cuffs:
@@ -172,20 +166,19 @@ class Motion:
 
     @cached_property
     def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Torque passed on to the links, its first and its second derivative, (n, J) each.
+        """Torque transmitted to the links, with its first and second derivative, (n, J) each.
 
-        The estimate where there is one; else the measured torque, which also holds the drive's own
-        friction.
+        The estimate of a fit if there is one; otherwise the measured torque, which contains the
+        drive's own friction.
         """
         return self._smoothed(self.torque if self.load is None else self.load)
 
     @cached_property
     def on_limb(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Torque of the machine on the wearer's limb, its first and its second derivative, (n, J)
-        each.
+        """Torque of the machine on the wearer's limb, with two derivatives, (n, J) each.
 
-        The estimate where there is one; else from the cuff forces; else what is passed on to the
-        links.
+        The estimate of a fit if there is one; otherwise from the cuff forces, or the torque
+        transmitted to the links.
         """
         if self.limb_load is not None:
             return self._smoothed(self.limb_load)
@@ -196,33 +189,34 @@ class Motion:
 
     @cached_property
     def link_swing(self) -> Load | None:
-        """What hangs behind the drive trains as a load that can swing; None where no fit has
-        estimated it."""
+        """Body behind the drive trains as a load that can swing; None if it was not estimated."""
         return None if self.body is None else Load(self.load_columns, self.body)
 
     @cached_property
     def limb_swing(self) -> Load | None:
-        """The wearer's limb as a load that can swing; None where no fit has estimated it."""
+        """The wearer's limb as a load that can swing; None if it was not estimated."""
         return None if self.limb_body is None else Load(self.load_columns, self.limb_body)
 
     @cached_property
     def columns_known(self) -> dict[Hashable, NDArray]:
-        """Torques (n, J, k) along this motion that were computed, by what makes them; none depends
-        on the loads."""
+        """Columns (n, J, k) already computed along this motion, by effect.
+
+        None depends on the loads.
+        """
         return {}
 
     @cached_property
     def load_columns(self) -> LoadColumns:
-        """What each inertial parameter adds to the load of a body along this motion."""
+        """Load of a body along this motion, per unit of each inertial parameter."""
         return LoadColumns(self.machine.mechanism, self.q, self.dq, self.ddq, self.geometry)
 
     @property
     def _load_cutoff_hz(self) -> float:
-        # Long blocks make a motion whose own rate is below what a load's filter would pass.
+        # After averaging over long blocks, a motion's rate may be below the cut-off of loads.
         return min(self.cutoff_hz, LOAD_CUTOFF_HZ, 0.4 * self.sample_rate_hz)
 
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Smooth and differentiate: the derivatives would otherwise be those of the noise."""
+        """Smooth and differentiate; the derivatives of the raw torque are noise."""
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
             if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
@@ -233,22 +227,33 @@ class Motion:
         return smooth, rate, curvature
 
     def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
-        """Return the run with the loads of rigid bodies, (p,) each: all behind the drive trains,
-        and the limb alone.
+        """Return the run with the loads of rigid bodies.
 
-        The measured torques would not do: their noise would stand on both sides of a regression.
+        Measured torques would not do: their noise would be on both sides of a regression.
+
+        Parameters
+        ----------
+        body : (p,) array
+            Inertial parameters of everything behind the drive trains.
+        limb : (p,) array
+            Inertial parameters of the wearer's limb alone.
         """
         of = self.load_columns.torque_of
         motion = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
-        # The motion is the same.
+        # The kinematics are the same, and so are the cached columns.
         motion.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
         return motion
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
-        """Return the same run with other kinematics, (n, J) each, as a corrected measurement
-        has."""
+        """Return the same run with other kinematics, as a corrected measurement has.
+
+        Parameters
+        ----------
+        q, dq, ddq : (n, J) array
+            Angle, velocity and acceleration; rad, rad/s and rad/s².
+        """
         motion = replace(self, q=q, dq=dq, ddq=ddq)
-        # The torques are the same, and smoothing them costs more than the correction did.
+        # The torques are the same, and smoothing them again costs more than the correction.
         kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
         motion.__dict__.update(
             {name: self.__dict__[name] for name in kept if name in self.__dict__}
@@ -257,19 +262,19 @@ class Motion:
 
 
 class Piece(NamedTuple):
-    """Some of a run: the samples that it is about, and their neighbours."""
+    """Part of a run: some samples and their neighbours."""
 
     motion: Motion
     core: slice
-    """The samples it is about."""
+    """The samples of the piece; the others are its margin."""
     before: int
-    """Samples of the motion's first segment that came before the motion."""
+    """Samples of the motion's first segment that precede the motion."""
 
 
 def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:
-    """Return the recording's geometry; what it does not say comes from ``default``.
+    """Return the recording's geometry, completed by ``default``.
 
-    Without one, gravity acts on revolute joints, and a prismatic joint is level.
+    Without a default, gravity acts on revolute joints, and prismatic joints are level.
     """
     known = {
         k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__
@@ -279,13 +284,14 @@ def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Ge
 
 
 def _period(table: Table) -> float | None:
-    """Return the period of a recording's motion, s; None where it is unknown or far longer than the
-    recording.
+    """Return the period of a recording's motion, s.
+
+    None if it is unknown, or much longer than the recording.
 
     Raises
     ------
     InputError
-        Where the period is shorter than a few samples.
+        If the period is shorter than a few samples.
     """
     period_s, rate_hz = table.metadata.get("period_s"), float(table.metadata["sample_rate_hz"])
     if period_s is None or period_s * rate_hz > IGNORED_PERIOD * len(table.frame):
@@ -300,10 +306,10 @@ def _period(table: Table) -> float | None:
 
 
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:
-    """Take a ``motion/1`` table apart into arrays.
+    """Return the motion in a ``motion/1`` table.
 
-    The recording's own geometry wins over ``default_geometry`` (exoid.toml's), which wins over the
-    paper's.
+    The recording's own geometry takes precedence over ``default_geometry``, which comes from
+    exoid.toml, and that over the paper's.
     """
     frame, metadata = table.frame, table.metadata
     joints = joints_of(metadata)

@@ -1,5 +1,4 @@
-"""Runs that are fitted together are of one machine: the same joints, the same lengths, the same
-gravity."""
+"""Ensure that runs that are fitted together are of one machine."""
 
 from collections.abc import Sequence
 

@@ -1,5 +1,4 @@
-"""Where a run came from, and so where what is wrong with it is put right: in a rig file, or in an
-import's map."""
+"""The origin of a run, and the file in which its description is corrected: a rig file or a map."""
 
 from collections.abc import Sequence
 
@@ -7,13 +6,12 @@ from pipelines.mechanics.run import Run
 
 
 def settings_of(run: Run) -> str:
-    """Say which file tells how a run's channels are read: a map where it was imported, else the
-    rig's."""
+    """Return the file that describes a run's channels: the map of its import, or the rig file."""
     return "the map" if "imported" in run.metadata else "the rig file"
 
 
 def giving(purpose: str, runs: Sequence[Run]) -> str:
-    """Say how a session comes by a run for a purpose."""
+    """Explain how to add a run for a purpose to a session."""
     if any("imported" in run.metadata for run in runs):
         return (
             f'give one of them purpose = "{purpose}" in a [[recording]] of the map and import again'

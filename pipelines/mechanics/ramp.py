@@ -1,16 +1,20 @@
-"""The way between rest and motion: a share of the motion that grows smoothly."""
+"""The transition between rest and motion: a share of the motion that grows smoothly."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def smooth_share(progress: NDArray) -> NDArray:
-    """Return the quintic from 0 to 1 whose speed and acceleration vanish at both ends.
+    """Return the quintic from 0 to 1 whose first two derivatives vanish at both ends.
 
     Parameters
     ----------
     progress : (n,) array
-        Time over the ramp's length; before 0 the share is 0, after 1 it is 1.
+        Time over the ramp's length; the share is 0 before 0, and 1 after 1.
+
+    Returns
+    -------
+    (n,) array
     """
     s = np.clip(progress, 0.0, 1.0)
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))

@@ -1,4 +1,4 @@
-"""Motions from files: a ``motion/1`` as it is, a ``recording/1`` filtered on the way."""
+"""Read motions from files: ``motion/1`` directly, ``recording/1`` through the filter."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,13 +23,12 @@ from pipelines.validation.suggestion import suggestion
 
 
 def geometry_from(experiment: Experiment) -> Geometry | None:
-    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives
-    none.
+    """Return the geometry in exoid.toml, for recordings without one; None if it has none.
 
     Raises
     ------
     SettingsError
-        Where its [mechanism] is none that exoid knows.
+        If its [mechanism] is unknown.
     """
     settings = experiment.mechanism
     if not settings.model_fields_set:
@@ -59,13 +58,13 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
 
 
 def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -> None:
-    """Refuse runs of another mechanism than exoid.toml speaks of, if it speaks of one."""
+    """Refuse runs of another mechanism than that of exoid.toml, if it names one."""
     for run in runs if settings.model_fields_set else ():
         if run.machine.mechanism.kinds != settings.kinds:
             raise InputError(
                 f"{run.file} has joints {in_words(run.machine.joints)}, expected those of"
                 f" exoid.toml's [mechanism]: {', '.join(settings.kinds)}; correct its name and"
-                " joints, or give no exoid.toml: files say themselves what they are of"
+                " joints, or give no exoid.toml: each file names its own mechanism"
             )
 
 
@@ -85,15 +84,20 @@ def read_motions(
     settings: FilterSettings | None = None,
     default_geometry: Geometry | None = None,
 ) -> list[Motion]:
-    """Return the motions in several files; the same data twice is refused, whatever the names, and
-    so are data of one log that would both train and validate.
+    """Return the motions in several files.
 
-    Files of one name in several folders are told apart by their paths.
+    Files of one name in several folders are named by their paths.
+
+    Raises
+    ------
+    InputError
+        If two files hold the same data, or a training and a validation run share rows of one log.
     """
     _refuse_twins(paths)
     motions = [read_motion(path, settings, default_geometry) for path in paths]
     named = [
-        replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)
+        replace(motion, file=name)
+        for motion, name in zip(motions, _distinct_names(paths), strict=True)
     ]
     refuse_seen(named)
     return on_one_scale(named)
@@ -102,12 +106,11 @@ def read_motions(
 def read_runs(
     paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry | None
 ) -> list[StoredRun]:
-    """Return the runs in several files as ``read_motions`` does, but read, and filtered, piece by
-    piece."""
+    """Return the runs in several files like ``read_motions``, but piece by piece."""
     _refuse_twins(paths)
     runs = [
         StoredRun(_motion_rows(path, settings), default_geometry, name)
-        for path, name in zip(paths, _told_apart(paths), strict=True)
+        for path, name in zip(paths, _distinct_names(paths), strict=True)
     ]
     refuse_seen(runs)
     return on_one_scale(runs)
@@ -125,13 +128,13 @@ def _refuse_twins(paths: Sequence[Path]) -> None:
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():
-            # Empty or damaged files are alike, too, and that is not what is wrong with them.
+            # Empty or damaged files are alike too; this reports them as damaged first.
             contract_of(path)
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")
 
 
-def _told_apart(paths: Sequence[Path]) -> list[str]:
+def _distinct_names(paths: Sequence[Path]) -> list[str]:
     names = [path.name for path in paths]
     return [path.name if names.count(path.name) == 1 else str(path) for path in paths]

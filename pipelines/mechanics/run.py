@@ -1,4 +1,4 @@
-"""A run to fit or to judge: all of it in memory, or read piece by piece from where it is stored."""
+"""A run to fit or to validate, either in memory or read piece by piece from its file."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -19,12 +19,12 @@ from pipelines.mechanics.units import Scale
 RUNS = ("exo_alone", "with_human")
 
 WINDOW = 2**16
-"""Samples of a piece."""
+"""Samples in a piece."""
 FITTED = ("angle", "velocity", "acceleration", "torque")
 
 
 class Run(Protocol):
-    """What a fit asks of a run; a ``Motion`` is one."""
+    """Interface of a run for fits; a ``Motion`` has it."""
 
     @property
     def run(self) -> str: ...  # noqa: D102
@@ -48,11 +48,11 @@ class Run(Protocol):
     def joint_metadata(self) -> list[dict[str, str]]: ...  # noqa: D102
 
     def pieces(self, margin: int) -> Iterator[Piece]:
-        """Yield the run in its order, each piece with ``margin`` samples to both sides."""
+        """Yield the run in order, each piece with ``margin`` samples on both sides."""
         ...
 
     def whole(self) -> Motion:
-        """Return all of it, every channel, in memory."""
+        """Return the whole run with every channel in memory."""
         ...
 
 
@@ -61,40 +61,40 @@ class StoredRun:
     """A run of which one piece is in memory at a time."""
 
     rows: Rows
-    """``motion/1``."""
+    """Rows of ``motion/1``."""
     default_geometry: Geometry | None
     file: str
     scales: tuple[Scale, ...] = ()
-    """As a motion's."""
+    """Scale of each joint, as of a motion."""
 
     @cached_property
     def _first(self) -> pa.Table:
-        """The first row, with every column that there is."""
+        """The first row, with all columns of the file."""
         return next(iter(self.rows.pieces())).slice(0, 1)
 
     @cached_property
     def _facts(self) -> Motion:
-        """All that is known of the run, without a sample of it."""
+        """All properties of the run, without samples."""
         return self._motion(self._first.slice(0, 0).select(self._columns))
 
     @property
     def run(self) -> str:
-        """The kind of run."""
+        """Kind of run."""
         return self._facts.run
 
     @property
     def purpose(self) -> str:
-        """What the run is for."""
+        """Purpose of the run."""
         return self._facts.purpose
 
     @property
     def sample_rate_hz(self) -> float:
-        """Nominal."""
+        """Nominal sample rate."""
         return self._facts.sample_rate_hz
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the joints."""
         return self._facts.joints
 
     @property
@@ -104,22 +104,22 @@ class StoredRun:
 
     @property
     def geometry(self) -> Geometry:
-        """The recording's, completed by the default."""
+        """Geometry of the recording, completed by the default."""
         return self._facts.geometry
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """The motion's."""
+        """Metadata of the motion."""
         return self.rows.metadata
 
     @property
     def joint_metadata(self) -> list[dict[str, str]]:
-        """What a file computed from this run says of its joints."""
+        """Joints for the metadata of files computed from this run."""
         return self._facts.joint_metadata
 
     @cached_property
     def _columns(self) -> list[str]:
-        """What a fit needs: temperatures too, where they were read."""
+        """Columns that a fit needs, with temperatures if the file has them."""
         quantities = [joint.column(quantity) for quantity in FITTED for joint in self.rows.joints]
         read = [joint.column("temperature") for joint in self.rows.joints]
         return [
@@ -135,7 +135,7 @@ class StoredRun:
         return replace(motion_from_table(table, self.default_geometry), scales=self.scales)
 
     def pieces(self, margin: int) -> Iterator[Piece]:
-        """Yield the run in its order, each piece with ``margin`` samples to both sides."""
+        """Yield the run in order, each piece with ``margin`` samples on both sides."""
         begun = 0
         for window in windows(self.rows.pieces(self._columns), WINDOW, margin):
             motion = self._motion(window.rows)
@@ -145,11 +145,11 @@ class StoredRun:
             begun = int(following[-1]) if len(following) else begun
 
     def whole(self) -> Motion:
-        """Return all of it, every channel, in memory."""
+        """Return the whole run with every channel in memory."""
         return self._motion(pa.concat_tables(self.rows.pieces()))
 
 
 def kinds_of(runs: Iterable[Run]) -> tuple[str, ...]:
-    """Return the kinds of run there are among some, exo_alone first."""
+    """Return the kinds of run that occur, exo_alone first."""
     there = {run.run for run in runs}
     return tuple(kind for kind in RUNS if kind in there)

@@ -1,4 +1,4 @@
-"""An excitation known only at samples, as other tools may write it: splines between them."""
+"""An excitation known at samples only, as other tools may write it, with splines between them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,26 +14,39 @@ from pipelines.contracts.joints import HIP_AND_KNEE, Joint
 class SampledTrajectory:
     """A motion through n samples of J joints, with the interface of ``FourierTrajectory``.
 
-    Angle and velocity are Hermite splines that keep the samples and their given slopes.
+    Angle and velocity are Hermite splines through the samples with their given slopes.
     """
 
     time: NDArray
     """(n,) s, from the first sample on."""
     q: NDArray
+    """(n, J) angles, rad."""
     dq: NDArray
+    """(n, J) velocities, rad/s."""
     ddq: NDArray
+    """(n, J) accelerations, rad/s²."""
     period_s: float | None = None
-    """Time after which the samples repeat; None where the motion runs once."""
+    """Time after which the samples repeat; None if the motion runs once."""
     joints: tuple[Joint, ...] = HIP_AND_KNEE
 
     @property
     def duration_s(self) -> float:
-        """How long the motion can go on."""
+        """Time for which the motion can run, s."""
         return np.inf if self.period_s else float(self.time[-1] - self.time[0])
 
     def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
-        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J)
-        each."""
+        """Return angle, velocity and acceleration at some times.
+
+        Parameters
+        ----------
+        time : (n,) array or float
+            Times, s.
+
+        Returns
+        -------
+        q, dq, ddq : (n, J) array
+            rad, rad/s and rad/s².
+        """
         time = np.atleast_1d(np.asarray(time, dtype=float))
         if self.period_s:
             time = np.mod(time, self.period_s)
@@ -41,7 +54,7 @@ class SampledTrajectory:
         return q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Lowest and highest angle, velocity and acceleration of each joint, (3, J, 2)."""
+        """Return the least and greatest angle, velocity and acceleration, (3, J, 2)."""
         return np.array(
             [
                 [_range(spline, joint) for joint in range(len(self.joints))]

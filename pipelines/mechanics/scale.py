@@ -1,9 +1,9 @@
-"""How large a machine is beside the exoskeleton's leg on which ranges and thresholds were found.
+"""The size of a machine relative to the exoskeleton's leg of the standard thresholds.
 
-"Slow" or "a strong spring" mean something else at a servo of half a newton metre and at a ball
-screw that pushes a hundred kilograms. So what is usual of an exoskeleton is multiplied by how much
-more torque, speed and travel the machine's own runs have; the leg itself, whose joints are called
-hip and knee, is left as it is.
+"Slow" or "a strong spring" differ between a servo of half a newton metre and a ball screw that
+pushes a hundred kilograms. So the usual values of an exoskeleton are multiplied by the ratios of
+torque, speed and travel in the machine's own runs. The leg itself, whose joints are called hip and
+knee, keeps its values.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ Measured = TypeVar("Measured", bound=Run)
 
 
 def on_one_scale(runs: Sequence[Measured]) -> list[Measured]:
-    """Return runs of one machine, each with the scales of the joints in all of them.
+    """Return runs of one machine with the scales of its joints in all of them.
 
-    An exoskeleton's are left as they are, and so are runs that have their scales.
+    Runs of an exoskeleton, and runs that have scales, are returned unchanged.
 
     Raises
     ------
     InputError
-        Where the runs are of several machines, or of one that exoid does not know.
+        If the runs are of several machines, or of an unknown one.
     """
     if runs:
         refuse_several_machines(runs)
@@ -54,13 +54,12 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
             low = np.minimum(low, q.min(axis=0, initial=np.inf))
             high = np.maximum(high, q.max(axis=0, initial=-np.inf))
     torque, speed = np.sqrt(squares / max(count, 1))
-    # A joint that stands still, or a channel that is dead, has no scale; what refuses such runs
-    # says so.
+    # A joint at rest or a dead channel has no scale; such runs are refused elsewhere.
     return tuple(
         Scale(
             torque=float(torque[j]) / TORQUE_NM if torque[j] > 0 else 1.0,
             speed=float(speed[j]) / SPEED_RAD_S if speed[j] > 0 else 1.0,
-            # Angles are what they are whatever the machine: a sine of them is in its equations.
+            # Angles do not scale with the machine, because its equations contain their sines.
             travel=float(high[j] - low[j]) / TRAVEL_RAD
             if joint.kind == "prismatic" and high[j] > low[j]
             else 1.0,

@@ -1,5 +1,4 @@
-"""Torques that say nothing: one number in every row, as of a drive that was off or a channel that
-is another's."""
+"""Report a constant torque: a drive that was off, or a channel of something else."""
 
 from collections.abc import Sequence
 
@@ -10,11 +9,10 @@ from pipelines.mechanics.run import Run
 
 
 def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
-    """Return what is wrong with runs in which the torque (N·m or N) of a joint is one ``value`` all
-    along."""
+    """Return the error for runs in which a joint's torque is always ``value`` (N·m or N)."""
     return InputError(
         f"{', '.join(run.file for run in runs)}: the"
         f" {'torque' if joint.kind == 'revolute' else 'force'} of {the(joint.name)} is {value:.4g}"
-        f" {joint.unit('torque')} in every row, expected what a drive exerts; check that it was on,"
-        f" and which channel {settings_of(runs[0])} reads"
+        f" {joint.unit('torque')} in every row, expected one that varies; check that the drive was"
+        f" on, and which channel {settings_of(runs[0])} reads"
     )

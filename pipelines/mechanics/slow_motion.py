@@ -1,4 +1,4 @@
-"""What a motion holds below a cut-off lower than its own."""
+"""The part of a motion below a cut-off lower than its own."""
 
 from dataclasses import replace
 
@@ -10,19 +10,18 @@ from pipelines.signals.blocks import dilate
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 EDGE_PERIODS = 1.5
-"""Periods of the cut-off at each end of a stretch that the filter lacks one side of."""
+"""Periods of the cut-off at each end of a stretch where the filter lacks one side."""
 
 
 def edge(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the samples at each end of a stretch that the filter lacks one side of."""
+    """Return the number of samples at each end of a stretch where the filter lacks one side."""
     return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
 
 
 def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
-    """Tell which samples a filter lacks one side of, or spoils by what is bad beside them, (n,)
-    bool.
+    """Return which samples lack one side of the filter, or are near invalid samples, (n,) bool.
 
-    All of a stretch that is too short for it.
+    A stretch that is too short for the filter is marked as a whole.
     """
     rate = motion.sample_rate_hz
     reach, near = edge(rate, cutoff_hz), np.zeros(len(motion), dtype=bool)
@@ -33,13 +32,13 @@ def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
         near[stretch.start : stretch.start + reach] = True
         near[max(stretch.start, stretch.stop - reach) : stretch.stop] = True
         inner = slice(stretch.start + reach, max(stretch.start + reach, stretch.stop - reach))
-        if not motion.valid[inner].all():  # the ends are marked as bad already
+        if not motion.valid[inner].all():  # The ends are already marked.
             near[inner] |= dilate(~motion.valid[inner], reach)
     return near
 
 
 def filtered(motion: Motion, x: NDArray, cutoff_hz: float) -> NDArray:
-    """Return what (n, ...) along a motion holds below a cut-off."""
+    """Return the part of a signal (n, ...) along a motion below a cut-off."""
     slow = np.array(x, dtype=float)
     for stretch in motion.segments():
         if stretch.stop - stretch.start >= shortest(motion.sample_rate_hz, cutoff_hz):
@@ -62,7 +61,7 @@ def below(motion: Motion, cutoff_hz: float) -> Motion:
         ddq=ddq,
         valid=valid,
         cutoff_hz=cutoff_hz,
-        # What a fit to the faster motion estimated is not that of this one.
+        # Loads and bodies were estimated from the faster motion, and do not apply to this one.
         load=None,
         limb_load=None,
         body=None,

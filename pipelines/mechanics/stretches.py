@@ -1,5 +1,4 @@
-"""The unbroken stretches of a recording: where its gaps are, and whether its samples keep to a
-uniform grid."""
+"""Find the unbroken stretches of a recording, and whether their samples are uniform."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,26 +11,25 @@ from pipelines.errors import InputError
 GAP = 1.5
 """Sample periods between two samples that make a gap, unless it is bridged."""
 BRIDGED_S = 0.022
-"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here
-and there, or a clock that stamps one late, would otherwise leave no stretch long enough to be
-filtered."""
+"""Length of a gap that is bridged by interpolation. No leg moves noticeably in it, and a bus that
+loses single samples, or a clock that is late once, would otherwise leave no stretch long enough for
+the filter."""
 JITTER = 0.02
-"""Share of a sample period a sample may stray from the uniform grid before it is interpolated."""
+"""Deviation from the uniform grid, in sample periods, above which samples are interpolated."""
 
 
 @dataclass(frozen=True)
 class Stretches:
-    """All stretches of a recording, in their order; every array (s,)."""
+    """All stretches of a recording in their order; every array is (s,)."""
 
     start: NDArray
     """Row of the first sample."""
     stop: NDArray
-    """Row after the last."""
+    """Row after the last sample."""
     origin_s: NDArray
     """Time of the first sample."""
     uniform: NDArray
-    """True where every sample is at its place on a grid of the nominal rate, which begins with the
-    first one."""
+    """True if every sample is on a grid of the nominal rate that begins with the first one."""
 
     def __len__(self) -> int:
         """Return the number of stretches."""
@@ -39,17 +37,16 @@ class Stretches:
 
     @property
     def samples(self) -> NDArray:
-        """How many each has, (s,)."""
+        """Number of samples of each stretch, (s,)."""
         return self.stop - self.start
 
     @property
     def longest(self) -> int:
-        """Number of the longest, the first of equals."""
+        """Index of the longest stretch, the first of equals."""
         return int(np.argmax(self.samples))
 
     def overlapping(self, first: int, last: int) -> range:
-        """Return the numbers of those that have a row in ``first`` to ``last``, ``last`` not
-        included."""
+        """Return the indices of stretches with a row from ``first`` to before ``last``."""
         return range(
             int(np.searchsorted(self.stop, first, "right")),
             int(np.searchsorted(self.start, last, "left")),
@@ -57,13 +54,19 @@ class Stretches:
 
 
 def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
-    """Find the stretches of a recording whose times, (n,) s and strictly increasing, come piece by
-    piece.
+    """Find the stretches of a recording whose times arrive piece by piece.
+
+    Parameters
+    ----------
+    times : iterable of (n,) array
+        Times in s, strictly increasing.
+    rate_hz : float
+        Nominal sample rate.
 
     Raises
     ------
     InputError
-        Where the times do not advance at about ``rate_hz``.
+        If the times do not advance at about ``rate_hz``.
     """
     starts: list[int] = []
     origins: list[float] = []
@@ -74,7 +77,7 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
         step = np.diff(time, prepend=before)
         steps += [float(np.median(step[np.isfinite(step)]))] if np.isfinite(step).any() else []
         begins = np.flatnonzero(step > max(GAP / rate_hz, BRIDGED_S))
-        # What goes on from the piece before stands first, though no row of it may follow here.
+        # The first entry continues the stretch of the piece before, even without rows here.
         start_of, origin_of = np.append(start, row + begins), np.append(origin, time[begins])
         number = np.searchsorted(begins, np.arange(len(time)), "right")
         grid = origin_of[number] + (row + np.arange(len(time)) - start_of[number]) / rate_hz
@@ -95,7 +98,7 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
         start=np.array(starts, dtype=np.int64),
         stop=np.array([*starts[1:], row], dtype=np.int64),
         origin_s=np.array(origins),
-        # The first is what went before the first row: nothing.
+        # The first entry precedes the first row, and is empty.
         uniform=np.array([*strayed[1:], stray]) < JITTER / rate_hz,
     )
 

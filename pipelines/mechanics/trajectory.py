@@ -1,5 +1,4 @@
-"""Excitations from files: Fourier coefficients as TOML or in a table's metadata, or bare
-samples."""
+"""Read excitations: Fourier coefficients as TOML or in a table's metadata, or samples alone."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -20,15 +19,14 @@ Trajectory = FourierTrajectory | SampledTrajectory
 
 COEFFICIENTS = ("omega_rad_s", "theta0_rad", "a", "b")
 
-# A table that was rounded to microradians is still the motion of its coefficients.
 ROUNDING_RAD = 1e-5
+"""Greatest difference, rad, between samples and their coefficients that is rounding error."""
 
 Row = tuple[float, ...]
 
 
 class CoefficientFile(Settings):
-    """An excitation as TOML: rows of ``a`` and ``b`` are hip and knee, columns the harmonics from
-    the first."""
+    """An excitation as TOML: rows of ``a`` and ``b`` are hip and knee, columns are harmonics."""
 
     unit: Literal["deg", "rad"] = Field(description="Unit of a and b.")
     omega_rad_s: float = Field(gt=0.0, description="Angular frequency of the first harmonic.")
@@ -91,10 +89,10 @@ def _from_toml(path: Path) -> FourierTrajectory:
 
 
 def trajectory_from_table(table: Table) -> Trajectory:
-    """Return the excitation in a ``trajectory/1`` table: its coefficients' where it has them, else
-    its samples'.
+    """Return the excitation in a ``trajectory/1`` table.
 
-    Bare samples repeat where the metadata name ``omega_rad_s``, and run once where they do not.
+    Its coefficients are used if it has them, and its samples otherwise. Samples repeat if the
+    metadata hold ``omega_rad_s``, and run once if they do not.
     """
     metadata = table.metadata
     missing = [key for key in COEFFICIENTS if metadata.get(key) is None]
@@ -130,8 +128,7 @@ def _sampled(table: Table) -> SampledTrajectory:
 
 
 def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
-    """Refuse a table whose coefficients and samples are different motions: nobody knows which one
-    is meant."""
+    """Refuse a table whose coefficients and samples are different motions."""
     if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (
         len(table.joints),
     ):

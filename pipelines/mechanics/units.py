@@ -1,8 +1,7 @@
-"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a
-prismatic joint.
+"""Units at a joint: radians and newton metres become metres and newtons at a prismatic joint.
 
-And how a quantity of a unit grows with the machine: of twice the torque, a spring is twice as
-stiff.
+A quantity's unit also determines how it scales with the machine: at twice the torque, a spring is
+twice as stiff.
 """
 
 from typing import NamedTuple
@@ -14,15 +13,16 @@ class Unit(NamedTuple):
     """A unit of a parameter, as written for revolute joints."""
 
     prismatic: str
-    """The same at a prismatic joint."""
+    """The same unit at a prismatic joint."""
     torque: int
     travel: int
     speed: int
-    """Powers of the joint's torque, travel and speed with which a quantity of this unit grows."""
+    """Exponents of the joint's torque, travel and speed with which a quantity of this unit
+    scales."""
 
 
 FIRST_MOMENT = "kg·m"
-"""Unit of a rigid body's first moments of mass, by which they are known among its parameters."""
+"""Unit that identifies a rigid body's first moments of mass among its parameters."""
 UNITS = {
     "N·m": Unit("N", 1, 0, 0),
     "N·m/°C": Unit("N/°C", 1, 0, 0),
@@ -40,18 +40,18 @@ UNITS = {
     "1/rad²": Unit("1/m²", 0, -2, 0),
     "1/turn": Unit("rad/m", 0, -1, 0),
 }
-"""Others are the same at every joint: s, Hz, 1, °C."""
+"""Units that depend on the kind of joint; s, Hz, 1 and °C do not."""
 
 
 class Scale(NamedTuple):
-    """How many times an exoskeleton's torque, speed and travel a joint has."""
+    """Ratios of a joint's torque, speed and travel to an exoskeleton's."""
 
     torque: float = 1.0
     speed: float = 1.0
     travel: float = 1.0
 
     def of(self, unit: str) -> float:
-        """Return how many times an exoskeleton's a quantity is, by its unit at a revolute joint."""
+        """Return the ratio of a quantity to an exoskeleton's, by its unit at a revolute joint."""
         if unit not in UNITS:
             return 1.0
         power = UNITS[unit]
@@ -61,6 +61,5 @@ class Scale(NamedTuple):
 
 
 def unit_at(kind: Kind, unit: str) -> str:
-    """Return the unit that a quantity in ``unit`` at a revolute joint has at a joint of this
-    kind."""
+    """Return the unit at a kind of joint for a unit at a revolute joint."""
     return UNITS[unit].prismatic if kind == "prismatic" and unit in UNITS else unit

@@ -1,4 +1,4 @@
-"""What a model is judged on, no fit has seen: runs of one log share no rows."""
+"""Ensure that a model is validated on data that no fit has seen."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -7,26 +7,27 @@ from pipelines.errors import InputError
 from pipelines.mechanics.run import Run
 
 IN_ORDER = 20
-"""Rows that may seem to be in two spans that touch: an import puts in order as many that arrived
-out of order."""
+"""Rows that may overlap between adjacent spans, because an import sorts as many that arrived
+late."""
 
 
 def refuse_seen(runs: Sequence[Run]) -> None:
-    """Refuse runs of which one trains and another validates, and that were imported from the same
-    rows of a log.
+    """Refuse a training and a validation run that were imported from the same rows of a log.
+
+    Runs that were not imported are accepted, because their rows are unknown.
 
     Raises
     ------
     InputError
-        Where there are such; of runs that were not imported nothing is known, and none is refused.
+        If two runs share rows.
     """
     for one, other in combinations(runs, 2):
         shared = _shared_rows(one, other) if one.purpose != other.purpose else 0
         if shared > IN_ORDER:
             raise InputError(
                 f"{other.file} ({other.purpose}) and {one.file} ({one.purpose}) have {shared} rows"
-                f" of {one.metadata['imported']['source']} in common, expected none: a model is"
-                " judged on data that no fit has seen; import them again with spans that do not"
+                f" of {one.metadata['imported']['source']} in common, expected none: validation"
+                " needs data that no fit has seen; import them again with spans that do not"
                 " overlap"
             )
 

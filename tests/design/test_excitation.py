@@ -52,7 +52,7 @@ def published():
 
 def test_the_published_excitation_has_the_published_model_s_condition_numbers(published):
     found = quality(published, DesignSettings(), Geometry())
-    # DESIGN: 47.3 for 8 columns, 22.6 for the inertial ones, 5.8 scaled; recomputed from the
+    # 47.3 for 8 columns, 22.6 for the inertial ones, 5.8 scaled; recomputed from the
     # printed coefficients.
     assert f"{found.condition:.1f}" == "47.3"
     assert f"{found.inertial_condition:.1f}" == "22.6"
@@ -96,7 +96,7 @@ def test_log_det_foretells_smaller_errors_of_inertia_than_the_published_excitati
     settings = DesignSettings(seed=1)
     before = quality(published, settings, Geometry()).standard_errors
     after = design(settings).quality.standard_errors
-    assert 4.0 < before["X1"] / after["X1"]  # DESIGN: five to seven times
+    assert 4.0 < before["X1"] / after["X1"]  # five to seven times
 
 
 @pytest.mark.parametrize("topology", ["ring", "global"])

@@ -71,10 +71,12 @@ def test_a_constant_torque_is_reported_as_constant(motions, value):
             [imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions]
         )
     assert (
-        f": the torque of the knee is {value:.4g} N·m in every row, expected what a drive exerts"
+        f": the torque of the knee is {value:.4g} N·m in every row, expected one that varies"
         in str(refused.value)
     )
-    assert str(refused.value).endswith("check that it was on, and which channel the map reads")
+    assert str(refused.value).endswith(
+        "check that the drive was on, and which channel the map reads"
+    )
 
 
 @pytest.mark.parametrize("times", [1.0, -1.0, 57.3])

@@ -52,13 +52,13 @@ def test_an_effect_of_another_package_is_one_of_exoids(python_with):
     [
         (
             "import no_such_module",
-            "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; mend it",
+            "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; correct it",
         ),
-        ("TendonSlack = 3", "it is 3, expected a subclass of pipelines.effects.Effect; mend it"),
+        ("TendonSlack = 3", "it is 3, expected a subclass of pipelines.effects.Effect; correct it"),
         (GOOD.replace("    equation =", "    unstated ="), "does not state equation"),
         (
             GOOD.replace('"tendon_slack"', '"cogging"'),
-            "its name cogging is already that of pipelines",
+            "its name cogging is already used by pipelines",
         ),
     ],
     ids=["does not load", "no effect", "incomplete", "name taken"],

@@ -351,7 +351,7 @@ def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_one
     """Those too whose torque goes with the load, which is not measured: the drive's own friction is
     in what is."""
     effect = term.effect
-    if effect.name in ("rigid_body", "friction") or effect.goes_with_time:
+    if effect.name in ("rigid_body", "friction") or effect.depends_on_time:
         pytest.skip("is fitted anyway, or differs from run to run")
     if effect.name in ("friction_warmup", "gain_drift"):
         pytest.skip("warms while the machine moves to where the run begins")
@@ -500,6 +500,6 @@ def test_a_torque_that_is_nought_all_along_is_refused_beside_effects_too(hidden)
     silent = [replace(motion, torque=motion.torque * np.array([1.0, 0.0])) for motion in hidden]
     with pytest.raises(
         InputError,
-        match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts",
+        match=r"the torque of the knee is 0 N·m in every row, expected one that varies",
     ):
         identify(silent, extension=Extension(chosen(LABELS, THE_LEG)))

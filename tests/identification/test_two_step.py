@@ -185,7 +185,7 @@ def test_a_torque_that_is_nought_all_along_is_refused_and_fitted_by_none(noisele
     silent = [replace(m, torque=m.torque * [1.0, 0.0]) for m in noiseless_motions]
     with pytest.raises(
         InputError,
-        match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts",
+        match=r"the torque of the knee is 0 N·m in every row, expected one that varies",
     ):
         identify(silent)
 

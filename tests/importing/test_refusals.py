@@ -519,7 +519,7 @@ def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp
     outcome = exoid("identify", *files, "-o", tmp_path / "identified")
     assert outcome.code == 2
     assert (
-        "have 800 rows of log.csv in common, expected none: a model is judged on data that no fit"
+        "have 800 rows of log.csv in common, expected none: validation needs data that no fit"
         in outcome.err
     )
 

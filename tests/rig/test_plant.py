@@ -121,7 +121,7 @@ def test_a_leg_that_cannot_exist_is_refused():
     assert (
         str(caught.value)
         == "plant.exo_inertial + human_inertial: no real leg has these: X2 = -0.19 kg·m² is not"
-        " positive: the shank would have no inertia; correct them"
+        " positive: every shank has inertia; correct them"
     )
 
 

@@ -373,7 +373,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, prepared: PreparedRuns) ->
         variance=cause.variance.tolist(),
         derivative=at.derivatives[number].tolist(),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
-        repeats=not effect.goes_with_time and effect.family != Family.TIME,
+        repeats=not effect.depends_on_time and effect.family != Family.TIME,
         first=cause.first,
         each_run=effect.each_run,
         sized_each_run=effect.sized_each_run,

@@ -1,2 +1,1 @@
-"""The mechanisms that there are: one file each, and nothing else to edit (docs/mechanisms.md tells
-what it holds)."""
+"""Mechanisms, one file each; docs/mechanisms.md explains how to add one."""

@@ -1,13 +1,12 @@
-"""The leg: two revolute joints in series, two rigid links, and the paper's four inertial
-parameters.
+"""The leg: two revolute joints in series, two rigid links, four inertial parameters.
 
-The regressor is the only place where the equations of motion stand. Angles: the first (hip) from
-the downward vertical, the second (knee) relative to the first link, flexion negative: any double
-pendulum is a leg. The paper prints several of these formulas with slips; the mended forms and a
-test for each are in ``docs/errata.md``.
+The regressor is the only place with the equations of motion. Angles: the first (hip) counts from
+the downward vertical, the second (knee) from the first link, flexion negative; any double pendulum
+is a leg. The paper prints several of these formulas with errors; ``docs/errata.md`` has the
+corrected forms, with a test for each.
 
-Where gravity does not act along the plane of motion, as at a planar arm, nothing depends on X4, nor
-on where the first joint stands.
+If gravity does not act in the plane of motion, as for a planar arm, nothing depends on X4, nor on
+the first joint's position.
 """
 
 from dataclasses import replace
@@ -26,11 +25,12 @@ INERTIAL = ("X1", "X2", "X3", "X4")
 
 @njit(cache=True)
 def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
-    """Rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
+    """Return the rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
 
-    Paper, appendix A, row 2 renumbered as docs/errata.md gives it. ``sin_leg`` is sin(q1 + q2). The
-    sines are arguments, because whoever evaluates thousands of motions has a faster way to them.
-    Tuples, because an array made at every integration step would cost more than the equations.
+    Source: paper, appendix A, with row 2 corrected as in docs/errata.md. ``sin_leg`` is sin(q1 +
+    q2). The sines are arguments, because a caller that evaluates thousands of motions has a faster
+    way to compute them. The rows are tuples, because an array for every integration step would cost
+    more than the equations.
     """
     shank_gravity = gravity * sin_leg
     hip = (
@@ -52,7 +52,7 @@ def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, 
 
 @njit("UniTuple(UniTuple(f8, 4), 2)(f8[::1], f8[::1], f8[::1], f8, f8)", cache=True)
 def regressor_at(q, dq, ddq, thigh_length, gravity):
-    """Rows hip and knee of A(q, dq, ddq) at one instant."""
+    """Return the rows hip and knee of A(q, dq, ddq) at one instant."""
     return regressor_rows(
         sin(q[0]), sin(q[0] + q[1]), sin(q[1]), cos(q[1]), dq, ddq, thigh_length, gravity
     )
@@ -60,7 +60,7 @@ def regressor_at(q, dq, ddq, thigh_length, gravity):
 
 @njit(cache=True)
 def _along(q, dq, ddq, geometry):
-    """Rigid-body regressor of a whole motion, (n, 2, 4)."""
+    """Return the rigid-body regressor of a whole motion, (n, 2, 4)."""
     Y = np.empty((q.shape[0], 2, 4))
     for k in range(q.shape[0]):
         rows = regressor_at(q[k], dq[k], ddq[k], geometry[0], geometry[1])
@@ -72,7 +72,7 @@ def _along(q, dq, ddq, geometry):
 
 @njit(REACTION, cache=True)
 def _rigid_body(at, state, values, geometry, joint, out):
-    """Add A(q, dq, ddq) X, of a leg without gravity X4 apart."""
+    """Add A(q, dq, ddq) X, without X4 for a leg without gravity."""
     hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
     for i in range(len(values)):
         out[0] += hip[i] * values[i]
@@ -81,7 +81,7 @@ def _rigid_body(at, state, values, geometry, joint, out):
 
 @njit(cache=True)
 def _level_along(q, dq, ddq, geometry):
-    """Rigid-body regressor of a whole motion without gravity, (n, 2, 3)."""
+    """Return the rigid-body regressor of a whole motion without gravity, (n, 2, 3)."""
     return np.ascontiguousarray(_along(q, dq, ddq, geometry)[:, :, :3])
 
 
@@ -100,7 +100,7 @@ def _mass_off_axis(at, state, values, geometry, joint, out):
 
 @njit(REACTION, cache=True)
 def _payload_change(at, state, values, geometry, joint, out):
-    """Add what a point mass adds to X1..X4, once it is there."""
+    """Add the contribution of a point mass to X1..X4 from its time on."""
     if at.t < values[1]:
         return
     moment, r, length = values[0], values[2], geometry[0]
@@ -115,17 +115,23 @@ def _payload_change(at, state, values, geometry, joint, out):
 
 
 def potential_energy(q, X, geometry: Geometry) -> float:
-    """Potential energy in J, zero with both joint axes level (paper eq. 3 and 4 in terms of X)."""
+    """Return the potential energy in J, zero with both joint axes level.
+
+    Source: paper, eq. 3 and 4, in terms of X.
+    """
     q1, q2 = q
     return -geometry.gravity_m_s2 * float(X[3] * cos(q1) + X[2] * cos(q1 + q2))
 
 
 def _broken(X: NDArray, geometry: Geometry) -> list[str]:
-    """M(q) > 0 for every knee angle if and only if X2 > 0 and X2 (X1 - X2) > (L1 X3)²."""
+    """List violated conditions of a real leg: X2 > 0 and X2 (X1 - X2) > (L1 X3)².
+
+    They are equivalent to M(q) > 0 at every knee angle.
+    """
     X1, X2, X3 = X[:3]
     broken = []
     if X2 <= 0:
-        broken.append(f"X2 = {X2:.4g} kg·m² is not positive: the shank would have no inertia")
+        broken.append(f"X2 = {X2:.4g} kg·m² is not positive: every shank has inertia")
     if X2 * (X1 - X2) <= (geometry.thigh_length_m * X3) ** 2:
         broken.append(
             f"X2 (X1 - X2) = {X2 * (X1 - X2):.4g} is not above (L1 X3)² ="
@@ -136,11 +142,10 @@ def _broken(X: NDArray, geometry: Geometry) -> list[str]:
 
 
 def _inertia_forms(geometry: Geometry) -> NDArray:
-    """Return symmetric B, (4, 2, 2): M(q) > 0 at every knee angle if and only if the sum of X_i B_i
-    is.
+    """Return symmetric B, (4, 2, 2): M(q) > 0 at every knee angle if and only if sum X_i B_i > 0.
 
-    The sum is [[X1 - X2, L1 X3], [L1 X3, X2]], whose determinant and last element are the
-    conditions of ``_broken``: linear in X, as a convex program wants them.
+    The sum is [[X1 - X2, L1 X3], [L1 X3, X2]]. Its determinant and last element are the conditions
+    of ``_broken``; it is linear in X, as a convex program requires.
     """
     L1 = geometry.thigh_length_m
     return np.array(
@@ -197,19 +202,26 @@ LEVEL_LEG = replace(
 
 
 def cuff_torque(thigh, shank, q, geometry: Geometry) -> NDArray:
-    """Torque of the exoskeleton on the leg from the cuff forces, (n, 2) N·m about hip and knee.
+    """Return the torque of the exoskeleton on the leg, from the cuff forces.
 
     Parameters
     ----------
-    thigh, shank : (n, 3) arrays
+    thigh, shank : (n, 3) array
         Sum of front and back sensor in the segment's frame, N: x distal, y forward, z lateral.
     q : (n, 2) array
         Joint angles, rad.
+    geometry : Geometry
+        Lengths, with the positions of both cuffs.
+
+    Returns
+    -------
+    (n, 2) array
+        Torque about hip and knee, N·m.
 
     Raises
     ------
     ValueError
-        Where the geometry does not say where the cuffs are.
+        If the geometry has no cuffs.
     """
     d_thigh, d_shank = geometry.thigh_cuff_distance_m, geometry.shank_cuff_distance_m
     if d_thigh is None or d_shank is None:

@@ -9,9 +9,9 @@ lift         prismatic  yes      X1 ddq + X2
 slide        prismatic  no       X1 ddq
 ===========  =========  =======  ==========================================================
 
-Gravity pulls a prismatic joint with the same force wherever it stands. Counterweights and springs
-of constant force do so too, and mostly are there where it matters; so X2 of a lift is that force,
-and not X1 times gravity.
+Gravity pulls a prismatic joint with the same force at every position. Counterweights and springs
+of constant force do so too, and heavy axes mostly have one; so X2 of a lift is the sum of these
+forces, and not X1 times gravity.
 """
 
 from dataclasses import replace
@@ -55,20 +55,20 @@ def _pendulum(at, state, values, geometry, joint, out):
 
 @njit(REACTION, cache=True)
 def _mass_off_axis(at, state, values, geometry, joint, out):
-    """Add Y g cos q: a mass across the link is one along it, a right angle ahead."""
+    """Add Y g cos q: a mass across the link equals one along it, a right angle ahead."""
     out[0] += values[0] * geometry[1] * cos(at.q[0])
 
 
 @njit(REACTION, cache=True)
 def _payload_change(at, state, values, geometry, joint, out):
-    """Add the point mass p / r at r, once it is there: p (r ddq + g sin q)."""
+    """Add the point mass p / r at r from its time on: p (r ddq + g sin q)."""
     if at.t >= values[1]:
         out[0] += values[0] * (values[2] * at.ddq[0] + geometry[1] * sin(at.q[0]))
 
 
 @njit(REACTION, cache=True)
 def _mass_change(at, state, values, geometry, joint, out):
-    """Add a mass, once it is there: m (ddq + g), and no gravity where the joint is level."""
+    """Add a mass from its time on: m (ddq + g), with g = 0 for a level joint."""
     if at.t >= values[1]:
         out[0] += values[0] * (at.ddq[0] + geometry[1])
 
@@ -88,16 +88,14 @@ def _lift(at, state, values, geometry, joint, out):
 
 def _broken_inertia(X: NDArray, geometry: Geometry) -> list[str]:
     return (
-        [f"X1 = {X[0]:.4g} kg·m² is not positive: what turns would have no inertia"]
+        [f"X1 = {X[0]:.4g} kg·m² is not positive: every rotating part has inertia"]
         if X[0] <= 0
         else []
     )
 
 
 def _broken_mass(X: NDArray, geometry: Geometry) -> list[str]:
-    return (
-        [f"X1 = {X[0]:.4g} kg is not positive: what slides would have no mass"] if X[0] <= 0 else []
-    )
+    return [f"X1 = {X[0]:.4g} kg is not positive: every sliding part has mass"] if X[0] <= 0 else []
 
 
 def _inertia_forms(geometry: Geometry) -> NDArray:
@@ -109,7 +107,7 @@ def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
 
 
 _ABSORBED = {"rotor_inertia": "X1", "torque_gain": "all parameters together"}
-"""What nothing but another joint, which carries the same links, could tell."""
+"""Effects that only a second joint, which carries the same links, would separate."""
 
 _INERTIA = Inertial(
     "X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0)
@@ -140,9 +138,7 @@ PENDULUM = Mechanism(
 
 TURNTABLE = replace(
     PENDULUM,
-    title=(
-        "one revolute joint that gravity does not turn: its axis is vertical, or its load balanced"
-    ),
+    title=("one revolute joint without gravity: its axis is vertical, or its load balanced"),
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
@@ -169,7 +165,7 @@ LIFT = replace(
         Inertial(
             "X2",
             "N",
-            "force that holds it still: its weight less a counterweight's",
+            "force that holds it at rest: its weight less a counterweight's",
             (-500.0, 500.0),
         ),
     ),
