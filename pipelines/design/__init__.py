@@ -1,2 +1,1 @@
-"""The excitation: a particle swarm over Fourier coefficients, judged by what the regressor can tell
-apart."""
+"""Design an excitation: a particle swarm over Fourier coefficients, rated by its regressor."""

@@ -1,8 +1,8 @@
-"""Local polish: an evolution strategy that learns the landscape's covariance (CMA-ES).
+"""Local refinement by an evolution strategy that learns the cost's covariance (CMA-ES).
 
-Hansen (2016), "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772; the names are the
-tutorial's. It needs no gradient: shrinking to the bounds, sgn columns and crossing eigenvalues all
-leave kinks in the criterion.
+Source: Hansen (2016), "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772, with its names.
+It needs no gradient: shrinking to the bounds, sgn columns and crossing eigenvalues all make kinks
+in the criterion.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 POPULATION = 24
-# The decomposition costs as much as several candidates, and the covariance moves slowly.
+# The decomposition costs as much as several candidates, and the covariance changes slowly.
 GENERATIONS_PER_DECOMPOSITION = 5
 PATIENCE = 60
 LEAST_GAIN = 1e-6
@@ -25,19 +25,29 @@ def polish(
     generations: int,
     out_of_time: Callable[[], bool] = lambda: False,
 ) -> tuple[NDArray, float]:
-    """Minimise from ``start`` until nothing is gained for a while.
+    """Minimize from ``start`` until the cost stagnates.
 
     Parameters
     ----------
-    start, spread : (D,) arrays
-        First mean, and standard deviation of the first candidates.
+    start : (D,) array
+        First mean.
+    spread : (D,) array
+        Standard deviation of the first candidates.
     costs : callable
-        Returns the costs (P,) of candidates (P, D); may repair them in place.
+        Returns the costs (P,) of candidates (P, D), and may repair them in place.
+    rng : Generator
+        Random numbers.
+    generations : int
+        Most generations.
+    out_of_time : callable
+        Returns whether to stop.
 
     Returns
     -------
-    (D,) array, float
-        The best candidate, repaired, and its cost.
+    best : (D,) array
+        The best candidate, repaired.
+    cost : float
+        Its cost.
     """
     size = len(start)
     rank = np.arange(1, POPULATION // 2 + 1)

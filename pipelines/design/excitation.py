@@ -1,4 +1,4 @@
-"""The stage: find an excitation, judge it, and put it into a table."""
+"""The design stage: search for an excitation, assess it, and write it as a table."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,8 +23,10 @@ class Design:
     stopped_by: str
 
     def frame(self) -> pd.DataFrame:
-        """Return one period as rows of a ``trajectory/1`` table; the next period begins where it
-        ends."""
+        """Return one period as rows of a ``trajectory/1`` table.
+
+        The next period begins where the table ends.
+        """
         rows = round(self.trajectory.period_s * self.settings.sample_rate_hz)
         time = np.arange(rows) / self.settings.sample_rate_hz
         states = dict(
@@ -38,7 +40,7 @@ class Design:
         return pd.DataFrame({"time_s": time, **columns})
 
     def metadata(self) -> dict[str, Any]:
-        """Return the coefficients and what they are worth."""
+        """Return the coefficients and their quality for a file's metadata."""
         return {
             "omega_rad_s": self.trajectory.omega,
             "theta0_rad": self.trajectory.theta0.tolist(),
@@ -57,8 +59,10 @@ def design(
     geometry: Geometry | None = None,
     report: Report = lambda done, note: None,
 ) -> Design:
-    """Design an excitation; equal settings give an equal one, unless ``seconds`` cut the search
-    short."""
+    """Design an excitation.
+
+    Equal settings give an equal excitation, unless ``seconds`` ended the search.
+    """
     geometry = geometry or Geometry()
     result = search(settings, geometry, report)
     return Design(

@@ -1,9 +1,8 @@
-"""How good an excitation is, compiled: repair, regressor, Gram matrix, criterion; about 15 us a
-motion.
+"""Compute the fitness of an excitation, compiled: repair, regressor, Gram matrix, criterion.
 
-A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip and knee, and
-the two mean angles where they are searched too. Coordinates times ``basis`` are the Fourier
-coefficients.
+A motion takes about 15 us. A candidate is a vector: sine coordinates of hip and knee, cosine
+coordinates of hip and knee, and the two mean angles if they are searched too. Coordinates times
+``basis`` are the Fourier coefficients.
 """
 
 import math
@@ -25,13 +24,12 @@ FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "n
 PARAMETERS = 8
 HIP_PARAMETERS = (0, 1, 2, 3, 4, 5)
 KNEE_PARAMETERS = (1, 2, 6, 7)
-"""The columns that are not zero in each joint's row; X1 .. X4, then Coulomb and viscous friction of
-hip and knee."""
+"""Columns that are not zero in each joint's row: X1 .. X4, then Coulomb and viscous friction of hip
+and knee."""
 
 
 class Problem(NamedTuple):
-    """What all candidates of one search share. n harmonics, f free coordinates for each joint, N
-    samples."""
+    """The constants of one search: n harmonics, f free coordinates per joint, N samples."""
 
     sine: NDArray
     cosine: NDArray
@@ -39,7 +37,7 @@ class Problem(NamedTuple):
     speeds: NDArray
     """(n,) rad/s."""
     basis: NDArray
-    """(2, n, f): from coordinates to sine (0) and cosine (1) coefficients."""
+    """(2, n, f) from coordinates to sine (0) and cosine (1) coefficients."""
     theta0: NDArray
     """(2,) mean angles, unless ``theta0_is_free``."""
     theta0_is_free: bool
@@ -77,12 +75,22 @@ def problem(
 
     Parameters
     ----------
+    omega : float
+        Angular frequency of the first harmonic, rad/s.
+    harmonics : int
+        Number of harmonics, n.
     bounds : (3, J, 2) array
         Lowest and highest angle, velocity and acceleration of each joint, SI units.
+    geometry : Geometry
+        Lengths and gravity.
+    criterion : str
+        One of ``CRITERIA``.
     theta0 : (J,) array or None
-        Mean angles, rad; None where they are searched too.
-    basis : array
-        Columns that span the coefficients that are searched, ``search.basis_of``.
+        Mean angles, rad; None to search them too.
+    basis : (2, n, f) array
+        Columns that span the searched coefficients, ``search.basis_of``.
+    samples : int
+        Samples per period, N.
     """
     phase = 2.0 * np.pi * np.outer(np.arange(1, harmonics + 1), np.arange(samples) / samples)
     return Problem(
@@ -109,8 +117,7 @@ def workspace(problem):
 
 @njit(cache=True)
 def cost(candidate, problem, work):
-    """Repair a candidate in place so that it keeps every bound, and return its cost: the less, the
-    better."""
+    """Repair a candidate in place so that it keeps every bound, and return its cost."""
     expand(candidate, problem, work.coefficients)
     move(problem, work)
     repair(candidate, problem, work)
@@ -168,8 +175,10 @@ def move(problem, work):
 
 @njit(cache=True)
 def repair(candidate, problem, work):
-    """Shrink each joint's motion about its mean angle until it fits; every quantity is linear in
-    that scale."""
+    """Shrink each joint's motion about its mean angle until it keeps the bounds.
+
+    Every quantity is linear in that scale.
+    """
     _, n, free = problem.basis.shape
     samples = problem.sine.shape[1]
     for joint in range(2):
@@ -196,16 +205,17 @@ def repair(candidate, problem, work):
 
 @njit(cache=True)
 def room(allowed, reached):
-    """Return the scale at which ``reached`` is no more than what is allowed."""
+    """Return the scale at which ``reached`` does not exceed ``allowed``."""
     return allowed / reached if reached > allowed else 1.0
 
 
 @njit(**FAST)
 def extent(x, harmonics):
-    """Bound a trigonometric polynomial of this degree from its N uniform samples over a period.
+    """Bound a trigonometric polynomial by N uniform samples over a period.
 
-    Between samples it exceeds the largest of them in size by no more than 1 / cos(pi n / N)
-    (Ehlich and Zeller, 1964, Math. Z. 86); taken about the middle of its range, which is tighter.
+    Between samples, its size exceeds the largest of them by at most a factor of 1 / cos(pi n / N)
+    (Ehlich and Zeller, 1964, Math. Z. 86). Applied about the middle of its range, the bound is
+    tighter.
     """
     low, high = x[0], x[0]
     for i in range(1, x.size):
@@ -247,7 +257,7 @@ def sign(x):
 
 @njit(**FAST)
 def gram_matrix(columns):
-    """A'A / N, (8, 8), from the columns of hip and knee."""
+    """Return A'A / N, (8, 8), from the columns of hip and knee."""
     gram = np.zeros((PARAMETERS, PARAMETERS))
     for i in range(6):
         for j in range(i + 1):
@@ -264,7 +274,7 @@ def gram_matrix(columns):
 
 @njit(**FAST)
 def dot(x, y):
-    """Sum of products; a loop, because a BLAS call costs more than 1000 products."""
+    """Return the sum of products; a BLAS call would cost more than 1000 products."""
     total = 0.0
     for i in range(x.size):
         total += x[i] * y[i]
@@ -273,8 +283,7 @@ def dot(x, y):
 
 @njit(cache=True)
 def log_determinant(gram):
-    """Log of a Gram matrix's determinant by Cholesky's factors; minus infinity where it is
-    singular."""
+    """Return the log of a Gram matrix's determinant by Cholesky factors; -inf if it is singular."""
     factor = gram.copy()
     total = 0.0
     for j in range(len(factor)):
@@ -293,7 +302,7 @@ def log_determinant(gram):
 
 @njit(cache=True)
 def condition_number(gram):
-    """Condition number of A from the eigenvalues of A'A, good to about eps cond²."""
+    """Return the condition number of A from the eigenvalues of A'A, accurate to about eps cond²."""
     eigenvalues = np.linalg.eigvalsh(gram)
     if eigenvalues[0] <= 0.0:
         return np.inf

@@ -1,4 +1,4 @@
-"""What an excitation can tell: condition numbers, log det, and the standard errors to expect."""
+"""The quality of an excitation: condition numbers, log det, and expected standard errors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,33 +20,35 @@ from pipelines.settings.design import DesignSettings, NoiseSettings
 
 JOINTS = ("hip", "knee")
 SAMPLES = 1000
-"""Samples of one period in the numbers that are reported."""
+"""Samples of one period in the reported numbers."""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How good an excitation is; the regressor has eight columns, X1 .. X4, then each joint's
-    friction."""
+    """The quality of an excitation, by the eight columns of its regressor.
+
+    The columns are those of X1 .. X4, then of each joint's friction.
+    """
 
     condition: float
-    """Of the regressor as it is, the paper's criterion; computed by singular values."""
+    """Condition number of the unscaled regressor, the paper's criterion."""
     inertial_condition: float
-    """Of the four inertial columns alone."""
+    """Condition number of the four inertial columns alone."""
     scaled_condition: float
-    """With columns scaled to unit norm, so that it does not depend on units."""
+    """Condition number with columns of unit norm, independent of units."""
     log_det: float
     """log det of A'A/N."""
     standard_errors: dict[str, float]
-    """By parameter, in its unit."""
+    """Expected standard error of each parameter, in its unit."""
     units: dict[str, str]
     margins: list[Margin]
 
     def value(self, criterion: str) -> float:
-        """Return the criterion of this name."""
+        """Return the value of a criterion."""
         return float(getattr(self, criterion))
 
     def as_metadata(self) -> dict[str, Any]:
-        """Return what a ``trajectory/1`` file says of its excitation."""
+        """Return the quality for the metadata of ``trajectory/1``."""
         numbers = {
             name: getattr(self, name) for name in ("condition", "scaled_condition", "log_det")
         }
@@ -63,12 +65,12 @@ class Quality:
 
 
 def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry) -> Quality:
-    """Judge an excitation as a whole period of it, by the reference method.
+    """Assess an excitation over a whole period, without the search's approximations.
 
     Raises
     ------
     InputError
-        Where it moves other joints than hip and knee.
+        If it moves joints other than hip and knee.
     """
     names = tuple(joint.name for joint in trajectory.joints)
     if names != JOINTS:
@@ -93,7 +95,22 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
 
 
 def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDArray:
-    """Regressor of rigid body and friction at times (n,), shape (n, 2, 8)."""
+    """Return the regressor of rigid body and friction at some times.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Excitation of hip and knee.
+    geometry : Geometry
+        Lengths and gravity.
+    time : (n,) array
+        Times, s.
+
+    Returns
+    -------
+    (n, 2, 8) array
+        Torque in N·m per unit of each parameter.
+    """
     return paper_model().regressor(_planned(trajectory, geometry, time))
 
 
@@ -120,13 +137,29 @@ def _planned(
 def standard_errors(
     trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float
 ) -> NDArray:
-    """Foretell the standard errors (8,) of a weighted least-squares fit to one recording.
+    """Predict the standard errors of a weighted least-squares fit to one recording.
 
     Torque noise of a joint is stationary, with standard deviation s and correlation exp(-|t| / T).
-    With weights 1 / s², information I = sum of A_j'A_j / s_j² and R the noise's correlation matrix,
-    the fit's covariance is I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever
-    the fit believes of its noise. Rows near a joint's reversals are zero in A_j, because the fit
-    leaves them out.
+    With weights 1 / s², information I = sum of A_j'A_j / s_j², and R the correlation matrix of the
+    noise, the covariance of the fit is I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹. This is exact (White's
+    sandwich), whatever noise the fit assumes. Rows near a joint's reversals are zero in A_j,
+    because the fit leaves them out.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Excitation of hip and knee.
+    noise : NoiseSettings
+        Standard deviations, correlation time and duration.
+    geometry : Geometry
+        Lengths and gravity.
+    sample_rate_hz : float
+        Sample rate.
+
+    Returns
+    -------
+    (8,) array
+        In the units of the parameters; infinite if they are not identifiable.
     """
     duration = min(noise.duration_s, trajectory.duration_s)
     motion = _planned(
@@ -149,8 +182,7 @@ def standard_errors(
 
 
 def paper_model() -> Model:
-    """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both
-    joints."""
+    """Return the model of an excitation: rigid body, and friction of both joints."""
     effects = baseline(THE_LEG, ("exo_alone",))
     return Model.of(effects)
 

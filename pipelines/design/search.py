@@ -1,5 +1,4 @@
-"""The search for an excitation: a swarm for the region, an evolution strategy for the last
-digits."""
+"""Search for an excitation: a swarm finds the region, an evolution strategy refines it."""
 
 import time
 from collections.abc import Callable
@@ -18,18 +17,18 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings
 
-# The swarm only has to find the region: a coarse grid is five times faster, and no less strict
-# about bounds.
+# The swarm only has to find the region. A coarse grid is five times as fast, and its bounds are
+# as strict.
 COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC = 200, 40
 FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC = 1000, 100
 
 ITERATIONS_PER_LOOK = 25
 PATIENCE = 8
-"""Looks at the swarm without gain after which it is done."""
+"""Number of checks without gain after which the swarm stops."""
 LEAST_GAIN = 1e-4
 
 POLISHED = 3
-"""Particles that are polished: the best of as many arcs of the ring, which may sit in different
+"""Number of polished particles: the best of as many arcs of the ring, which may be in different
 valleys."""
 GENERATIONS = 2000
 POLISH_SPREAD = 0.05
@@ -39,26 +38,32 @@ Report = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The outcome of a search."""
+    """Result of a search."""
 
     trajectory: FourierTrajectory
     stopped_by: str
-    """``stagnation``, ``iterations``, or ``seconds``, when the design also depends on the machine's
-    speed."""
+    """``stagnation``, ``iterations``, or ``seconds``; in the last case the result depends on the
+    computer's speed."""
 
 
 def search(
     settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None
 ) -> SearchResult:
-    """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen
-    criterion.
+    """Search for the excitation that is best by a criterion and keeps its bounds at every time.
 
-    ``report`` is called with the share done, 0 to 1, and the best value so far.
+    Parameters
+    ----------
+    settings : DesignSettings
+        Bounds, criterion and effort.
+    geometry : Geometry
+        Lengths and gravity.
+    report : callable
+        Called with the share done, 0 to 1, and the best value so far.
 
     Raises
     ------
     NotIdentifiable
-        Where no motion within the bounds tells the parameters apart.
+        If no motion within the bounds separates the parameters.
     """
     rng = np.random.default_rng(settings.seed)
     coarse = _problem(settings, geometry, COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC)
@@ -69,7 +74,7 @@ def search(
         return f"{settings.criterion} {-cost if settings.criterion == 'log_det' else cost:.4g}"
 
     swarm = _first_swarm(settings, coarse, spread, rng)
-    fly(swarm, coarse, True, 0, rng)  # compiles what is not compiled yet, which is no search time
+    fly(swarm, coarse, True, 0, rng)  # Compiles before the search time begins.
     deadline = time.monotonic() + settings.seconds
     stopped_by = _let_fly(
         swarm, coarse, settings, rng, deadline, lambda done, cost: report(0.5 * done, note(cost))
@@ -91,7 +96,7 @@ def search(
         report(0.5 + 0.5 * (i + 1) / POLISHED, note(best_cost))
     if not np.isfinite(best_cost):
         raise NotIdentifiable(
-            "no excitation within the bounds tells the parameters apart; widen [design.bounds] or"
+            "no excitation within the bounds separates the parameters; widen [design.bounds] or"
             " add harmonics"
         )
     return SearchResult(
@@ -115,10 +120,10 @@ def _problem(
 
 
 def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
-    """Return what coefficients are combinations of: sine (0) and cosine (1), (2, n, free).
+    """Return the basis of the coefficients of sine (0) and cosine (1), (2, n, free).
 
-    At t = 0 and after each period the velocity is w sum k a_k and the acceleration -w² sum k² b_k;
-    at rest both vanish, so the coefficients come from the null spaces of (k) and (k²).
+    At t = 0 and after each period, the velocity is w sum k a_k and the acceleration is -w² sum k²
+    b_k. Both vanish at rest, so that the coefficients lie in the null spaces of (k) and (k²).
     """
     if not rest_to_rest:
         return np.array([np.eye(harmonics)] * 2)
@@ -127,7 +132,7 @@ def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
 
 
 def spread_of(problem: Problem) -> NDArray:
-    """Return how far a single coordinate may go before some bound stops it, (D,)."""
+    """Return the greatest value of each single coordinate within the bounds, (D,)."""
     half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
     powers = problem.speeds ** np.arange(3)[:, np.newaxis]
     reach = (half[:, :, np.newaxis] / powers[:, np.newaxis, :]).min(axis=0)
@@ -157,7 +162,7 @@ def _let_fly(
     deadline: float,
     report: Callable[[float, float], None],
 ) -> str:
-    """Move the swarm until nothing is gained, and say what stopped it."""
+    """Move the swarm until it stagnates, and return the reason for the end."""
     best, last_gain = swarm.best_cost.min(), 0
     looks = -(-settings.iterations // ITERATIONS_PER_LOOK)
     for look in range(looks):

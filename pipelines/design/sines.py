@@ -1,4 +1,4 @@
-"""Sine and cosine of whole arrays in a form the compiler turns into vector instructions."""
+"""Sine and cosine of whole arrays, in a form that compiles to vector instructions."""
 
 import math
 
@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 VECTORIZED = {"reassoc", "contract", "nsz", "arcp"}
-"""What the compiler may do to arithmetic: order sums anew, fuse; NaN and infinity keep their
-meaning."""
+"""Permitted changes of arithmetic: reordered sums and fused operations, but no change of NaN or
+infinity."""
 
 # Taylor's series about 0, enough terms for 1e-15 on [-pi/2, pi/2].
 _SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
@@ -18,7 +18,7 @@ C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11 = _COSINE
 
 @njit(cache=True, fastmath=VECTORIZED, error_model="numpy")
 def sines(x, sine, cosine):
-    """Write sin x and cos x, all arrays (n,); exact to 1e-14 for any angle a joint can have."""
+    """Write sin x and cos x, (n,) each; exact to 1e-14 for any joint angle."""
     for i in range(x.size):
         half_turns = np.floor(x[i] * (1.0 / math.pi) + 0.5)
         r = x[i] - math.pi * half_turns

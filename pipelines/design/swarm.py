@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.design.fitness import cost, costs, workspace
 
-# Clerc and Kennedy's constriction (2002, IEEE Trans. Evol. Comput. 6(1)): the swarm contracts by
-# itself.
+# Constriction makes the swarm contract (Clerc and Kennedy, 2002, IEEE Trans. Evol. Comput. 6(1)).
 INERTIA = 0.7298
 PULL = 1.49618
 
@@ -21,14 +20,14 @@ class Swarm(NamedTuple):
     velocity: NDArray
     """(P, D)."""
     best_position: NDArray
-    """(P, D): the best each particle has seen."""
+    """(P, D): the best position of each particle."""
     best_cost: NDArray
     """(P,)."""
 
 
 @njit(cache=True)
 def assess(swarm, problem):
-    """Repair and judge every particle where it is."""
+    """Repair and evaluate every particle at its position."""
     swarm.best_cost[:] = costs(swarm.position, problem)
     swarm.best_position[:] = swarm.position
 

@@ -1,4 +1,4 @@
-"""A model laid out for compiled code: addresses of kernels, values and memory in flat arrays."""
+"""A model in flat arrays for compiled code: addresses of kernels, values and memory."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -18,8 +18,8 @@ from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.model import Model, Term
 
 MOTOR_SHARE = 0.04
-"""Of a joint's inertia that stays with its motor behind a spring, where the machine is no
-exoskeleton: as of a leg."""
+"""Share of a joint's inertia that stays with its motor in front of a spring, for machines other
+than the exoskeleton; as of a leg."""
 
 
 @reaction
@@ -48,13 +48,13 @@ def _no_torque_reading(t, torque, values, joint, state, temperature):
 
 
 class Assembly(NamedTuple):
-    """What the compiled dynamics needs of a model; made by ``assemble``.
+    """The model in the form that the compiled dynamics needs.
 
-    Terms stand in the order: on links and inertial, on links, on drives and inertial, on drives;
-    ``bounds`` (5,) says where each group begins and the last ends. Per term i: the addresses of its
-    kernels, ``joint[i]`` (-1 for the whole leg), its values ``values[value_at[i] : value_at[i +
-    1]]``, its memory ``state_at[i] : state_at[i + 1]``. Arrays alone, so that one compilation
-    serves all models.
+    Terms are in the order: on links and inertial, on links, on drives and inertial, on drives;
+    ``bounds`` (5,) holds the begin of each group and the end of the last. Term i has the addresses
+    of its kernels, ``joint[i]`` (-1 for the whole leg), values ``values[value_at[i] : value_at[i +
+    1]]`` and a memory ``state_at[i] : state_at[i + 1]``. All fields are arrays, so that one
+    compilation serves all models.
     """
 
     joints: int
@@ -69,23 +69,23 @@ class Assembly(NamedTuple):
     value_at: np.ndarray
     state_at: np.ndarray
     sensed_at: np.ndarray
-    """As ``state_at``, for the memory of torque sensors."""
+    """Like ``state_at``, for the memory of torque sensors."""
     sprung: np.ndarray
-    """For each joint the term that is its transmission, -1 for a rigid one."""
+    """The term that is each joint's transmission, -1 for a rigid one."""
     motor_inertia: np.ndarray
     cuffed: bool
-    """True where the springs are cuffs: links are then the limb's, and the machine's own bodies are
-    on the motors' side."""
+    """True if the springs are cuffs: links are then those of the limb, and the machine's own bodies
+    are on the motors' side."""
     geometry: np.ndarray
     temperature: np.ndarray
-    """(J,) °C of the motors; who simulates a machine that warms sets it before each sample."""
+    """(J,) °C of the motors; a simulation of a machine that warms sets it before each sample."""
 
 
 _indices, _reals = int64[::1], float64[::1]
 ASSEMBLY = types.NamedTuple(
     [int64, *(_indices,) * 7, _reals, *(_indices,) * 4, _reals, boolean, _reals, _reals], Assembly
 )
-"""The assembly's type in compiled code."""
+"""Type of the assembly in compiled code."""
 
 
 def _addresses(kernels: Sequence, blank) -> NDArray:
@@ -93,14 +93,21 @@ def _addresses(kernels: Sequence, blank) -> NDArray:
 
 
 def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "knee")) -> Assembly:
-    """Lay a model out for the compiled dynamics.
+    """Convert a model for the compiled dynamics.
 
-    ``model`` holds the terms of one kind of run (``Model.for_run``).
+    Parameters
+    ----------
+    model : Model
+        Terms of one kind of run (``Model.for_run``).
+    geometry : Geometry
+        Lengths and gravity.
+    joints : sequence of str
+        Names of the joints.
 
     Raises
     ------
     InputError
-        Where a joint has two transmissions, or cuffs and joints are both compliant.
+        If a joint has two transmissions, or cuffs and joints are both compliant.
     """
     terms = in_order(model)
     effects = [term.effect for term in terms]
@@ -112,8 +119,8 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             continue
         if effect.at_cuff != cuffed(effects):
             raise InputError(
-                f"{effect.label}: a simulation holds compliant cuffs or joints that are not rigid,"
-                " not both; leave out the one or the other"
+                f"{effect.label}: a simulation supports compliant cuffs or compliant joints,"
+                " not both; remove one of them"
             )
         if sprung[joint[i]] >= 0:
             raise InputError(
@@ -144,21 +151,19 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
 
 
 def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
-    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic
-    joint.
+    """Return the inertia on the motor's side of a compliant joint, kg·m²; kg at a prismatic joint.
 
     Raises
     ------
     InputError
-        Where the joint has play and the machine is no exoskeleton.
+        If the joint has play and the machine is no exoskeleton.
     """
     if effect.on.is_exoskeleton:
         return effect.motor_inertia
     if isinstance(effect, Backlash):
         raise InputError(
-            f"{effect.label}: the teeth that a simulation has are those of an exoskeleton's gear,"
-            " too hard for a machine of another size; simulate the model without it, as `exoid"
-            " identify` writes it"
+            f"{effect.label}: backlash can only be simulated for an exoskeleton's joints; simulate"
+            " the model without it, as `exoid identify` writes it"
         )
     mechanism = effect.on.mechanism
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)
@@ -169,13 +174,13 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
 
 
 def in_order(model: Model) -> list[Term]:
-    """Return a model's terms in the order in which an assembly holds them."""
+    """Return a model's terms in the order of an assembly."""
     has_cuffs = cuffed([term.effect for term in model])
     return sorted(model, key=lambda term: _group(term.effect, has_cuffs))
 
 
 def cuffed(effects: Iterable[Effect]) -> bool:
-    """Tell whether a limb moves against its cuff."""
+    """Return whether a limb moves in a compliant cuff."""
     return any(effect.at_cuff for effect in effects)
 
 

@@ -1,7 +1,7 @@
-"""The motion that a model would have made of a run's references, under the same drives.
+"""Simulate a model along a run's references, under the same drives.
 
-It has the run's excitation and none of its sensors' noise: what instruments for a regression are
-made of.
+The result has the run's excitation without its sensors' noise, and so serves as instruments of a
+regression.
 """
 
 from collections.abc import Mapping
@@ -22,24 +22,23 @@ from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 
 RATE_HZ = 1000.0
-"""Of drives that do not tell theirs, and at most: what is faster changes nothing that a regression
-sees."""
+"""Rate of drives that report none, and the highest that is simulated; a faster one changes nothing
+in a regression."""
 BANDWIDTH_RAD_S = 2.0 * np.pi * 8.0
-"""Of the loop that stands for drives that tell nothing."""
+"""Bandwidth of the loop that replaces unknown drives."""
 
 
 def closed_loop(model: Model, motion: Motion) -> Motion:
-    """Return the run as a model would have moved along its references: angle, velocity and
-    acceleration anew.
+    """Return the run's motion as a model performs it along the references.
 
-    The drives are those of the recording's ``controller``; where it tells none, loops of a
-    bandwidth of 8 Hz take their place, tuned to the model's inertia, as in DIDIM (Gautier, Janot
-    and Vandanjon, 2013, IEEE TCST 21(2)).
+    The drives are those of the recording's ``controller``. Without them, loops of a bandwidth of 8
+    Hz are used, tuned to the model's inertia, as in DIDIM (Gautier, Janot and Vandanjon, 2013, IEEE
+    TCST 21(2)).
 
     Raises
     ------
     InputError
-        Where the run has no references, or the model runs away.
+        If the run has no references, or the simulation diverges.
     """
     reference = _set_points(motion)
     a = assemble(model.for_run(motion.run), motion.geometry, motion.joints)
@@ -54,14 +53,14 @@ def closed_loop(model: Model, motion: Motion) -> Motion:
         q[stretch], dq[stretch], ddq[stretch] = truth[:, 0], truth[:, 1], truth[:, 2]
     if not np.isfinite(ddq).all():
         raise InputError(
-            f"{motion.file or 'the motion'}: the model runs away under the run's own drives; "
+            f"{motion.file or 'the motion'}: the simulation diverges under the run's own drives; "
             "check the metadata `controller`, or choose --method weighted_least_squares"
         )
     return replace(motion, q=q, dq=dq, ddq=ddq)
 
 
 def _set_points(motion: Motion) -> NDArray:
-    """Return the commanded angles, straight lines between those that were told, (n, J)."""
+    """Return the commanded angles, (n, J) rad, linear between recorded ones."""
     reference = np.full_like(motion.q, np.nan) if motion.reference is None else motion.reference
     for joint, column in zip(motion.joints, reference.T, strict=True):
         if not np.isfinite(column).any():
@@ -102,7 +101,7 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
 
 
 def _gain(controller: Mapping[str, Any], key: str) -> float:
-    """Return a drive's number, whatever unit its name ends in; 0 where it is not told."""
+    """Return a drive's value by its name without unit; 0 if it is missing."""
     return next(
         (float(v) for k, v in controller.items() if k.startswith(key) and v is not None), 0.0
     )

@@ -1,8 +1,8 @@
-"""Functions that are compiled once: their callers call the machine code that is there.
+"""Compile functions once, so that their callers call existing machine code.
 
-numba otherwise optimises the code of a function anew within each of its callers, and theirs: of the
-dynamics' five levels each would take as long as the first. An optimiser that cannot see into a call
-cannot make it part of its caller either, which for functions as large as these gains nothing.
+By default, numba optimises a function's code again within each of its callers: each of the
+dynamics' five levels would take as long as the first. The optimiser cannot inline such calls, but
+for functions as large as these that gains nothing.
 """
 
 from functools import wraps
@@ -23,8 +23,7 @@ def compiled_once(signature):
 
     def decorate(function):
         compiled = njit(signature, **ALLOCATING_NOTHING)(function)
-        # The signature is part of the name, so that compiled code of another version finds nothing
-        # here.
+        # The signature is part of the name, so that cached code of another version does not match.
         symbol = f"{function.__module__}.{function.__qualname__}{signature}"
         binding.add_symbol(symbol, address(compiled))
 

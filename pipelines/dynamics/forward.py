@@ -1,19 +1,18 @@
-"""Forward dynamics of any model: acceleration from drive torque, and one step of time.
+"""Forward dynamics of any model: accelerations from drive torque, and one time step.
 
-A joint has two coordinates, the motor's and the link's, which are one where it is rigid. Motors
-carry the drive's effects and the encoder; links carry everything else. With T the torque passed
-on::
+A joint has two coordinates, the motor's and the link's, which coincide if it is rigid. Motors carry
+the drive's effects and the encoder; links carry everything else. With T the transmitted torque::
 
     M(q) ddq + rest(q, dq) = T          links (structure, human)
     J dd_theta + drive(theta, d_theta) + T = drive torque     motors; T from the spring
 
-and a rigid joint is the sum of its two rows. Where a limb moves against its cuff, the cuff is the
+and a rigid joint is the sum of its two rows. If a limb moves in a compliant cuff, the cuff is the
 spring, the limb the link, and the whole machine the motors, whose J is then the machine's mass
 matrix.
 
-Dry friction is a set-valued function of speed. The step looks for the ``direction`` in [-1, 1]
-of each joint that is consistent with the speed at the step's end (projected Gauss-Seidel on the
-complementarity problem; Stewart and Trinkle, 1996), so joints stick without chatter.
+Dry friction is a set-valued function of speed. The step finds the ``direction`` in [-1, 1] of each
+joint that is consistent with the speed at the step's end (projected Gauss-Seidel on the
+complementarity problem; Stewart and Trinkle, 1996), so that joints stick without chatter.
 """
 
 from typing import Any, NamedTuple
@@ -32,17 +31,18 @@ STICTION_SWEEPS = 20
 STICTION_TOLERANCE = 1e-9
 
 HOT: dict[str, Any] = {"cache": True, "_nrt": False}
-"""How the innermost functions are compiled. They allocate nothing, and numba's counting of
-references to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
+"""Compiler options of the innermost functions. They allocate nothing, so that ``_nrt`` may switch
+off numba's reference counting, which would take more than half of their time."""
 INNER: dict[str, Any] = {**HOT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""How those are that Python never calls: what hands over an assembly takes long to compile."""
+"""Compiler options of functions that Python never calls; their wrappers would take long to
+compile."""
 
 Q, DQ, THETA, DTHETA = range(4)
-"""Rows of a state: link angle and speed, motor angle and speed, (4, J)."""
+"""Rows of a state (4, J): link angle and speed, motor angle and speed."""
 
 
 def resting_state(q: NDArray) -> NDArray:
-    """Return the state (4, J) of a leg at rest at angles ``q`` (J,), springs relaxed."""
+    """Return the state (4, J) of a leg at rest at angles ``q`` (J,), with relaxed springs."""
     still = np.zeros_like(q, dtype=float)
     return np.array([q, still, q, still], dtype=float)
 
@@ -67,7 +67,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(joints: int) -> Workspace:
-    """Make the scratch arrays for a number of joints."""
+    """Return the scratch arrays for a number of joints."""
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
@@ -93,7 +93,7 @@ states = float64[:, ::1]
 WORKSPACE = typeof(workspace(1))
 
 
-# Inlined: a call hands over the whole assembly, which costs as much as the equations do.
+# Inlined, because a call passes the whole assembly, which costs as much as the equations.
 @njit(cache=True, inline="always")
 def _react(a, first, last, at, memory, out):
     """Add the reactions of terms ``first`` to ``last - 1`` to ``out`` (J,)."""
@@ -105,10 +105,10 @@ def _react(a, first, last, at, memory, out):
 
 @njit(cache=True, inline="always")
 def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, M, rest):
-    """Write inertial terms' mass matrix into ``M`` (J, J), their torque at no acceleration into
-    ``rest`` (J,).
+    """Write the inertial terms' mass matrix (J, J), and their torque at zero acceleration (J,).
 
-    The mass matrix is the torque at unit acceleration less that at none (Walker and Orin, 1982).
+    The mass matrix is the torque at unit acceleration less that at zero acceleration (Walker and
+    Orin, 1982).
     """
     w.ddq[:] = 0.0
     at = Instant(t, angle, speed, w.ddq, direction, load, a.temperature)
@@ -130,7 +130,7 @@ def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, 
 
 @njit(cache=True, inline="always")
 def _solve(M, b, scratch, x):
-    """Solve M x = b, without a loop for one or two joints; ``scratch`` has room for more."""
+    """Solve M x = b, explicitly for one or two joints; ``scratch`` is for more."""
     if b.shape[0] == 1:
         x[0] = b[0] / M[0, 0]
     elif b.shape[0] == 2:
@@ -147,8 +147,7 @@ def _solve(M, b, scratch, x):
 
 @njit(cache=True, inline="always")
 def _prepare(a, w, t, state, memory, load):
-    """Compute all that does not depend on the direction of dry friction: masses, link torque,
-    spring torque."""
+    """Compute everything independent of friction's direction: masses, link and spring torque."""
     link, after_inertial, drive = a.bounds[0], a.bounds[1], a.bounds[2]
     for j in range(a.joints):
         w.link_direction[j] = np.sign(state[DQ, j])
@@ -198,10 +197,10 @@ def _prepare(a, w, t, state, memory, load):
 
 @njit(**INNER)
 def _accelerate_both(a, w, state, drive, rates):
-    """Write d(state)/dt of machine and limb, whose masses are coupled across the joints that are
-    rigid.
+    """Write d(state)/dt of machine and limb, whose masses are coupled across rigid joints.
 
-    Unknown are the links' accelerations, then the motors'; a rigid joint's are equal.
+    The unknowns are the accelerations of the links, then of the motors; those of a rigid joint are
+    equal.
     """
     joints = a.joints
     w.both_masses[:] = 0.0
@@ -226,10 +225,9 @@ def _accelerate_both(a, w, state, drive, rates):
 
 @njit(**INNER)
 def _eliminate(A, b):
-    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) is left
-    holding x.
+    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) becomes x.
 
-    Of a larger ``A`` the first n rows and columns are meant.
+    Only the first n rows and columns of a larger ``A`` are used.
     """
     n = b.shape[0]
     for i in range(n):
@@ -285,7 +283,9 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     Parameters
     ----------
     a : Assembly
+        Model.
     w : Workspace
+        Scratch.
     t : float
         Time, s.
     state : (4, J) array
@@ -293,9 +293,9 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     memory : (m,) array
         Memories of all effects.
     direction : (J,) array
-        Sign of each motor's speed, or what holds it, in [-1, 1].
+        Sign of each motor's speed, or the value in [-1, 1] that holds it.
     load : (J,) array
-        Torque passed on to the links, N·m, as of the last step.
+        Torque transmitted to the links in the last step, N·m.
     drive : (J,) array
         Drive torque, N·m.
     """
@@ -321,14 +321,16 @@ def memory_rates(a, w, t, state, memory, direction, load, rates):
 
 @compiled_once(RATES)
 def _rates_under(a, w, t, state, memory, direction, load, drive, rates):
-    """As ``_finish``, but not inlined: for what happens seldom."""
+    """Compute ``_finish`` without inlining, for rare cases."""
     _finish(a, w, t, state, memory, direction, load, drive, rates)
 
 
 @njit(**INNER)
 def _grip(a, w, t, state, memory, load, drive, rates, j):
-    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where
-    friction is dry."""
+    """Return the slope of a motor's acceleration in its direction, rad/s².
+
+    It is negative for dry friction.
+    """
     now = w.direction[j]
     w.direction[j] = -1.0
     _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
@@ -341,10 +343,10 @@ def _grip(a, w, t, state, memory, load, drive, rates, j):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, float64, float64, states, vector, vector, vector, states))
 def find_direction(a, w, t, h, state, memory, load, drive, rates):
-    """Write into ``w.direction`` (J,) the sign of each motor's speed over the next ``h`` seconds.
+    """Write the sign of each motor's speed over the next ``h`` seconds into ``w.direction`` (J,).
 
-    Where neither sign is consistent with the speed that it leads to, the value that stops the
-    joint. ``rates`` (4, J) is left holding d(state)/dt with that direction.
+    If neither sign is consistent with the resulting speed, it is the value that stops the joint.
+    ``rates`` (4, J) then holds d(state)/dt with that direction.
     """
     for j in range(a.joints):
         w.direction[j] = np.sign(state[DTHETA, j])
@@ -365,7 +367,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
             if w.slope[j] < 0.0:
                 w.direction[j] = min(1.0, max(-1.0, before - ahead / (h * w.slope[j])))
             else:
-                # No dry friction at this joint: nothing can hold it.
+                # Without dry friction nothing can hold this joint.
                 w.direction[j] = np.sign(ahead)
             change = max(change, abs(w.direction[j] - before))
         if change < STICTION_TOLERANCE:
@@ -374,7 +376,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
 
 
 class Stages(NamedTuple):
-    """Scratch of the Runge-Kutta step: four rates of state and of memory, and the stage's own."""
+    """Scratch of the Runge-Kutta step: four rates of state and memory, and a stage's values."""
 
     rates: np.ndarray
     memory_rates: np.ndarray
@@ -383,7 +385,7 @@ class Stages(NamedTuple):
 
 
 def stages(joints: int, memories: int) -> Stages:
-    """Make the scratch of the Runge-Kutta step."""
+    """Return the scratch arrays of the Runge-Kutta step."""
     return Stages(
         np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories)
     )
@@ -394,8 +396,10 @@ STAGES = typeof(stages(1, 1))
 
 @njit(cache=True, inline="always")
 def begin_stages(a, w, s, t, state, memory, load):
-    """Finish the first stage, whose ``s.rates[0]`` is known: rates of the memories, and ``load``
-    (J,) passed on."""
+    """Complete the first stage: write the memories' rates and the transmitted ``load`` (J,).
+
+    ``s.rates[0]`` must be known.
+    """
     memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
     load[:] = 0.0
     at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero, a.temperature)
@@ -404,8 +408,7 @@ def begin_stages(a, w, s, t, state, memory, load):
 
 @njit(cache=True, inline="always")
 def reach_stage(s, i, reach, state, memory):
-    """Write state and memory of stage ``i``, ``reach`` seconds after the step's begin, into
-    ``s``."""
+    """Write state and memory of stage ``i`` into ``s``, ``reach`` seconds after the step begins."""
     for row in range(4):
         for j in range(state.shape[1]):
             s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
@@ -431,10 +434,10 @@ def end_stages(s, h, state, memory):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, STAGES, float64, float64, states, vector, vector, vector))
 def step(a, w, s, t, h, state, memory, load, drive):
-    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant
-    drive torque.
+    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds.
 
-    Classical Runge-Kutta with the direction of dry friction held over the step.
+    Classical Runge-Kutta under constant drive torque; the direction of dry friction is held over
+    the step.
     """
     find_direction(a, w, t, h, state, memory, load, drive, s.rates[0])
     begin_stages(a, w, s, t, state, memory, load)
@@ -447,5 +450,5 @@ def step(a, w, s, t, h, state, memory, load, drive):
 
 
 def memory_size(a: Assembly) -> int:
-    """Return how many memories the effects have together."""
+    """Return the number of memories of all effects together."""
     return int(a.state_at[-1])

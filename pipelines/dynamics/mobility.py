@@ -1,4 +1,4 @@
-"""What the motors feel of the leg's mass, and how fast a loop around it gets."""
+"""The effective inertia at the motors, and the fastest rate of a feedback loop around it."""
 
 import numpy as np
 from numba import njit
@@ -18,30 +18,29 @@ from pipelines.dynamics.forward import (
 from pipelines.errors import InputError
 
 KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
-"""Where a leg's mass matrix is looked at, rad: it is even in the knee angle and depends on no
-other."""
+"""Knee angles at which a leg's mass matrix is evaluated, rad. It is even in the knee angle, and
+depends on no other."""
 
 MORE_POSES = 500
-"""Of a machine of more than two joints."""
+"""Number of poses of a machine of more than two joints."""
 
 STABLE_REACH = 1.5
-"""Step times fastest rate up to which the Runge-Kutta method is stable (2.78) and still
-accurate."""
+"""Greatest product of step and fastest rate; the Runge-Kutta method is stable up to 2.78, but
+accurate only below."""
 
 MOST_STEPS = 200
-"""Integration steps a sample: at the default gain and rate the motors then feel 1e-3 kg·m², less
-than rotors have."""
+"""Most integration steps per sample. At the default gain and rate, more correspond to an inertia
+below 1e-3 kg·m², less than that of rotors."""
 
 
 @njit(**HOT)
 def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
-    """Write mass matrices and mobilities at poses (k, J) into ``mass`` and ``mobility`` (k, J,
-    J)."""
+    """Write mass matrices and mobilities, (k, J, J) each, at poses (k, J)."""
     joints = a.joints
     for k in range(len(poses)):
         for j in range(joints):
             state[Q, j] = poses[k, j]
-        # With no torque first, then with one newton metre at each drive in turn.
+        # First without torque, then with one newton metre at each drive in turn.
         for pushed in range(-1, joints):
             for j in range(joints):
                 drive[j] = 1.0 if j == pushed else 0.0
@@ -55,7 +54,7 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
 
 
 def _poses(joints: int) -> NDArray:
-    """Return joint angles, (k, J) rad: no mass matrix depends on where the first joint is."""
+    """Return joint angles, (k, J) rad; no mass matrix depends on the first joint's."""
     poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else MORE_POSES, joints))
     if joints < 3:
         poses[:, -1] = KNEE_ANGLES
@@ -67,12 +66,14 @@ def _poses(joints: int) -> NDArray:
 
 
 def masses(a: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the links' mass matrices and the motors' acceleration per drive torque at some poses.
+    """Return the links' mass matrix and the motors' mobility at k poses.
 
     Returns
     -------
-    tuple of (k, J, J) arrays
-        kg·m² and 1/(kg·m²), at k poses.
+    mass : (k, J, J) array
+        Mass matrix of the links, kg·m².
+    mobility : (k, J, J) array
+        Acceleration of the motors per drive torque, 1/(kg·m²).
     """
     poses, joints = _poses(a.joints), a.joints
     mass, mobility = np.empty((2, len(poses), joints, joints))
@@ -93,22 +94,28 @@ def masses(a: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
-    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays
-    stable.
+    """Return the number of integration steps per sample for which a speed feedback is stable.
+
+    Parameters
+    ----------
+    a : Assembly
+        Model to be simulated.
+    feedback_gain : float
+        Gain of the feedback, N·m·s/rad.
+    period : float
+        Time between two samples, s.
 
     Raises
     ------
     InputError
-        Where that is more than ``MOST_STEPS``: a model can be so light at some pose that it hardly
-        has mass.
+        If it exceeds ``MOST_STEPS``, because the model hardly has mass at some pose.
     """
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
     needed = feedback_gain * mobility * period / STABLE_REACH
     if not needed <= MOST_STEPS:
         raise InputError(
-            f"the motors feel as little as {1.0 / mobility:.2g} kg·m² at some pose of this model,"
-            f" too little for a feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz to"
-            " be simulated. Identify it again from richer motions, or give smaller gains of"
-            " feedback"
+            f"the effective inertia falls to {1.0 / mobility:.2g} kg·m² at some pose: a simulation"
+            f" with a feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz is unstable."
+            " Identify the model again from richer motions, or reduce the feedback gain"
         )
     return max(1, int(np.ceil(needed)))

@@ -1,6 +1,6 @@
 """The leg under its drives' own position loops: sampled PD control of encoder counts.
 
-The same loop moves the virtual rig sample by sample and replays a recording under its references.
+The same loop moves the virtual rig sample by sample, and replays a recording along its references.
 """
 
 from typing import NamedTuple
@@ -28,11 +28,10 @@ SUBSTEPS = 6
 
 
 class Drives(NamedTuple):
-    """Position controllers of all joints: torque = kp (reference - angle) + kd (its rate - speed),
-    limited.
+    """Position controllers of all joints.
 
-    The reference runs in a straight line from one set-point to the next; speed is the low-passed
-    difference of the counted angle.
+    torque = kp (reference - angle) + kd (its rate - speed), limited. The reference is linear from
+    one set-point to the next; speed is the low-passed difference of the counted angle.
     """
 
     kp: np.ndarray
@@ -42,9 +41,9 @@ class Drives(NamedTuple):
     limit: np.ndarray
     """(J,) N·m."""
     rad_per_count: np.ndarray
-    """(J,) of the encoder; 0 for an ideal one."""
+    """(J,) resolution of the encoder; 0 for an ideal one."""
     speed_share: float
-    """What a new speed adds to the low-passed one each control period, (0, 1]."""
+    """Share of a new speed in the low-passed one at each control period, (0, 1]."""
     periods: int
     """Control periods per sample."""
     step_s: float
@@ -60,9 +59,20 @@ def make_drives(
     sample_rate_hz: float,
     speed_cutoff_hz: float = 100.0,
 ) -> Drives:
-    """Lay drives out for the compiled loop, gains and limits (J,) each.
+    """Return the drives for the compiled loop.
 
-    ``rate_hz`` is rounded to a multiple of the sample rate.
+    Parameters
+    ----------
+    kp, kd, limit : (J,) array
+        Gains, N·m/rad and N·m·s/rad, and greatest torque, N·m.
+    counts_per_turn : (J,) array
+        Resolution of the encoders; 0 for an ideal one.
+    rate_hz : float
+        Rate of the control loop; it is rounded to a multiple of the sample rate.
+    sample_rate_hz : float
+        Sample rate.
+    speed_cutoff_hz : float
+        Cut-off of the speed's low-pass.
     """
     periods = max(1, round(rate_hz / sample_rate_hz))
     period = 1.0 / (sample_rate_hz * periods)
@@ -79,7 +89,7 @@ def make_drives(
 
 
 class LoopState(NamedTuple):
-    """All that changes while the loop runs."""
+    """The variables of the running loop."""
 
     state: np.ndarray
     """(4, J) links and motors."""
@@ -88,9 +98,9 @@ class LoopState(NamedTuple):
     angle: np.ndarray
     """(J,) last counted angle."""
     speed: np.ndarray
-    """(J,) the drive's estimate."""
+    """(J,) speed as the drive estimates it."""
     torque: np.ndarray
-    """(J,) what the drives apply."""
+    """(J,) torque that the drives apply."""
     reference: np.ndarray
     """(J,) last set-point."""
     sensed: np.ndarray
@@ -117,15 +127,14 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
 
 @njit(**HOT)
 def read_encoders(a, angle):
-    """Turn true motor angles into what the encoders say, in place."""
+    """Turn true motor angles into the encoders' readings, in place."""
     for i in range(a.bounds[4]):
         reading_at(a.readings[i])(angle, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
 
 
 @njit(cache=True)
 def read_torque(a, t, torque, sensed):
-    """Turn what the drives deliver into what their torque sensors say, in place; once a sample, in
-    order."""
+    """Turn delivered torques into the sensors' readings, in place; once per sample, in order."""
     for i in range(a.bounds[4]):
         values = a.values[a.value_at[i] : a.value_at[i + 1]]
         state = sensed[a.sensed_at[i] : a.sensed_at[i + 1]]
@@ -147,14 +156,16 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     ----------
     a, d, w, s, loop
         Assembly, Drives, workspace, stages, LoopState.
+    t : float
+        Time, s.
     reference : (J,) array
-        Set-point to be reached at the end of the period.
-    enabled : (J,) array of bool
+        Set-point to be reached at the end of the period, rad.
+    enabled : (J,) bool array
         False for a drive that applies no torque.
-    angle, speed, torque : (J,) arrays, written
-        Measured angle and the drive's speed at the middle of the period, mean torque over it.
+    angle, speed, torque : (J,) array, written
+        Measured angle and the drive's speed in the middle of the period, mean torque over it.
     truth : (4, J) array, written
-        Link angle, speed, acceleration and motor angle at the middle of the period.
+        Link angle, speed, acceleration and motor angle in the middle of the period.
     """
     j_count = a.joints
     begin = loop.reference.copy()
@@ -216,10 +227,29 @@ def follow(
     start_s: float,
     temperature: NDArray | None = None,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4,
-    J) of each sample.
+    """Run the loop along set-points.
 
-    ``temperature`` (n, J) is the motors', °C, where they warm.
+    Parameters
+    ----------
+    a : Assembly
+        Model.
+    d : Drives
+        Controllers.
+    loop : LoopState
+        State at the start; it is advanced.
+    reference : (n, J) array
+        Set-points, rad.
+    start_s : float
+        Time of the first sample, s.
+    temperature : (n, J) array, optional
+        Temperature of the motors, °C; by default that of ``a``.
+
+    Returns
+    -------
+    angle, speed, torque : (n, J) array
+        Measured values of each sample.
+    truth : (n, 4, J) array
+        Link angle, speed, acceleration and motor angle of each sample.
     """
     n, joints = reference.shape
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))

@@ -1,5 +1,4 @@
-"""The leg to be simulated: one kind of run of an identified model, laid out for the compiled
-dynamics."""
+"""The leg to be simulated: one kind of run of an identified model, compiled."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from pipelines.model.per_run import with_own_values
 
 @dataclass(frozen=True)
 class Plant:
-    """A model that can move."""
+    """A model that can be simulated."""
 
     model: Model
     geometry: Geometry
@@ -30,16 +29,15 @@ class Plant:
     run: str
     assembly: Assembly
     guesses: tuple[str, ...] = ()
-    """What each run has for itself, and nobody knows of this one."""
+    """Remarks on values that differ from run to run, and are unknown for this one."""
 
     @property
     def machine(self) -> Machine:
-        """The machine it is a model of."""
+        """Machine of the model."""
         return machine_of(self.joints, self.geometry)
 
     def metadata(self) -> dict:
-        """Return what a file says of the plant: run, geometry and every parameter of every
-        effect."""
+        """Return run, geometry and the parameters of every effect, for a file's metadata."""
         effects = [
             {
                 "effect": term.effect.label,
@@ -60,7 +58,13 @@ class Plant:
 
 
 def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:
-    """Return the plant of a kind of run, or refuse a machine that cannot exist."""
+    """Return the plant of a kind of run.
+
+    Raises
+    ------
+    InputError
+        If no real machine has its parameters.
+    """
     model = model.for_run(run)
     assembly = assemble(model, geometry, [joint.name for joint in joints])
     lightest = _lightest(assembly)
@@ -70,7 +74,7 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
         reasons = mechanism.unrealizable(X, geometry) or [
             f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
         ]
-        whose, mend = (
+        whose, remedy = (
             ("leg", "from motions that separate X1, X2 and X3 better")
             if mechanism is LEG
             else (
@@ -79,15 +83,14 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
             )
         )
         raise InputError(
-            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. A simulation of it"
-            f" would run away; identify again {mend}, or choose another --run"
+            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. Its simulation"
+            f" diverges; identify again {remedy}, or choose another --run"
         )
     return Plant(model, geometry, joints, run, assembly)
 
 
 def _lightest(assembly: Assembly) -> float:
-    """Return the least eigenvalue of the mass matrix at any pose, kg·m²; 0 where there is no mass
-    to divide by."""
+    """Return the least eigenvalue of the mass matrix at any pose, kg·m²; 0 if it is singular."""
     try:
         return float(np.linalg.eigvalsh(masses(assembly)[0]).min())
     except ZeroDivisionError:
@@ -97,13 +100,23 @@ def _lightest(assembly: Assembly) -> float:
 def plant_from_table(
     table: Table, run: str, default_geometry: Geometry | None = None, recording: Path | None = None
 ) -> Plant:
-    """Return the plant that a ``parameters/1`` table describes for one kind of run, as it was in a
-    recorded one.
+    """Return the plant in a ``parameters/1`` table for one kind of run.
+
+    Parameters
+    ----------
+    table : Table
+        The ``parameters/1`` table.
+    run : str
+        Kind of run.
+    default_geometry : Geometry, optional
+        Geometry, if the table has none.
+    recording : Path, optional
+        Recording whose own values the plant has.
 
     Raises
     ------
     InputError
-        Where it holds no model of that run.
+        If the table has no model of that run.
     """
     bodies = table.frame.loc[table.frame["effect"] == "rigid_body", "run"]
     if not (bodies.isna() | (bodies == run)).any():

@@ -1,16 +1,16 @@
-"""Adaptive tracking with a radial-basis network for each joint (paper section 2.2, mended as in
-docs/errata.md).
+"""Adaptive tracking with a radial-basis network for each joint.
 
-With e the error of the angle and r = de + Lambda e (the paper's q)::
+Source: paper, section 2.2, as corrected in docs/errata.md. With e the error of the angle and r = de
++ Lambda e (the paper's q)::
 
     torque = W' H(x) + Kv r + gain sgn r,   limited
     dW/dt  = F H(x) r,                      paused while the torque is at its limit
     H_i(x) = exp(-|x - c_i|² / b²),         x = (e, de, qd, dqd, ddqd) of the joint
 
-Leg, memories and weights are integrated together by the classical Runge-Kutta method; the direction
+Leg, memories and weights are integrated together by the classical Runge-Kutta method. The direction
 of dry friction is held over a step, as everywhere in the forward dynamics. A step in which a joint
-turns back, or a torque reaches or leaves its limit, is halved until the switch is found: its time
-is what limits the accuracy.
+turns, or a torque reaches or leaves its limit, is halved until the switch is located, because its
+time limits the accuracy.
 """
 
 from typing import Any, NamedTuple
@@ -46,14 +46,14 @@ from pipelines.dynamics.pd_loop import read_encoders
 from pipelines.mechanics.instant import vector
 
 PARTS = 256
-"""How finely a step is cut where something switches in it, a power of two."""
+"""Number of parts into which a step with a switch can be divided, a power of two."""
 
 ROUNDING, CREEP = 1e-6, 1e-3
-"""Against its direction a joint may move this much, rad/s; held by friction, as much as torque
-changes in a step."""
+"""Greatest speed, rad/s, against a joint's direction, and of a joint held by friction, due to the
+change of torque in a step."""
 
 TURN = 2.0 * np.pi
-"""A joint that leaves ± one turn has run away, rad."""
+"""Angle, rad, at which a joint counts as running away."""
 
 
 class RbfController(NamedTuple):
@@ -66,29 +66,28 @@ class RbfController(NamedTuple):
     adaptation_gain: float
     """F."""
     robust_gain: float
-    """Bound on what network and disturbance leave over, N·m."""
+    """Bound on the torque that network and disturbance leave uncompensated, N·m."""
     limit: float
     """N·m."""
     nodes: np.ndarray
-    """(m,) where the Gaussians' centres lie on the diagonal of the space of inputs."""
+    """(m,) positions of the Gaussians' centres on the diagonal of the input space."""
     width: float
     """b of every Gaussian."""
 
 
 class Encoder(NamedTuple):
-    """What the controller knows of a motor's angle, read once a step."""
+    """The controller's reading of a motor's angle, once per step."""
 
     noise: np.ndarray
-    """(n, J) rad, added at each reading; (0, J) for an ideal encoder, which tells the speed too."""
+    """(n, J) rad, added to each reading; (0, J) for an ideal encoder, which also measures speed."""
     rad_per_count: float
-    """0 for an encoder that does not count."""
+    """Resolution; 0 for an encoder that does not count."""
     speed_share: float
-    """What a new difference of angles adds to the low-passed speed at each reading, (0, 1]."""
+    """Share of a new difference of angles in the low-passed speed at each reading, (0, 1]."""
 
 
 class _Network(NamedTuple):
-    """Weights, their rates at the four stages, the weights of a stage, and the neurons'
-    activation."""
+    """Weights, their rates at four stages, a stage's weights, and the neurons' activation."""
 
     weights: np.ndarray
     rates: np.ndarray
@@ -97,8 +96,7 @@ class _Network(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """State, memory, load and weights at the begin of a step, and references and disturbance within
-    it."""
+    """State at the begin of a step, and its references and disturbance."""
 
     state: np.ndarray
     memory: np.ndarray
@@ -109,7 +107,7 @@ class _Kept(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """Last reading, low-passed speed, and by how much angle and speed were misread; (J,) each."""
+    """Last reading, low-passed speed, and the errors of angle and speed; (J,) each."""
 
     angle: np.ndarray
     speed: np.ndarray
@@ -125,8 +123,7 @@ SEEN = typeof(_Seen(*np.zeros((5, 1))))
 
 @njit(**INNER)
 def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
-    """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted``
-    (3, J)."""
+    """Write torque and network output (J,) and the weights' rates (J, m) for ``wanted`` (3, J)."""
     sharpness = 1.0 / (c.width * c.width)
     for j in range(torque.shape[0]):
         q, dq, ddq = wanted[0, j], wanted[1, j], wanted[2, j]
@@ -134,7 +131,7 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
         de = dq - state[DTHETA, j] - seen.speed_error[j]
         r = de + c.error_gain * e
         network[j] = 0.0
-        # |x - c|² multiplied out: a centre has the same coordinate in each of the five directions.
+        # |x - c|² expanded, because a centre has equal coordinates in all five directions.
         sum_of_inputs, sum_of_squares = (
             e + de + q + dq + ddq,
             e * e + de * de + q * q + dq * dq + ddq * ddq,
@@ -152,8 +149,7 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
 
 @njit(cache=True, inline="always")
 def _keeps_going(direction, state):
-    """Tell whether every motor moves in the direction of its friction, or stands where friction
-    holds it."""
+    """Return whether every motor moves in its friction's direction, or is held by friction."""
     agrees = True
     for j in range(direction.shape[0]):
         v = state[DTHETA, j]
@@ -184,12 +180,11 @@ def _keeps_going(direction, state):
 def _step(
     a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
 ):
-    """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin,
-    middle and end.
+    """Advance leg and weights by ``h``; return whether nothing switched.
 
-    Torque and network output at the begin are written to ``torque`` and ``network`` (J,); ``drive``
-    is scratch. Returns True where nothing switched on the way: no joint turned back, no torque
-    reached or left its limit.
+    A switch is a joint that turns, or a torque that reaches or leaves its limit. ``wanted`` (3, 3,
+    J) and ``disturbance`` (3, J) are given at begin, middle and end. Torque and network output at
+    the begin are written to ``torque`` and ``network`` (J,); ``drive`` is scratch.
     """
     _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
     for j in range(a.joints):
@@ -241,8 +236,7 @@ def _copy(state, memory, load, weights, into_state, into_memory, into_load, into
 
 @njit(cache=True, inline="always")
 def _within(wanted, disturbance, begin, length, kept):
-    """Write references and disturbance of a part of a step, in shares of it; parabolas through the
-    three given."""
+    """Write references and disturbance of a part of a step, interpolated by parabolas."""
     for i in range(3):
         x = begin + 0.5 * i * length
         first, middle, last = (1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)
@@ -276,8 +270,7 @@ def _advance(
     drive,
     kept,
 ):
-    """As ``_step``, but a part in which something switches is taken again as two halves, down to a
-    ``PARTS``-th."""
+    """Advance like ``_step``, but halve a part in which something switches, down to ``PARTS``."""
     done, size = 0, PARTS
     while done < PARTS:
         _copy(state, memory, load, net.weights, kept.state, kept.memory, kept.load, kept.weights)
@@ -315,7 +308,7 @@ def _advance(
 
 @njit(**INNER)
 def _look(a, encoder, seen, state, k, period):
-    """Read the encoders at sample ``k``: how far angle and speed are off what they are."""
+    """Read the encoders at sample ``k``, and update the errors of angle and speed."""
     for j in range(a.joints):
         seen.reading[j] = state[THETA, j]
     read_encoders(a, seen.reading)
@@ -354,8 +347,10 @@ def _run(
     kept,
     out,
 ):
-    """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends
-    it."""
+    """Simulate samples into ``out`` (n, 4, J), and return their number.
+
+    A joint that runs away ends the simulation.
+    """
     h = period / substeps
     last = out.shape[0] - 1
     for k in range(out.shape[0]):
@@ -407,19 +402,19 @@ def _run(
 
 
 def _of_floats(controller: RbfController) -> RbfController:
-    """Return a controller as it was compiled for."""
+    """Return a controller with the types that were compiled."""
     values: list[Any] = [value if np.ndim(value) else float(value) for value in controller]
     return RbfController(*values)
 
 
 class RbfRun(NamedTuple):
-    """What a closed loop did, at n samples of J joints."""
+    """A simulated closed loop at n samples of J joints."""
 
     angle: NDArray
-    """(n, J) of the motors, rad."""
+    """(n, J) angle of the motors, rad."""
     speed: NDArray
     torque: NDArray
-    """(n, J) of the drives, N·m, the disturbance not counted."""
+    """(n, J) torque of the drives without the disturbance, N·m."""
     network: NDArray
     """(n, J) N·m."""
 
@@ -434,18 +429,20 @@ def follow_with_rbf(
     start: NDArray,
     substeps: int = 1,
 ) -> RbfRun:
-    """Let a leg follow a reference under the adaptive controller, weights zero and at rest to begin
-    with.
+    """Simulate a leg along a reference under the adaptive controller, from rest with zero weights.
 
     Parameters
     ----------
     a : Assembly
+        Model.
     controller : RbfController
+        Gains and network.
     encoder : Encoder
+        Readings of the angles.
     reference : (2 (n - 1) substeps + 1, 3, J) array
-        Angle, velocity and acceleration wanted, at every half integration step.
+        Reference angle, velocity and acceleration at every half integration step.
     disturbance : (2 (n - 1) substeps + 1, J) array
-        Torque that works against the drives (paper eq. 13), N·m, at every half step.
+        Torque against the drives (paper, eq. 13), N·m, at every half step.
     period : float
         Time between two samples, s.
     start : (J,) array
@@ -456,7 +453,7 @@ def follow_with_rbf(
     Returns
     -------
     RbfRun
-        n samples; fewer, where a joint has left ± one turn on the way: then in the last sample.
+        n samples; fewer if a joint leaves ± one turn, in the last sample.
     """
     n, joints, m = (len(reference) - 1) // (2 * substeps) + 1, a.joints, len(controller.nodes)
     out = np.empty((n, 4, joints))

@@ -1,7 +1,7 @@
-"""A model under recorded torque, from the recorded state, over short windows: how far it strays.
+"""Replay: a model under the recorded torque, from the recorded state, over short windows.
 
-The angle error over a window is what control feels of a wrong model; short windows keep the small
-errors of the recorded state from growing into large ones.
+The angle error over a window is the error of a model as a controller sees it. Short windows keep
+small errors of the recorded state from growing into large ones.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class ReplayResult:
     """Simulated windows of a motion: w windows of n samples, J joints."""
 
     first: NDArray
-    """(w,) sample of the motion at which each window starts."""
+    """(w,) first sample of each window in the motion."""
     angle: NDArray
     """(w, n, J) simulated angle of the motors, rad."""
     velocity: NDArray
@@ -58,24 +58,26 @@ class ReplayResult:
 def replay(
     model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: float = EVERY_S
 ) -> ReplayResult:
-    """Drive a model by the recorded torque from the recorded state, over windows within each
-    segment.
+    """Simulate a model under the recorded torque, from the recorded state, over short windows.
 
-    Windows lie within stretches of valid samples. A torque sample holds from half a sample before
-    its time to half a sample after it, as a mean over that time does.
+    Windows lie within stretches of valid samples. Each torque sample holds from half a sample
+    before its time to half a sample after, like a mean over that time.
 
     Parameters
     ----------
     model : Model
-        Its terms for another kind of run than the motion's are left out.
+        Terms for another kind of run than the motion's are ignored.
     motion : Motion
-    window_s, every_s : float
-        Length of a window and time from one start to the next, s.
+        Recorded motion.
+    window_s : float
+        Length of a window, s.
+    every_s : float
+        Time from the start of one window to that of the next, s.
 
     Raises
     ------
     InputError
-        Where no stretch of valid samples is as long as a window.
+        If no stretch of valid samples is as long as a window.
     """
     length = round(window_s * motion.sample_rate_hz)
     every = max(1, round(every_s * motion.sample_rate_hz))
@@ -130,8 +132,7 @@ def replay(
 
 
 def known_temperature(motion: Motion) -> NDArray:
-    """Return the motors' temperature along a motion, (n, J) °C: the reference where it was not
-    read."""
+    """Return the motors' temperature, (n, J) °C, and the reference where it was not measured."""
     return np.nan_to_num(motion.motor_temperature, nan=REFERENCE_C)
 
 
@@ -146,8 +147,7 @@ def _stretches(motion: Motion) -> Iterator[slice]:
 
 @njit(**INNER)
 def _recall(a, w, s, time, states, load, k, share, memory):
-    """Write the memories' rates a share of the way from sample ``k`` to the next into the first of
-    ``s``."""
+    """Write the memories' rates between samples ``k`` and k + 1 into the first of ``s``."""
     for j in range(a.joints):
         w.passed[j] = load[k, j] + share * (load[k + 1, j] - load[k, j])
         for row in range(4):
@@ -161,8 +161,7 @@ def _recall(a, w, s, time, states, load, k, share, memory):
 
 @njit(**HOT)
 def _remember(a, w, s, time, states, load, temperature, memory):
-    """Write the memories along a recorded stretch (n, 4, J), from rest at its first sample, into
-    ``memory`` (n, m)."""
+    """Write the memories along a recorded stretch (n, 4, J), from rest, into ``memory`` (n, m)."""
     for k in range(len(time) - 1 if memory.shape[1] > 0 else 0):
         for j in range(a.joints):
             a.temperature[j] = temperature[k, j]
@@ -170,7 +169,7 @@ def _remember(a, w, s, time, states, load, temperature, memory):
             memory[k + 1, m] = memory[k, m]
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
         for i in range(MEMORY_SUBSTEPS):
-            # The midpoint rule: half a step for the rate in the middle, a whole one with it.
+            # Midpoint rule: half a step to the middle, then a whole step with the rate there.
             _recall(a, w, s, time, states, load, k, i / MEMORY_SUBSTEPS, memory[k + 1])
             for m in range(memory.shape[1]):
                 s.memory[m] = memory[k + 1, m] + 0.5 * h * s.memory_rates[0, m]
@@ -184,7 +183,7 @@ def _window(a, w, s, time, torque, parts, state, memory, load, out):
     """Simulate one window from ``state`` on into ``out`` (n, 2, J)."""
     _note(state, out[0])
     for k in range(out.shape[0] - 1):
-        # The torque of one sample up to half way to the next, then the next one's.
+        # The torque of a sample holds half way to the next.
         h = 0.5 * (time[k + 1] - time[k]) / parts
         for part in range(2 * parts):
             step(a, w, s, time[k] + part * h, h, state, memory, load, torque[k + part // parts])

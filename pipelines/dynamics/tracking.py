@@ -15,12 +15,12 @@ from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.simulate import SimulateSettings
 
 NODES_REACH = 1.5
-"""The centres lie between minus and plus this, on the diagonal."""
+"""The network's centres lie between plus and minus this value, on the diagonal."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A closed loop at n samples of J joints."""
+    """A simulated closed loop at n samples of J joints."""
 
     time: NDArray
     """(n,) s."""
@@ -29,7 +29,7 @@ class ClosedLoop:
     run: RbfRun
     joints: tuple[Joint, ...]
     asked: int
-    """Samples that were asked for; n is smaller where a joint ran away."""
+    """Number of samples requested; n is smaller if a joint ran away."""
 
     @property
     def error(self) -> NDArray:
@@ -37,15 +37,17 @@ class ClosedLoop:
         return self.reference - self.run.angle
 
     def worst_error(self, after_s: float) -> NDArray:
-        """Return the largest error of each joint after a time, (J,) rad; NaN where a joint ran
-        away."""
+        """Return the largest error of each joint after a time, (J,) rad.
+
+        NaN if a joint ran away.
+        """
         if self.ran_away:
             return np.full(len(self.joints), np.nan)
         return np.abs(self.error[self.time >= after_s]).max(axis=0)
 
     @property
     def ran_away(self) -> str:
-        """Which joint ran away, and when; empty where none did."""
+        """The joint that ran away, and when, in words; empty if none did."""
         if len(self.time) == self.asked:
             return ""
         joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))].name
@@ -70,9 +72,18 @@ def track(
     reference: Trajectory,
     feedback_gain: float | None = None,
 ) -> ClosedLoop:
-    """Let the leg follow a reference from rest, hanging straight down.
+    """Simulate the leg along a reference, from rest, hanging straight down.
 
-    ``feedback_gain`` is Kv in N·m·s/rad, the settings' unless given.
+    Parameters
+    ----------
+    plant : Plant
+        Model to be simulated.
+    settings : SimulateSettings
+        Controller, encoder and duration.
+    reference : Trajectory
+        Angles to be followed.
+    feedback_gain : float, optional
+        Kv in N·m·s/rad; by default that of the settings.
     """
     _refuse_other_joints(reference, plant)
     _refuse_short(reference, settings)
@@ -130,13 +141,13 @@ def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
             for joints in (reference.joints, plant.joints)
         )
         raise InputError(
-            f"the reference moves {given}, expected the model's joints, {expected}; give one for"
-            " these"
+            f"the reference moves {given}, expected the model's joints, {expected}; give a"
+            " reference for these"
         )
 
 
 def _refuse_short(reference: Trajectory, settings: SimulateSettings) -> None:
-    # A sampled motion ends at its last sample; half a step is rounding.
+    # A sampled motion ends at its last sample, so half a step is allowed for rounding.
     if reference.duration_s < settings.duration_s - 0.5 * settings.step_s:
         raise InputError(
             f"the reference lasts {reference.duration_s:g} s, but simulate.duration_s asks for"

@@ -256,7 +256,7 @@ def test_play_of_another_machine_is_not_simulated_with_an_exoskeletons_teeth():
     play = Term(Backlash("arm", on=machine), np.array([0.01]))
     with pytest.raises(
         InputError,
-        match=r"backlash@arm: the teeth that a simulation has are those of an exoskeleton",
+        match=r"backlash@arm: backlash can only be simulated for an exoskeleton's joints",
     ):
         assemble(Model((*terms, play)), Geometry(), ["arm"])
 

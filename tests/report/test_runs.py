@@ -55,11 +55,11 @@ def test_a_model_that_cannot_move_is_said_to_with_the_reason_where_its_numbers_a
 ):
     session = session_with(tmp_path, "backlash", play=0.01)
     assert unmoved(session, RUN).startswith(
-        "backlash at the joint: the teeth that a simulation has are those of an"
+        "backlash at the joint: backlash can only be simulated for an exoskeleton's joints"
     )
     page = report(session)
     assert "With the causes this run could not be simulated" in page
-    assert "too hard for a machine of another size." in page
+    assert "can only be simulated for an exoskeleton" in page
     assert [tile.small for tile in tiles(session) if "simulated" in tile.title] == [
         "without the causes; with them it cannot be simulated"
     ]
