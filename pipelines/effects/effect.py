@@ -570,7 +570,7 @@ class Effect(ABC):
                 temperature[stretch],
                 torque[stretch],
                 np.zeros(len(motion.joints)),
-                np.zeros(self.reading_states),
+                np.zeros((torque.shape[2], self.reading_states)),
                 out[stretch],
             )
         return out

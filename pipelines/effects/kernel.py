@@ -124,7 +124,7 @@ _READ_ALONG = void(
     _table,
     types.Array(float64, 3, "A"),
     vector,
-    vector,
+    _table,
     types.Array(float64, 3, "A"),
 )
 
@@ -263,16 +263,16 @@ def columns_along_with_memory(
 def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
     """Apply a sensor, the kernel at an address, to p torques of one unbroken stretch.
 
-    ``torque`` and ``out`` are (n, J, p) N·m, ``at_once`` is (J,), and ``state`` is the sensor's
-    memory.
+    ``torque`` and ``out`` are (n, J, p) N·m, and ``at_once`` is (J,). ``state`` (p, m) is the
+    sensor's memory for each torque, zero before the first sample.
     """
     kernel = torque_reading_at(where)
-    for i in range(torque.shape[2]):
-        state[:] = 0.0
-        for k in range(torque.shape[0]):
+    # All torques of a sample are next to each other in memory.
+    for k in range(torque.shape[0]):
+        for i in range(torque.shape[2]):
             for j in range(at_once.shape[0]):
                 at_once[j] = torque[k, j, i]
-            kernel(time[k], at_once, values, joint, state, temperature[k])
+            kernel(time[k], at_once, values, joint, state[i], temperature[k])
             for j in range(at_once.shape[0]):
                 out[k, j, i] = at_once[j]
 

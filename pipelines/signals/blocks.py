@@ -82,8 +82,9 @@ class BlockAverage:
             return x[starts]
         total = np.zeros((len(starts), *x.shape[1:]))
         for offset in range(self.decimation):
-            total += x[starts + offset]
-        return total / self.decimation
+            total += np.take(x, starts + offset, axis=0)
+        total /= self.decimation
+        return total
 
     def all(self, x: NDArray, starts: NDArray) -> NDArray:
         """Return whether every sample of each block is true.
