@@ -92,7 +92,7 @@ def test_a_scaled_condition_number_below_the_published_one_is_found(published):
     )
 
 
-def test_log_det_foretells_smaller_errors_of_inertia_than_the_published_excitation(published):
+def test_log_det_predicts_smaller_errors_of_inertia_than_the_published_excitation(published):
     settings = DesignSettings(seed=1)
     before = quality(published, settings, Geometry()).standard_errors
     after = design(settings).quality.standard_errors
@@ -186,7 +186,7 @@ def test_longer_correlation_of_the_noise_means_larger_errors(published):
     assert np.all(errors[0] < errors[1]) and np.all(errors[1] < errors[2])
 
 
-def test_a_leg_that_stands_still_tells_nothing():
+def test_a_leg_at_rest_identifies_nothing():
     still = FourierTrajectory(np.array([0.5, -1.0]), np.zeros((2, 1)), np.zeros((2, 1)), 1.0)
     found = quality(still, DesignSettings(), Geometry())
     assert found.condition > 1e12

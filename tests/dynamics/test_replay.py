@@ -71,7 +71,7 @@ def test_terms_of_another_kind_of_run_are_left_out(leg, recorded):
     assert_allclose(replay(more, recorded).rmse, replay(leg, recorded).rmse)
 
 
-def test_a_recording_shorter_than_a_window_is_told(leg, recorded):
+def test_a_recording_shorter_than_a_window_is_refused(leg, recorded):
     with pytest.raises(InputError) as caught:
         replay(leg, recorded, window_s=60.0)
     assert (

@@ -43,7 +43,7 @@ def test_a_ripple_is_the_sum_of_its_lines(two_lines, with_human):
     assert_allclose(columns @ two_lines.linear, torque, atol=1e-12)
 
 
-def test_values_tell_how_many_lines_there_are_and_one_line_is_as_before():
+def test_names_of_values_determine_the_number_of_lines():
     one = term_from(Cogging("knee"), {k: v for k, v in TWO.items() if not k.endswith("_2")})
     assert one.effect == Cogging("knee") and len(one.values) == 3
     assert [p.name for p in one.effect.parameters] == ["amplitude", "cycles_per_turn", "phase"]
@@ -53,7 +53,7 @@ def test_values_tell_how_many_lines_there_are_and_one_line_is_as_before():
 
 
 @pytest.mark.parametrize("name", ["amplitude_5", "amplitude_1", "phase_2"])
-def test_a_line_that_there_cannot_be_or_that_is_told_by_half_is_refused(name):
+def test_an_unknown_or_incomplete_line_is_refused(name):
     values = {k: v for k, v in TWO.items() if not k.endswith("_2")} | {name: 0.3}
     with pytest.raises(InputError, match=r"cogging@knee has values amplitude, .* expected"):
         term_from(Cogging("knee"), values)

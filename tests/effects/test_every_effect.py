@@ -171,7 +171,7 @@ def test_the_corrected_angle_is_the_one_before_the_encoder(term, with_human):
 
 
 @every(t for t in TERMS if t.effect.torque_reading)
-def test_what_the_drives_delivered_can_be_told_from_what_was_measured(term, with_human):
+def test_delivered_torque_follows_from_measured_torque(term, with_human):
     body = Model((BODY, *FRICTION[1:]))
     model = Model((*body.terms, term))
     true, measured = body.torque(with_human), model.torque(with_human)
@@ -234,7 +234,7 @@ def test_a_delay_is_a_shift_in_time(with_human):
     assert_allclose(observed[10:], np.sin(3.0 * (with_human.time[10:] - 0.0175)), atol=1e-4)
 
 
-def test_a_delay_starts_anew_after_a_gap(with_human):
+def test_a_delay_starts_again_after_a_gap(with_human):
     (late,) = (t for t in TERMS if t.effect.label == "time_delay@hip")
     halves = replace(with_human, segment=(np.arange(len(with_human)) >= 1000).astype(np.int64))
     steps = np.where(halves.segment == 0, -5.0, 5.0)[:, np.newaxis, np.newaxis] * np.ones((1, 2, 1))
@@ -271,7 +271,7 @@ def test_a_payload_is_a_point_mass(with_human):
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_how_to_make_sure_of_it_is_told_in_no_unit_of_one_kind_and_size_of_machine(effect):
+def test_confirm_holds_no_unit_of_one_kind_or_size_of_machine(effect):
     assert not re.search(r"\brad|\bN·m", effect.confirm)
 
 

@@ -57,7 +57,7 @@ def test_a_parameter_too_few_is_refused_with_the_names_that_belong_there():
         model_from_parameters(frame[frame["name"] != "rest_angle"], "with_human")
 
 
-def test_a_mistyped_parameter_is_told_what_it_may_be():
+def test_a_mistyped_parameter_is_refused_with_the_nearest_name():
     (spring,) = (t for t in TERMS if t.effect.label == "parallel_spring@knee")
     frame = table(spring).replace({"name": {"stiffness": "stifness"}})
     with pytest.raises(

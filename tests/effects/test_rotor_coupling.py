@@ -60,7 +60,7 @@ def test_a_leg_with_a_carried_rotor_moves_as_its_energy_says():
     assert np.abs(without - truth).max() > 0.01
 
 
-def test_no_motion_tells_the_coupling_from_x2_and_the_rotors_own_inertia(with_human):
+def test_no_motion_separates_the_coupling_from_x2_and_the_rotors_own_inertia(with_human):
     c = RATIO * ROTOR
     apart = model(RATIO**2 * ROTOR, c).torque(with_human)
     taken_up = model(RATIO**2 * ROTOR - c, 0.0, (X1 + ROTOR, X2 + c, X3, X4)).torque(with_human)

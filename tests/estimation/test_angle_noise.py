@@ -72,7 +72,7 @@ def test_no_cause_is_named_for_what_shaking_encoders_do_and_the_reader_is_warned
     assert any("the angles are mostly noise" in caveat for caveat in verdict(found)["caveats"])
 
 
-def test_a_machine_that_a_fit_takes_for_too_light_is_told_with_what_to_do(shaken):
+def test_underestimated_inertia_is_reported_with_a_remedy(shaken):
     found = identify(shaken)
     assert "set filter.cutoff_hz = 5" in found.angle_noise[0]
     truth = identify(session()[:2])

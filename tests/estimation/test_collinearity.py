@@ -8,7 +8,7 @@ def gram(*columns):
     return A.T @ A
 
 
-def test_a_spring_and_inertia_on_one_sine_cannot_be_told_apart():
+def test_a_spring_and_inertia_on_one_sine_are_collinear():
     """On q = sin wt the acceleration is -w² q: the published hip trajectory's trouble."""
     t = np.linspace(0, 10, 2001)
     w = 2 * np.pi / 10
@@ -29,7 +29,7 @@ def test_units_do_not_make_a_collinearity():
     assert collinearities(gram(1e6 * np.sin(t), 1e-6 * np.cos(t)), ["a", "b"]) == []
 
 
-def test_what_is_told_of_some_parameters_with_others_unknown_is_the_inverse_of_their_covariance():
+def test_information_with_other_parameters_unknown_is_the_inverse_of_the_covariance():
     whole = gram(*np.random.default_rng(3).normal(size=(5, 200)))
     kept, others = [0, 2, 4], np.array([1, 3])
     covariance = np.linalg.inv(whole)[np.ix_(kept, kept)]

@@ -162,7 +162,7 @@ def test_good_angles_are_called_noisy_at_the_nominal_rate():
     assert 0.14 < np.mean(p < 0.2) < 0.27
 
 
-def test_drives_that_tell_nothing_are_replaced_by_a_model_based_loop(noisy):
+def test_unknown_drives_are_replaced_by_a_model_based_loop(noisy):
     silent = problem(
         *(replace(run, metadata={**run.metadata, "controller": {}}) for run in noisy.training.runs)
     )
@@ -190,7 +190,7 @@ def test_set_points_that_come_seldom_are_joined_by_lines(clean):
     assert np.all(np.abs(thinned.values - often.values) < 0.1 * error(often))
 
 
-def test_a_method_that_does_not_exist_is_told_with_the_nearest_that_does():
+def test_an_unknown_method_is_refused_with_the_nearest_name():
     with pytest.raises(
         InputError,
         match="there is no method 'instrumental_variable'; did you mean instrumental_variab",

@@ -83,7 +83,7 @@ def test_realizable_means_a_positive_mass_matrix_at_every_knee_angle():
     assert verdicts == {True, False}
 
 
-def test_unrealizable_parameters_are_told_with_their_numbers():
+def test_unrealizable_parameters_are_reported_with_their_numbers():
     assert LEG.unrealizable(np.array([2.0, 1.0, 4.0, 5.0]), GEOMETRY) == [
         "X2 (X1 - X2) = 1 is not above (L1 X3)² = 2.428 kg²·m⁴: the mass matrix is not positive"
         " definite"

@@ -210,7 +210,7 @@ def test_without_its_file_it_is_refused_with_what_there_is(
     )
 
 
-def test_two_mechanisms_that_no_recording_could_tell_apart_are_refused(
+def test_two_mechanisms_with_equal_joints_and_gravity_are_refused(
     exoid_with_it, recordings, tmp_path
 ):
     other = STAGE.replace('name="stage"', 'name="table"').replace(

@@ -55,7 +55,7 @@ def test_the_parts_of_a_mechanism_add_up_to_its_regressor(mechanism):
 
 
 @every
-def test_the_least_inertia_is_above_nought_exactly_where_a_machine_can_be_real(mechanism):
+def test_the_least_inertia_is_positive_exactly_if_a_machine_can_exist(mechanism):
     draw, real = np.random.default_rng(8), {True: 0, False: 0}
     for X in draw.uniform(-0.5, 3.0, (200, len(mechanism.parameters))):
         least, largest, slope = mechanism.least_inertia(X, EARTH)
@@ -117,7 +117,7 @@ def test_a_mechanism_that_is_not_known_is_refused_with_what_there_is():
 
 
 @every
-def test_what_cannot_exist_is_told_and_what_can_is_not(mechanism):
+def test_only_machines_that_cannot_exist_are_reported(mechanism):
     X = np.array([2.0, 0.5, 0.1, 1.0])[: len(mechanism.parameters)]
     assert mechanism.unrealizable(X, EARTH) == []
     assert "is not positive" in mechanism.unrealizable(-X, EARTH)[0]

@@ -26,7 +26,7 @@ def test_a_parameter_that_differs_has_a_column_in_each_run_with_its_term(layout)
     assert [list(push.places(run)) for run in range(3)] == [[-1] * 3, [16, 17, 18], [19, 20, 21]]
 
 
-def test_of_a_run_that_was_not_fitted_only_shared_columns_tell(layout):
+def test_a_run_that_was_not_fitted_has_shared_columns_only(layout):
     assert list(layout.terms[-2].places(None)) == [12, -1]
     values = np.arange(22.0)
     assert_array_equal(layout.select(values, None)[-5:], [12.0, 0.0, 0.0, 0.0, 0.0])

@@ -70,7 +70,7 @@ def test_the_noisier_joint_decides():
     assert coarse_hip.hz == pytest.approx(alone.hz, rel=0.3)
 
 
-def test_a_fast_joint_keeps_its_motion_beside_a_slow_one():
+def test_a_fast_joint_keeps_its_motion_next_to_a_slow_one():
     noise = 1e-3 * np.random.default_rng(0).standard_normal((len(TIME), 2))
     chosen = choose_cutoff(
         np.column_stack([moving(5, 0.1), moving(5, 1.0)]) + noise, RATE_HZ, ("hip", "knee")

@@ -28,7 +28,7 @@ def test_readings_themselves_are_left_alone():
     assert between_readings(WAVE, 20) is WAVE
 
 
-def test_nothing_is_made_up_between_readings_too_far_apart_nor_beside_them_all():
+def test_nothing_is_interpolated_across_long_intervals_or_beyond_the_readings():
     x = read_every(4)
     x[1000:1021] = np.nan
     made = between_readings(x, 20)
@@ -44,7 +44,7 @@ def test_a_channel_that_stands_still_does_so_between_its_readings_too():
     assert np.ptp(between_readings(x, 20)[:97]) == 0.0
 
 
-def test_one_reading_tells_nothing_of_any_other_moment():
+def test_one_reading_is_not_extrapolated():
     x = np.full((100, 1), np.nan)
     x[50] = 1.0
     assert_array_equal(between_readings(x, 20), x)
