@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipelines.contracts import PARAMETERS, Joint, joints_of
+from pipelines.contracts import Joint, joints_of
 from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.mobility import masses
@@ -131,8 +131,3 @@ def plant_from_table(
         model_from_parameters(table.frame, run, machine).for_run(run), table, recording
     )
     return replace(make_plant(model, geometry, joints, run), guesses=guesses)
-
-
-def read_plant(path: Path | str, run: str, default_geometry: Geometry | None = None) -> Plant:
-    """Return the plant in a ``parameters/1`` file."""
-    return plant_from_table(PARAMETERS.read(path), run, default_geometry)

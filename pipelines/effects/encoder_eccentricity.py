@@ -106,7 +106,8 @@ class EncoderEccentricity(Effect):
         jacobian = np.zeros((4, 4))
         for k in (0, 2):
             sine, cosine = values[k : k + 2]
-            if (amplitude := np.hypot(sine, cosine)) > 0.0:
+            amplitude = np.hypot(sine, cosine)
+            if amplitude > 0.0:
                 jacobian[k, k : k + 2] = sine / amplitude, cosine / amplitude
                 jacobian[k + 1, k : k + 2] = -cosine / amplitude**2, sine / amplitude**2
         return jacobian

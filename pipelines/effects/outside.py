@@ -63,9 +63,9 @@ def _loaded(entry: EntryPoint) -> type[Effect]:
     return effect
 
 
-def _broken(entry: EntryPoint, what: str, remedy: str) -> InputError:
+def _broken(entry: EntryPoint, reason: str, remedy: str) -> InputError:
     package = entry.dist.name if entry.dist else "an unknown package"
     return InputError(
-        f"effect {entry.name} ({entry.value}) of package {package} cannot be used: {what};"
+        f"effect {entry.name} ({entry.value}) of package {package} cannot be used: {reason};"
         f" {remedy}, or uninstall {package}"
     )

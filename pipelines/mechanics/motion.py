@@ -229,7 +229,7 @@ class Motion:
     def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
         """Return the run with the loads of rigid bodies.
 
-        Measured torques would not do: their noise would be on both sides of a regression.
+        Loads from measured torques would bring their noise to both sides of a regression.
 
         Parameters
         ----------

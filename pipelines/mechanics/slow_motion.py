@@ -47,7 +47,7 @@ def filtered(motion: Motion, x: NDArray, cutoff_hz: float) -> NDArray:
 
 
 def below(motion: Motion, cutoff_hz: float) -> Motion:
-    """Return what a motion holds below a cut-off; it must have been faster."""
+    """Return the part of a motion below a cut-off, which must be lower than the motion's own."""
     rate = motion.sample_rate_hz
     q, dq, ddq = filtered(motion, motion.q, cutoff_hz), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():

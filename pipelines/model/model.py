@@ -255,9 +255,8 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
         if name not in values and parameter.default is None
     ]
     if missing or not set(values) <= set(known):
-        meant = [
-            near for name in values if name not in known and (near := closest(name, list(known)))
-        ]
+        unknown = [name for name in values if name not in known]
+        meant = list(filter(None, (closest(name, list(known)) for name in unknown)))
         raise InputError(
             f"{effect.label} has values {', '.join(values) or 'none'}, expected"
             f" {', '.join(known)}; "

@@ -56,7 +56,8 @@ def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Te
         If an effect or a joint is unknown, or if values are missing or occur twice.
     """
     rest = frame[frame["effect"] != RigidBody.name]
-    if (twice := rest[["effect", "joint", "run", "name"]].duplicated()).any():
+    twice = rest[["effect", "joint", "run", "name"]].duplicated()
+    if twice.any():
         row = rest[twice].iloc[0]
         raise InputError(
             f"the parameters table: row {row.name} repeats {row['name']} of {row['effect']},"
