@@ -29,10 +29,8 @@ NOT_YET: dict[str, int] = {
     "pipelines/contracts": 1,
     "pipelines/export": 12,
     "pipelines/identification": 18,
-    "pipelines/modbus": 1,
     "pipelines/plotting": 1,
     "pipelines/report": 50,
-    "pipelines/rig": 25,
     "pipelines/simulation": 7,
     "pipelines/wording": 6,
 }
