@@ -52,7 +52,7 @@ def stages(start: str) -> Iterator[str]:
 
 def figures(context: typer.Context, start: str) -> Iterator[str]:
     """Yield the names of the figures of the folders that were named, or of the current one."""
-    from pipelines.report.figures import figures as figures_of
+    from pipelines.report.figure_files import figures as figures_of
     from pipelines.report.session import find
 
     with suppress(ExoidError):

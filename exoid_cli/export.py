@@ -74,7 +74,7 @@ def export(
     _report(model_to_write, chosen, list(files))
 
 
-def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
+def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
     """Return the file to write: ``output``, a file in that folder, or one next to the model."""
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS
@@ -95,7 +95,7 @@ def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
     return path
 
 
-def _texts(exported: "Exported", chosen: "Format", path: Path) -> dict[Path, str]:
+def _texts(exported: "Exported", chosen: "Format[Exported]", path: Path) -> dict[Path, str]:
     """Return what goes into each file; the main one is ``path``, whatever its suffix."""
     files = {
         path.with_suffix(suffix): text for suffix, text in chosen.write(exported, path.stem).items()
@@ -105,7 +105,7 @@ def _texts(exported: "Exported", chosen: "Format", path: Path) -> dict[Path, str
     return files
 
 
-def _report(exported: "Exported", chosen: "Format", files: list[Path]) -> None:
+def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path]) -> None:
     from pipelines.export import Degree
     from pipelines.export.exported import values_in_words
 

@@ -34,8 +34,8 @@ def figures(
     """
     from pipelines.contracts.atomic import open_folder
     from pipelines.errors import InputError
-    from pipelines.report.figures import draw
-    from pipelines.report.figures import figures as figures_of
+    from pipelines.report.figure_files import draw
+    from pipelines.report.figure_files import figures as figures_of
     from pipelines.report.session import find
     from pipelines.validation.suggestion import suggestion
 

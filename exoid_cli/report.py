@@ -48,7 +48,7 @@ def report(
     """
     from pipelines.contracts.atomic import write_text
     from pipelines.errors import SettingsError
-    from pipelines.report.report import report as page_of
+    from pipelines.report.html.report import report as page_of
     from pipelines.report.session import find
 
     if output.is_dir():
@@ -82,7 +82,7 @@ def warn_of_unreadable(session: "Session") -> None:
 
 def _compare(folders: tuple[Path, Path], output: Path) -> None:
     from pipelines.contracts.atomic import write_text
-    from pipelines.report.compare import compare, titles_of
+    from pipelines.report.html.compare import compare, titles_of
     from pipelines.report.session import find
 
     first, second = (find([folder]) for folder in folders)

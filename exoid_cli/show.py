@@ -86,7 +86,7 @@ def _show_content(inspection: "Inspection") -> bool:
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     """Print the decision on each of the first candidates, and its reason."""
-    from pipelines.report.sections.error_budget import any_label_in_words, labels_in_words
+    from pipelines.wording.causes import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:FIRST]:

@@ -14,7 +14,7 @@ from matplotlib.image import imread, imsave
 from numpy import concatenate, ones
 from playwright.sync_api import Browser, sync_playwright
 
-from pipelines.report.report import report
+from pipelines.report.html.report import report
 from pipelines.report.session import find
 
 IMAGES = Path(__file__).parents[1] / "images"

@@ -1,4 +1,4 @@
-"""Identified models in the forms that other tools read; one file a format."""
+"""Export of identified models to the formats of other tools, one file per format."""
 
 from pipelines.export.c import C
 from pipelines.export.exported import Exported, exported
@@ -8,6 +8,6 @@ from pipelines.export.matlab import MATLAB
 from pipelines.export.mjcf import MJCF
 from pipelines.export.urdf import URDF
 
-FORMATS: tuple[Format, ...] = (MJCF, URDF, JSON, MATLAB, C)
+FORMATS: tuple[Format[Exported], ...] = (MJCF, URDF, JSON, MATLAB, C)
 
 __all__ = ["FORMATS", "Degree", "Exported", "Format", "Holding", "exported"]

@@ -1,21 +1,20 @@
-"""Bodies that move as the identified machine does: masses chosen, everything that was identified
-kept.
+"""Bodies with the identified dynamics: masses are chosen, identified parameters are kept.
 
 Torques at the joints of a leg determine X1 to X4 (and moments across the segments), not the mass,
-centre and inertia of each segment: a mass can go from the shank to the thigh's lower end unnoticed.
-Simulators ask for all of these. With m the masses, c the centres along and a across the segments, I
-the inertias about the centres,
+centre and inertia of each segment: a mass moved from the shank to the thigh's lower end changes no
+torque. Simulators need all of these. With m the masses, c the centres along and a across the
+segments, I the inertias about the centres,
 
     X2 = m2 (c2² + a2²) + I2,  X3 = m2 c2,  X4 = m1 c1 + m2 L1,
     X1 = m1 (c1² + a1²) + I1 + m2 L1² + X2
 
 is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X2) / L1² and m1 is
-large enough; there is such an m2 exactly where the mass matrix is positive definite. Here m2 is the
-middle of that range, and m1 twice the least it may be, but no less than m2: a nominal leg, whose X
-are the identified ones to rounding.
+large enough; such an m2 exists if and only if the mass matrix is positive definite. Here m2 is the
+middle of that range, and m1 twice its minimum, but at least m2: a nominal leg, whose X are the
+identified ones up to rounding.
 
-A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be, or 1 kg
-if that is more. What slides weighs X1.
+A single joint's body has inertia X1 about the axis; a pendulum's mass is twice its minimum, or 1 kg
+if that is more. A slide has mass X1.
 """
 
 from collections.abc import Callable
@@ -34,7 +33,7 @@ from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTAB
 Vector = tuple[float, float, float]
 
 SWINGS_FORWARD: Vector = (0.0, -1.0, 0.0)
-"""Axis about which a positive angle swings what hangs down forward: x is forward, z up."""
+"""Axis about which a positive angle swings a hanging body forward: x is forward, z up."""
 
 HANGS: Vector = (0.0, 0.0, -1.0)
 LIES_FORWARD: Vector = (1.0, 0.0, 0.0)
@@ -42,7 +41,7 @@ RISES: Vector = (0.0, 0.0, 1.0)
 SLIDES_FORWARD: Vector = (1.0, 0.0, 0.0)
 
 NOMINAL_MASS = 1.0
-"""kg, where a body may have any."""
+"""Mass of a body whose dynamics do not depend on it, kg."""
 
 
 @dataclass(frozen=True)
@@ -52,31 +51,34 @@ class Body:
     joint: Joint
     mass: float
     inertia: float
-    """About the centre of mass, kg·m²; about every axis: those across the plane of motion do not
-    show, and three equal ones keep the triangle inequality that simulators check."""
+    """About every axis through the centre of mass, kg·m².
+
+    Only the axis normal to the plane of motion matters; three equal values satisfy the triangle
+    inequality that simulators check.
+    """
     across: float = 0.0
-    """Of the centre of mass, m, to where a positive angle takes the body."""
+    """Position of the centre of mass across the body, in the direction of positive angles, m."""
     along: float = 0.0
-    """Of the centre of mass, m."""
+    """Position of the centre of mass along the body, m."""
     axis: Vector = SWINGS_FORWARD
     lies: Vector = HANGS
     """Direction from the joint along the body, at angle zero."""
     beyond: float = 0.0
-    """From the joint before, along the body before, m."""
+    """Distance from the previous joint along the previous body, m."""
     shift: float = 0.0
-    """By how much its encoder's angle is more than its own."""
+    """Encoder's angle less the joint's own."""
     carried: float = 0.0
-    """Share of its weight that a counterweight carries."""
+    """Share of its weight that a counterweight balances."""
 
     @property
     def centre(self) -> NDArray:
-        """Of mass, (3,) m."""
-        # No -0.
+        """Centre of mass, (3,) m."""
+        # Adding zero turns -0 into 0.
         return self.across * np.cross(self.axis, self.lies) + self.along * np.array(self.lies) + 0.0
 
     @property
     def place(self) -> NDArray:
-        """Of its joint in the frame of the one before, (3,) m."""
+        """Position of its joint in the previous joint's frame, (3,) m."""
         return self.beyond * np.array(self.lies) + 0.0
 
 
@@ -86,14 +88,14 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     Raises
     ------
     InputError
-        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia
-        alone. And where it is not known how a mechanism's bodies are chosen.
+        If no bodies have such X, because only rotor inertia makes the mass matrix positive
+        definite; or if the mechanism has no rule for its bodies.
     """
     mechanism = exported.machine.mechanism
     if mechanism not in BODIES_OF:
         raise InputError(
-            f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose"
-            " masses for; export to c, matlab or json, which need no bodies"
+            f"{mechanism.name} ({mechanism.joints_in_words}) has no rule for its bodies' masses."
+            " Export to c, matlab or json, which need no bodies"
         )
     return BODIES_OF[exported.machine.mechanism](exported)
 
@@ -114,8 +116,7 @@ def _level_leg(exported: Exported) -> tuple[Body, ...]:
 def _in_series(
     exported: Exported, X1: float, X2: float, X3: float, X4: float | None
 ) -> tuple[Body, ...]:
-    """Return two links; without an X4, which nothing shows where gravity does not act, what the
-    second makes of it."""
+    """Return two links; without X4 (no gravity) the first link's centre is on its axis."""
     hip, knee = exported.joints
     across = [_moment_across(exported, joint) for joint in (hip, knee)]
     length, shift = exported.geometry.thigh_length_m, exported.shift()
@@ -124,11 +125,12 @@ def _in_series(
         raise InputError(
             f"no two bodies have the rigid body of {exported.run}: X2 = {X2:.4g} kg·m², X2 (X1 -"
             f" X2) = {X2 * (X1 - X2):.4g}, expected above (L1 X3)² = {(length * of_shank) ** 2:.4g}"
-            " kg²·m⁴; identify again from motions that separate X1, X2 and X3 better, or export to"
+            " kg²·m⁴. Identify again from motions that separate X1, X2 and X3 better, or export to"
             " c, matlab or json, which need no bodies"
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
-    inertia, along = X1 - X2 - m2 * length**2, 0.0 if X4 is None else X4 - m2 * length
+    inertia = X1 - X2 - m2 * length**2
+    along = 0.0 if X4 is None else X4 - m2 * length
     of_thigh = np.hypot(along, across[0])
     m1 = max(2.0 * of_thigh**2 / inertia, m2)
     thigh = Body(hip, m1, inertia - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
@@ -163,7 +165,7 @@ def _slide(exported: Exported) -> tuple[Body, ...]:
 
 
 def _cube(mass: float) -> float:
-    """Return the inertia of a cube of 0.1 m; what slides does not show its own."""
+    """Return the inertia of a cube of 0.1 m, which no motion of a slide depends on."""
     return mass * 0.1**2 / 6.0
 
 
@@ -180,4 +182,4 @@ BODIES_OF: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
     LIFT: _lift,
     SLIDE: _slide,
 }
-"""How each mechanism's bodies are chosen."""
+"""Functions that return each mechanism's bodies."""

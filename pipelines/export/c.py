@@ -12,8 +12,8 @@ LANGUAGE = Language(
     element=lambda name, index: f"{name.replace('.', '->')}[{index}]",
     power=lambda base, exponent: f"pow({base}, {exponent})",
     unequal="!=",
-    choice=lambda question, yes, no: [
-        f"if ({question}) {{",
+    branch=lambda condition, yes, no: [
+        f"if ({condition}) {{",
         *_indented(yes),
         *(["} else {", *_indented(no)] if no else []),
         "}",
@@ -32,9 +32,9 @@ extern "C" {{
 #define {NAME}_JOINTS {joints}
 #define {NAME}_MEMORY {room} {memory_comment}
 
-/* Torque that the drives must deliver. t: seconds since the run began; q, dq, ddq: angles as
- * the encoders give them, their rates, SI units; memory: {NAME}_MEMORY numbers, 0 to begin with.
- * Friction that depends on the load makes it other than affine in ddq. */
+/* Torque that the drives must deliver. t: seconds since the start of the run; q, dq, ddq: encoder
+ * angles and their rates, SI units; memory: {NAME}_MEMORY numbers, initially 0.
+ * Load-dependent friction makes it nonlinear in ddq. */
 void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}],
                              const double ddq[{joints}], const double memory[{room}],
                              double tau[{joints}]);
@@ -43,14 +43,14 @@ void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq
 void {name}_bias(double t, const double q[{joints}], const double dq[{joints}],
                  const double memory[{room}], double tau[{joints}]);
 
-/* Mass matrix, rotors included. */
+/* Mass matrix with rotors. */
 void {name}_mass_matrix(double t, const double q[{joints}], double M[{joints}][{joints}]);
 
-/* Rate of the memory, for whoever integrates it. */
+/* Rate of the memory, to be integrated by the caller. */
 void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}],
                         const double memory[{room}], double rate[{room}]);
 
-/* What the torque channels say where the drives deliver tau; in place. */
+/* Reading of the torque channels at drive torque tau; in place. */
 void {name}_torque_reading(double t, double tau[{joints}]);
 
 #ifdef __cplusplus
@@ -159,7 +159,7 @@ void {name}_torque_reading(double t, double tau[{joints}]) {{
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return header and source; their functions begin with the file's name."""
+    """Return header and source; their functions start with the file's name."""
     model, name = equations(exported), function_name(stem, ".c")
     joints = len(model.joints)
     of_memory = ", ".join(dict.fromkeys(model.memory_of))
@@ -171,7 +171,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         "joints": joints,
         "room": max(1, model.memories),
         "memory_comment": comment(
-            [f"memory of {of_memory}" if of_memory else "no effect here has one; pass any number"]
+            [f"memory of {of_memory}" if of_memory else "no effect has memory; pass any number"]
         ),
         "constants": "\n".join(
             _constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in model.used
@@ -194,18 +194,18 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def order_of(model: Equations) -> list[str]:
-    """Say which joint stands where."""
+    """Return the index, name and kind of each joint."""
     return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
 
 
 def comment(lines: Iterable[str]) -> str:
-    """Return a comment that nothing in it can end."""
+    """Return a comment that no text in it can end."""
     safe = [one_line(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "/* " + "\n".join(safe).replace("\n", "\n * ").replace(" \n", "\n") + " */"
 
 
-def _constant(name: str, value: float, says: str) -> str:
-    return f"static const double {name} = {value!r}; {comment([says])}"
+def _constant(name: str, value: float, meaning: str) -> str:
+    return f"static const double {name} = {value!r}; {comment([meaning])}"
 
 
 def _array(values: Iterable[float]) -> str:
@@ -214,14 +214,14 @@ def _array(values: Iterable[float]) -> str:
 
 def _group(name: str, group: list[Equation]) -> str:
     lines = [line for e in group for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
-    nothing = [] if group else ["    (void)at;", "    (void)tau;"]
+    unused = [] if group else ["    (void)at;", "    (void)tau;"]
     return "\n".join(
-        [f"static void {name}(const struct instant *at, double *tau) {{", *nothing, *lines, "}"]
+        [f"static void {name}(const struct instant *at, double *tau) {{", *unused, *lines, "}"]
     )
 
 
 def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return _indented([comment([f"{equation.label}: {equation.says}"]), *statements])
+    return _indented([comment([f"{equation.label}: {equation.text}"]), *statements])
 
 
 def _indented(lines: Iterable[str]) -> list[str]:

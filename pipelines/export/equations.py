@@ -1,8 +1,7 @@
-"""The equations of a model, written out: what the C and the MATLAB file hold.
+"""The equations of a model, for the C and the MATLAB file.
 
-The terms stand in the four groups of ``pipelines.dynamics``: on links and inertial, on links, on
-drives and inertial, on drives. Drives feel the torque that is passed on to the links as their
-``load``.
+The terms form the four groups of ``pipelines.dynamics``: on links and inertial, on links, on drives
+and inertial, on drives. The torque of the links is the ``load`` of the drives.
 """
 
 from dataclasses import dataclass, replace
@@ -24,19 +23,19 @@ from pipelines.export.formula import (
     arrays_in,
     constant,
     constants_in,
-    written,
+    outcome_of,
 )
 from pipelines.export.language import identifier, unique
 from pipelines.model import Term
 
 TEMPERATURE = "at.temperature"
-"""What no written file is given."""
+"""An input that no exported file has."""
 
 GROUPS = ("link_inertia", "link_torque", "drive_inertia", "drive_torque")
-"""Functions of a written file, in the order in which they are called."""
+"""Functions of an exported file, in the order of their calls."""
 
 GEOMETRY = ("thigh_length", "gravity")
-"""What kernels receive as ``geometry``."""
+"""The values of a kernel's argument ``geometry``."""
 
 RESERVED = (
     *GROUPS,
@@ -56,7 +55,7 @@ RESERVED = (
     "memory_rate",
     "torque_reading",
 )
-"""Names that a written file has for itself."""
+"""Names that an exported file uses itself."""
 
 
 @dataclass(frozen=True)
@@ -71,19 +70,18 @@ class Constant:
 
 @dataclass(frozen=True)
 class Equation:
-    """What a term adds to the torques, or the rate of its memory, or what a sensor makes of the
-    torques."""
+    """The torque of a term, the rate of its memory, or a sensor's reading of the torques."""
 
     label: str
-    says: str
+    text: str
     outcome: list | Branch
     first: int = 0
-    """Of the elements that it is about, the first one's place."""
+    """Index of its first element."""
 
 
 @dataclass(frozen=True)
 class Equations:
-    """A whole model, written out."""
+    """The equations of a whole model."""
 
     joints: tuple[Joint, ...]
     constants: tuple[Constant, ...]
@@ -93,42 +91,40 @@ class Equations:
     memories: int
     memory_of: tuple[str, ...]
     sensor_shift: tuple[float, ...]
-    """By how much encoders are off the motors' angles, rad."""
+    """Encoders' angles less the motors', rad."""
     link_shift: tuple[float, ...]
-    """By how much the motors' angles are off those that gravity and springs know, rad."""
+    """Motors' angles less the links', on which gravity and springs depend, rad."""
 
     @property
     def used(self) -> list[Constant]:
-        """The constants that stand in an equation; some have only decided which one is written."""
-        written_out = [
-            e.outcome for e in (*chain(*self.groups.values()), *self.rates, *self.readings)
-        ]
-        known = set(constants_in(written_out))
-        return [c for c in self.constants if c.name in known]
+        """The constants in the equations; others only selected a branch."""
+        every = (*chain(*self.groups.values()), *self.rates, *self.readings)
+        names = set(constants_in([equation.outcome for equation in every]))
+        return [c for c in self.constants if c.name in names]
 
 
 def holding(term: Term) -> Holding:
-    """Return what becomes of a term where equations are written out."""
+    """Return how a file of equations holds a term."""
     effect = term.effect
     if effect.spring is not None:
         return left_out("it needs a second coordinate at the joint, which is rigid here")
     if effect.reading_states:
         return left_out("it needs the torques of the past")
     if effect.reading is not None:
-        is_shift = shift_of(term) is not None
-        return (
-            exact("a constant between angles")
-            if is_shift
-            else left_out("its reading is more than a shift")
-        )
+        if shift_of(term) is None:
+            return left_out("its reading is more than a shift")
+        return exact("a constant between angles")
+    kernels = (effect.reaction, effect.derivative, effect.torque_reading)
     try:
-        for kernel in (effect.reaction, effect.derivative, effect.torque_reading):
-            if kernel is not None and TEMPERATURE in arrays_in(
-                _outcome(term, kernel, list(term.values), "at.q", 0)
-            ):
-                return left_out("it needs the motor's temperature")
+        outcomes = [
+            _outcome(term, kernel, list(term.values), "at.q", 0)
+            for kernel in kernels
+            if kernel is not None
+        ]
     except NotWritable as error:
         return left_out(str(error))
+    if TEMPERATURE in arrays_in(outcomes):
+        return left_out("it needs the motor's temperature")
     if effect.torque_reading is not None:
         return exact("torque_reading")
     return exact(
@@ -137,14 +133,14 @@ def holding(term: Term) -> Holding:
 
 
 def equations(exported: Exported) -> Equations:
-    """Write a model out."""
-    held = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
-    named = [(term, parameter) for term in held for parameter in term.effect.fitted]
+    """Return the equations of a model."""
+    terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
+    named = [(term, parameter) for term in terms for parameter in term.effect.fitted]
     names = unique((_constant_name(term.effect, parameter) for term, parameter in named), RESERVED)
     constants = [
         Constant(name, float(value), parameter.unit, f"{term.effect.label}: {parameter.meaning}")
         for name, (term, parameter), value in zip(
-            names, named, np.concatenate([term.values for term in held]), strict=True
+            names, named, np.concatenate([term.values for term in terms]), strict=True
         )
     ]
     shape = zip(
@@ -168,11 +164,11 @@ def equations(exported: Exported) -> Equations:
     )
     memory_of: list[str] = []
     at = 0
-    for term in held:
+    for term in terms:
         count = len(term.effect.fitted)
         values = [constant(c.name, c.value) for c in constants[at : at + count]]
         at += count
-        _write(model, term, values, len(memory_of))
+        _add_equations(model, term, values, len(memory_of))
         memory_of += [term.effect.label] * term.effect.states
     sensor = exported.shift(Side.SENSOR)
     return replace(
@@ -190,7 +186,7 @@ def _constant_name(effect: Effect, parameter: Parameter) -> str:
     )
 
 
-def _write(model: Equations, term: Term, values: list[Formula], first: int) -> None:
+def _add_equations(model: Equations, term: Term, values: list[Formula], first: int) -> None:
     effect = term.effect
     on_drive = effect.side is Side.DRIVE
 
@@ -207,7 +203,7 @@ def _write(model: Equations, term: Term, values: list[Formula], first: int) -> N
 
 
 def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> list | Branch:
-    """Return a kernel's equation; ``first`` is the place of the term's memory among all."""
+    """Return a kernel's outcome; ``first`` is the index of the term's memory."""
     geometry = [Formula("constant", (name,)) for name in GEOMETRY]
     joints, joint = len(term.effect.on.joints), column_of(term)
     memory = [Formula("element", ("at.memory", first + i)) for i in range(term.effect.states)]
@@ -224,4 +220,4 @@ def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> l
         out = [0.0] * (joints if kernel is term.effect.reaction else term.effect.states)
         return (at, memory, values, geometry, joint, out), out
 
-    return written(kernel, arguments)
+    return outcome_of(kernel, arguments)

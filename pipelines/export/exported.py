@@ -1,7 +1,8 @@
-"""What is handed over: one kind of run of an identified model, and where it came from."""
+"""The model to export: one kind of run of an identified model, with its origin."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,32 +24,32 @@ from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, Term, model_from_parameters
 
 HUMAN = "human"
-"""The wearer alone, beside the kinds of run."""
+"""The wearer only, in addition to the kinds of run."""
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A model to be written, all values known."""
+    """A model to export, with all values."""
 
     model: Model
     """The terms that act in the run."""
     absent: tuple[tuple[Term, Holding], ...]
-    """Terms of the file that do not, and why."""
+    """Terms of the file that do not act in the run, and why."""
     run: str
     """``exo_alone``, ``with_human``, or ``human`` for the wearer alone."""
     geometry: Geometry
     machine: Machine
     table: Table
-    """The ``parameters/1`` table that it comes from."""
+    """The ``parameters/1`` table of the model."""
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """The machine's, from the base on."""
+        """The machine's joints, from the base on."""
         return self.machine.joints
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The model's terms, bodies that move together added up."""
+        """The model's terms, with bodies that move together added up."""
         bodies = [term for term in self.model if isinstance(term.effect, RigidBody)]
         body = replace(bodies[0], values=np.sum([term.values for term in bodies], axis=0))
         return (body, *(term for term in self.model if not isinstance(term.effect, RigidBody)))
@@ -60,20 +61,20 @@ class Exported:
 
     def of(self, effect: str, joint: str) -> Term | None:
         """Return an effect's term at a joint, if the model has it."""
-        return next(
-            (t for t in self.terms if t.effect.name == effect and t.effect.joint == joint), None
-        )
+        for term in self.terms:
+            if term.effect.name == effect and term.effect.joint == joint:
+                return term
+        return None
 
-    def holdings(self, format: Format) -> list[tuple[Term, Holding]]:
-        """Return what becomes of each term of the file, none passed over."""
+    def holdings(self, format: Format[Any]) -> list[tuple[Term, Holding]]:
+        """Return each term of the file and how the format holds it."""
         return [(term, format.holding(term)) for term in self.terms] + list(self.absent)
 
     def driving(self) -> list[str]:
-        """Return which friction would drive its joint, which a simulation or a controller must not
-        be given unseen."""
+        """Return a warning for each negative friction coefficient, which drives its joint."""
         return [
             f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the"
-            " joint, and a simulation of it may run away; identify again, or set it to 0"
+            " joint, and a simulation may diverge. Identify again, or set it to 0"
             for term in self.terms
             if isinstance(term.effect, Friction)
             for p, value in zip(term.effect.parameters, term.values, strict=True)
@@ -81,16 +82,18 @@ class Exported:
         ]
 
     def shift(self, side: Side | None = None) -> NDArray:
-        """Return by how much the encoders' angles are more than the links' own, (J,) rad, at a
-        prismatic joint m.
+        """Return the encoders' angles less the links' angles, (J,) rad; at a prismatic joint m.
 
-        ``side`` asks for the part of it that effects of one side make.
+        Parameters
+        ----------
+        side : Side, optional
+            Only the part from effects of this side.
         """
         shifts = [shift_of(term) for term in self.terms if side in (None, term.effect.side)]
         return np.sum([s for s in shifts if s is not None] + [np.zeros(len(self.joints))], axis=0)
 
-    def heading(self, format: Format) -> Iterator[str]:
-        """Yield what every written file says of itself, line by line."""
+    def heading(self, format: Format[Any]) -> Iterator[str]:
+        """Yield the lines of the comment at the top of every file."""
         yield f"{format.title} of an identified machine, written by exoid {__version__}"
         if self.table.path:
             yield (
@@ -107,26 +110,26 @@ class Exported:
 
 
 def column_of(term: Term) -> int:
-    """Return the place of a term's joint, -1 for one of the whole machine."""
+    """Return the index of a term's joint; -1 for a term of the whole machine."""
     return term.effect.on.names.index(term.effect.joint) if term.effect.joint else -1
 
 
 def shift_of(term: Term) -> NDArray | None:
-    """Return what an effect adds to the encoders' angles, (J,) rad; None where it adds no
-    constant."""
+    """Return the constant that an effect adds to the encoders' angles, (J,) rad; None if none."""
     if term.effect.reading is None:
         return None
     joints, joint = len(term.effect.on.joints), column_of(term)
-    angles = (np.zeros(joints), np.ones(joints))
-    read = [angle.copy() for angle in angles]
-    for angle in read:
-        term.effect.reading(angle, term.values, joint)
-    first, second = (after - before for after, before in zip(read, angles, strict=True))
+    shifts = []
+    for angle in (np.zeros(joints), np.ones(joints)):
+        reading = angle.copy()
+        term.effect.reading(reading, term.values, joint)
+        shifts.append(reading - angle)
+    first, second = shifts
     return first if np.allclose(first, second, rtol=0.0, atol=1e-12) else None
 
 
 def values_in_words(term: Term) -> str:
-    """Write a term's parameters as a file names them, with units."""
+    """Return a term's parameters with values and units."""
     physical = term.effect.physical(term.values)
     return ", ".join(
         f"{p.name} = {value:.9g}" + (f" {p.unit}" if p.unit != "1" else "")
@@ -137,21 +140,21 @@ def values_in_words(term: Term) -> str:
 def exported(
     table: Table, run: str | None = None, default_geometry: Geometry | None = None
 ) -> Exported:
-    """Return what a ``parameters/1`` table says of one kind of run.
+    """Return the model of one kind of run from a ``parameters/1`` table.
 
     Parameters
     ----------
     table : Table
     run : str, optional
-        ``exo_alone``, ``with_human`` or ``human``; unless given, the only one there is, or
+        ``exo_alone``, ``with_human`` or ``human``; by default the only one in the table, or
         ``with_human``.
     default_geometry : Geometry, optional
-        Used where the table does not say its own.
+        Used if the table has none.
 
     Raises
     ------
     InputError
-        Where the table has no such run, or no real machine has such parameters.
+        If the table has no such run, or no real machine has such parameters.
     """
     bodies = set(table.frame.loc[table.frame["effect"] == RigidBody.name, "run"].dropna())
     run = run or (bodies.copy().pop() if len(bodies) == 1 else "with_human")
@@ -164,21 +167,25 @@ def exported(
                 " --run"
             )
         whole = model_from_parameters(table.frame, run, machine)
+        has_cuffs = cuffed([term.effect for term in whole])
         present, absent = [], []
         for term in whole:
-            why = _why_absent(term, run, cuffed([term.effect for term in whole]))
-            (absent.append((term, left_out(why))) if why else present.append(term))
+            reason = _why_absent(term, run, has_cuffs)
+            if reason:
+                absent.append((term, left_out(reason)))
+            else:
+                present.append(term)
         kind = "with_human" if run == HUMAN else run
         acting = Model(tuple(present)).for_run(kind)
-        make_plant(_rigid(acting), geometry, machine.joints, kind)  # which refuses what cannot be
+        # Refuses models that no real machine has.
+        make_plant(_rigid(acting), geometry, machine.joints, kind)
     return Exported(acting, tuple(absent), run, geometry, machine, table)
 
 
 def _rigid(model: Model) -> Model:
-    """Return the model with rigid joints: what only a simulation cannot lay out is listed by each
-    format, not refused.
+    """Return the model with rigid joints, whose springs each format lists or leaves out.
 
-    Cuffs stay, for behind them the limb has a body of its own.
+    Cuffs stay, because the limb behind them has its own body.
     """
     return Model(tuple(term for term in model if term.effect.spring is None or term.effect.at_cuff))
 
@@ -188,12 +195,8 @@ def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:
     if not any((effect.reaction, effect.spring, effect.reading, effect.torque_reading)):
         return "a machine of this kind cannot have it"
     if run != HUMAN:
-        return (
-            ""
-            if run in effect.acts_in and effect.run in (None, run)
-            else f"it does not act in {run} runs"
-        )
-    # Where machine and limb move apart, each has a body; elsewhere the one there is, is the
-    # wearer's.
-    wearers = effect.on_limb or (isinstance(effect, RigidBody) and not has_cuffs)
-    return "" if wearers and not effect.at_cuff else "it is the machine's, not the wearer's"
+        acts = run in effect.acts_in and effect.run in (None, run)
+        return "" if acts else f"it does not act in {run} runs"
+    # With cuffs, machine and limb have a body each; without, the only body is the wearer's.
+    of_wearer = effect.on_limb or (isinstance(effect, RigidBody) and not has_cuffs)
+    return "" if of_wearer and not effect.at_cuff else "it is the machine's, not the wearer's"

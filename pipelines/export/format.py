@@ -1,14 +1,14 @@
-"""What a format is: which terms of a model it can hold, and how the model is written in it."""
+"""A file format: which terms of a model it can hold, and how it writes the model."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 from pipelines.model import Term
 
-if TYPE_CHECKING:
-    from pipelines.export.exported import Exported
+Source = TypeVar("Source")
+"""Type of the model that a format writes."""
 
 
 class Degree(StrEnum):
@@ -21,47 +21,47 @@ class Degree(StrEnum):
 
 @dataclass(frozen=True)
 class Holding:
-    """What becomes of a term in a format."""
+    """How a format holds a term."""
 
     degree: Degree
     how: str
-    """Where in the file it is found, or why it is not there."""
+    """Its place in the file, or why it is left out."""
 
 
 def exact(how: str) -> Holding:
-    """Return that a term is held exactly, and where."""
+    """Return the holding of a term that is written exactly."""
     return Holding(Degree.EXACT, how)
 
 
 def approximate(how: str) -> Holding:
-    """Return that a term is held approximately, where, and what is not exact."""
+    """Return the holding of a term that is written approximately."""
     return Holding(Degree.APPROXIMATE, how)
 
 
 def left_out(why: str) -> Holding:
-    """Return that a term is not held, and why."""
+    """Return the holding of a term that is not written."""
     return Holding(Degree.NOT, why)
 
 
 @dataclass(frozen=True)
-class Format:
-    """A form that other tools read."""
+class Format(Generic[Source]):
+    """A file format of other tools."""
 
     name: str
-    """As ``--to`` takes it."""
+    """Value of ``--to``."""
     title: str
     suffix: str
-    """Of the file, its dot included."""
+    """File suffix with its dot."""
     holds: Callable[[Term], Holding]
-    """What becomes of a term, its values looked at: a negative friction, say, may be more than a
-    format holds."""
-    write: Callable[["Exported", str], Mapping[str, str]]
-    """Of a model and the file's stem: the text of each file by its suffix."""
+    """Returns the holding of a term, which may depend on its values, such as negative friction."""
+    write: Callable[[Source, str], Mapping[str, str]]
+    """Returns the text of each file by suffix, from a model and the file's stem."""
 
     def holding(self, term: Term) -> Holding:
-        """Return what becomes of a term, and that each run has its own where what is held is one
-        run's."""
-        held, own = self.holds(term), [p.name for p in term.effect.parameters if p.per_run]
-        if held.degree is Degree.NOT or not own:
-            return held
-        return replace(held, how=f"{held.how}; {' and '.join(own)} of one run, each has its own")
+        """Return how the format holds a term, with a note on values that differ between runs."""
+        holding = self.holds(term)
+        per_run = [p.name for p in term.effect.parameters if p.per_run]
+        if holding.degree is Degree.NOT or not per_run:
+            return holding
+        note = f"{' and '.join(per_run)} of one run, each has its own"
+        return replace(holding, how=f"{holding.how}; {note}")

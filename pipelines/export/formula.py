@@ -1,9 +1,8 @@
-"""An equation as it is written down: what a kernel computes, told by running it on numbers that are
-not yet known.
+"""Formulae of kernels, traced by calling them with symbols instead of numbers.
 
-Kernels are plain scalar Python before numba compiles them. Called with `Formula` objects instead of
-numbers they return formulae, which a format prints in its own language. So an exported file holds
-the very equations that every stage uses, and no second copy of them stands anywhere.
+Kernels are plain scalar Python before numba compiles them. Called with `Formula` objects they
+return formulae, which a format prints in its own language. An exported file therefore has the same
+equations as every stage, without a second copy of them.
 """
 
 import math
@@ -32,19 +31,19 @@ FUNCTIONS = (
     "max",
     "min",
 )
-"""What an equation may call; every format knows how to spell them."""
+"""Functions that an equation may call, and that every format can write."""
 
 MOST_BRANCHES = 64
-"""Ways through one kernel beyond which it is no formula any more."""
+"""Most paths through one kernel."""
 
 
 class NotWritable(ExoidError):
-    """A kernel does what no formula can say, such as looking back into its own past."""
+    """A kernel that no formula can express, such as one that reads its own past."""
 
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """A number that is computed later.
+    """A number that the exported file computes.
 
     ``operator`` is one of + - * / ** neg, a function's name, ``element`` (of an array) or
     ``constant``.
@@ -53,7 +52,7 @@ class Formula:
     operator: str
     operands: tuple[Any, ...]
     value: float | None = None
-    """What a constant is; comparisons of constants are decided when the formula is written."""
+    """Value of a constant; comparisons of constants are evaluated while tracing."""
 
     def __add__(self, other):
         """Write a sum."""
@@ -104,73 +103,67 @@ class Formula:
         return Formula("abs", (self,))
 
     def __lt__(self, other):
-        """Ask which is less."""
+        """Compare."""
         return _compare("<", self, other)
 
     def __le__(self, other):
-        """Ask which is less."""
+        """Compare."""
         return _compare("<=", self, other)
 
     def __gt__(self, other):
-        """Ask which is greater."""
+        """Compare."""
         return _compare(">", self, other)
 
     def __ge__(self, other):
-        """Ask which is greater."""
+        """Compare."""
         return _compare(">=", self, other)
 
     def __eq__(self, other):
-        """Ask whether they are equal."""
+        """Compare."""
         return _compare("==", self, other)
 
     def __ne__(self, other):
-        """Ask whether they differ."""
+        """Compare."""
         return _compare("!=", self, other)
 
     __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self):
-        """Refuse: a formula is no truth."""
-        raise NotWritable("it takes a number for a truth")
+        """Refuse to be a condition."""
+        raise NotWritable("it uses a number as a condition")
 
 
 def constant(name: str, value: float) -> Formula:
-    """Return a constant that the written equation calls by its name."""
+    """Return a constant that the equation refers to by name."""
     return Formula("constant", (name,), float(value))
 
 
 def constants_in(outcome: Any) -> Iterator[str]:
-    """Yield the names of the constants of an outcome, as often as they stand there."""
-    match outcome:
-        case Branch(condition, yes, no):
-            yield from constants_in([condition.left, condition.right, yes, no])
-        case list():
-            for part in outcome:
-                yield from constants_in(part)
-        case Formula(operator="constant"):
-            yield outcome.operands[0]
-        case Formula():
-            yield from constants_in(list(outcome.operands))
+    """Yield the name of each constant of an outcome, once per occurrence."""
+    return _names_in(outcome, "constant")
 
 
 def arrays_in(outcome: Any) -> Iterator[str]:
-    """Yield the names of the arrays of which an outcome has elements, as often as they stand
-    there."""
+    """Yield the name of the array of each element in an outcome, once per occurrence."""
+    return _names_in(outcome, "element")
+
+
+def _names_in(outcome: Any, operator: str) -> Iterator[str]:
     match outcome:
         case Branch(condition, yes, no):
-            yield from arrays_in([condition.left, condition.right, yes, no])
-        case list():
+            yield from _names_in([condition.left, condition.right, yes, no], operator)
+        case list() | tuple():
             for part in outcome:
-                yield from arrays_in(part)
-        case Formula(operator="element"):
+                yield from _names_in(part, operator)
+        case Formula() if outcome.operator == operator:
             yield outcome.operands[0]
         case Formula():
-            yield from arrays_in(list(outcome.operands))
+            yield from _names_in(outcome.operands, operator)
 
 
 @dataclass(frozen=True)
 class Elements:
-    """An array that is filled later, such as ``q``: its elements are formulae."""
+    """An array such as ``q`` whose elements are formulae."""
 
     name: str
     length: int
@@ -182,36 +175,35 @@ class Elements:
         return Formula("element", (self.name, index % self.length))
 
     def __iter__(self) -> Iterator[Formula]:
-        """Go through the elements."""
+        """Iterate over the elements."""
         return (self[i] for i in range(self.length))
 
     @property
     def shape(self) -> tuple[int]:
-        """As of a numpy array."""
+        """Shape, as of a numpy array."""
         return (self.length,)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A question that only the running program can answer."""
+    """A comparison that only the exported program can evaluate."""
 
     operator: str
     left: Any
     right: Any
 
     def __bool__(self) -> bool:
-        """Return the answer of the way that is being gone; where there is none yet, stop at the
-        fork."""
-        answers = _ANSWERS.get()
+        """Return the value on the current path; without one, stop at the fork."""
+        choices = _CHOICES.get()
         key = repr(self)
-        if key not in answers:
+        if key not in choices:
             raise _Fork(self, key)
-        return answers[key]
+        return choices[key]
 
 
 @dataclass(frozen=True)
 class Branch:
-    """What is computed either way."""
+    """The outcomes of a condition."""
 
     condition: Condition
     yes: Any
@@ -223,54 +215,55 @@ class _Fork(Exception):
         self.condition, self.key = condition, key
 
 
-_ANSWERS: ContextVar[Mapping[str, bool]] = ContextVar("answers")
+_CHOICES: ContextVar[Mapping[str, bool]] = ContextVar("choices")
+"""Values of the conditions on the current path, by condition."""
 
 
 @contextmanager
-def _answering(answers: Mapping[str, bool]) -> Iterator[None]:
-    token = _ANSWERS.set(answers)
+def _choosing(choices: Mapping[str, bool]) -> Iterator[None]:
+    token = _CHOICES.set(choices)
     try:
         yield
     finally:
-        _ANSWERS.reset(token)
+        _CHOICES.reset(token)
 
 
-def written(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
-    """Return what a compiled kernel computes, as formulae.
+def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
+    """Return the outcome of a compiled kernel as formulae.
 
     Parameters
     ----------
     kernel : numba dispatcher
         Of the kinds in ``pipelines.effects.kernel``.
     arguments : callable
-        Returns the kernel's arguments and, among them, the list that it writes to; called anew for
-        each way through the kernel.
+        Returns the kernel's arguments and, among them, the list that it writes to; called once per
+        path through the kernel.
 
     Returns
     -------
     list, or Branch of such
-        What stands in the list afterwards: numbers and formulae.
+        Numbers and formulae that the kernel writes to the list.
 
     Raises
     ------
     NotWritable
-        Where the kernel does what no formula can say.
+        If no formula can express the kernel.
     """
     function = _plain(kernel.py_func, {})
-    ways = 0
+    paths = 0
 
-    def walk(answers: dict[str, bool]):
-        nonlocal ways
-        ways += 1
-        if ways > MOST_BRANCHES:
-            raise NotWritable(f"it branches more than {MOST_BRANCHES} ways")
-        given, out = arguments()
+    def walk(choices: dict[str, bool]):
+        nonlocal paths
+        paths += 1
+        if paths > MOST_BRANCHES:
+            raise NotWritable(f"it has more than {MOST_BRANCHES} paths")
+        inputs, out = arguments()
         try:
-            with _answering(answers):
-                function(*given)
+            with _choosing(choices):
+                function(*inputs)
         except _Fork as fork:
-            ahead = [walk(answers | {fork.key: answer}) for answer in (True, False)]
-            return Branch(fork.condition, *ahead)
+            yes, no = (walk(choices | {fork.key: choice}) for choice in (True, False))
+            return Branch(fork.condition, yes, no)
         except (TypeError, AttributeError, IndexError, ValueError) as error:
             raise NotWritable(f"its equation cannot be written as a formula ({error})") from error
         return out
@@ -279,8 +272,7 @@ def written(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
 
 
 def _plain(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:
-    """Return an uncompiled function that calls uncompiled functions, and formulae where it would
-    call math."""
+    """Return an uncompiled function that calls uncompiled functions, and accepts formulae."""
     if function not in done:
         scope: dict[str, Any] = {}
         plain = FunctionType(
@@ -317,12 +309,12 @@ def _function(name: str) -> Callable[..., Any]:
         "min": min,
         "sign": lambda x: (x > 0) - (x < 0),
     }
-    at_once = of_numbers[name] if name in of_numbers else getattr(math, name)
+    evaluate = of_numbers[name] if name in of_numbers else getattr(math, name)
 
     def call(*arguments):
         if any(isinstance(argument, Formula) for argument in arguments):
             return Formula(name, arguments)
-        return float(at_once(*arguments))
+        return float(evaluate(*arguments))
 
     return call
 

@@ -1,4 +1,4 @@
-"""What becomes of a term in a format of bodies and joints."""
+"""How formats of bodies and joints hold the terms of a model."""
 
 from collections.abc import Callable, Mapping
 
@@ -8,35 +8,36 @@ from pipelines.model import Term
 
 
 def sound_friction(term: Term) -> tuple[float, float]:
-    """Return Coulomb and viscous friction of a term, 0 in place of a negative one: simulators
-    refuse what drives."""
+    """Return Coulomb and viscous friction, at least 0: simulators refuse negative values."""
     coulomb, viscous = (max(float(value), 0.0) for value in term.values)
     return coulomb, viscous
 
 
 def held_friction(term: Term, whole: Holding) -> Holding:
-    """Return ``whole`` where both halves of a friction can be held, else which of them is not."""
+    """Return ``whole`` if no coefficient is negative, else a holding that names the others."""
     negative = [
         p.name for p, value in zip(term.effect.parameters, term.values, strict=True) if value < 0.0
     ]
     if not negative:
         return whole
-    why = f"its {' and '.join(negative)} friction is negative, which would drive the joint"
-    return left_out(why) if len(negative) == 2 else approximate(f"its other half alone: {why}")
+    reason = f"its {' and '.join(negative)} friction is negative and drives the joint"
+    if len(negative) == 2:
+        return left_out(reason)
+    return approximate(f"its other coefficient only: {reason}")
 
 
-Held = Mapping[str, Callable[[Term], Holding]]
-"""What becomes of a term, by its effect's name."""
+Holdings = Mapping[str, Callable[[Term], Holding]]
+"""Functions that return the holding of a term, by the effect's name."""
 
 
-def looked_up(held: Held, shift: str, format_name: str) -> Callable[[Term], Holding]:
-    """Return what tells the holding of a term in a format of bodies and joints; encoders' shifts
-    are ``shift``."""
+def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[Term], Holding]:
+    """Return the function from a term to its holding; ``shift`` describes encoders' shifts."""
 
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:
             return exact(shift)
-        held_as = held.get(term.effect.name)
-        return held_as(term) if held_as else left_out(f"{format_name} has no element for it")
+        if term.effect.name in holdings:
+            return holdings[term.effect.name](term)
+        return left_out(f"{format_name} has no element for it")
 
     return holding

@@ -1,4 +1,4 @@
-"""JSON: all that the model's file holds, for programs that read no Parquet; it explains itself."""
+"""JSON: the whole content of a model's file, with explanations, for programs without Parquet."""
 
 import json
 from collections.abc import Mapping
@@ -18,27 +18,26 @@ CONVENTIONS = {
     "units": "SI",
     "angles": (
         "of the first revolute joint from the downward vertical, forward positive, of the next"
-        " relative to the link before; a prismatic joint rises where gravity acts; all as their"
-        " encoders give them"
+        " relative to the previous link; a prismatic joint rises if gravity acts; all as encoder"
+        " readings"
     ),
     "torques": (
-        "positive torque accelerates its angle upward; an effect's equation gives what the drive"
-        " must add"
+        "positive torque accelerates its angle upward; an effect's equation is the torque that the"
+        " drive must add"
     ),
     "covariance": (
-        "of the parameters' values, rows and columns in their order; null where it was not"
-        " estimated"
+        "of the parameters' values, rows and columns in their order; null if it was not estimated"
     ),
 }
 
 
 def holding(term: Term) -> Holding:
-    """Return what becomes of a term in JSON."""
+    """Return how JSON holds a term."""
     return exact("parameters, with intervals and covariance")
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the document."""
+    """Return the document's text by suffix."""
     table = exported.table
     document = {
         "contract": CONTRACT,
@@ -74,7 +73,7 @@ def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _effect(term: Term) -> dict[str, Any]:
-    """Say of a term what it is, and its values."""
+    """Return a term's description and values."""
     effect = term.effect
     stated = facts(type(effect))
     values = effect.physical(term.values)

@@ -1,4 +1,4 @@
-"""How a programming language spells a formula, a choice and a comment."""
+"""The syntax of formulae and branches in a programming language."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -9,31 +9,31 @@ from pipelines.errors import InputError
 from pipelines.export.formula import Branch, Condition, Formula
 
 SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
-"""What binds how tightly."""
+"""Precedence, lowest first."""
 
 BINARY = {"+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT}
 
 
 @dataclass(frozen=True)
 class Language:
-    """What differs between the languages that equations are written in."""
+    """The differences between the languages of exported equations."""
 
     names: Mapping[str, str]
-    """Of functions where they are not those of ``formula.FUNCTIONS``."""
+    """Names of functions that differ from those of ``formula.FUNCTIONS``."""
     element: Callable[[str, int], str]
-    """An element of an array, counted from 0."""
+    """Returns an element of an array, counted from 0."""
     power: Callable[[str, str], str]
-    """A power, both operands in brackets where they need some."""
+    """Returns a power; both operands have brackets if needed."""
     unequal: str
-    choice: Callable[[str, list[str], list[str]], list[str]]
-    """The lines of a choice: condition, statements either way."""
+    branch: Callable[[str, list[str], list[str]], list[str]]
+    """Returns the lines of a branch, from its condition and both lists of statements."""
 
     def text(self, formula: Any, at_least: int = SUM) -> str:
-        """Write a formula or a number, in brackets where it binds less tightly than asked for."""
-        written, binds = self._written(formula)
-        return f"({written})" if binds < at_least else written
+        """Return a formula or a number, in brackets if its precedence is below ``at_least``."""
+        text, precedence = self._text_and_precedence(formula)
+        return f"({text})" if precedence < at_least else text
 
-    def _written(self, formula: Any) -> tuple[str, int]:
+    def _text_and_precedence(self, formula: Any) -> tuple[str, int]:
         if not isinstance(formula, Formula):
             return repr(float(formula)), SIGN if formula < 0 else ATOM
         operator, operands = formula.operator, formula.operands
@@ -42,9 +42,9 @@ class Language:
         if operator == "element":
             return self.element(*operands), ATOM
         if operator in BINARY:
-            binds = BINARY[operator]
-            right = self.text(operands[1], binds + (operator in "-/"))
-            return f"{self.text(operands[0], binds)} {operator} {right}", binds
+            precedence = BINARY[operator]
+            right = self.text(operands[1], precedence + (operator in "-/"))
+            return f"{self.text(operands[0], precedence)} {operator} {right}", precedence
         if operator == "neg":
             return f"-{self.text(operands[0], POWER)}", SIGN
         if operator == "**":
@@ -52,15 +52,13 @@ class Language:
         return f"{self.names.get(operator, operator)}({', '.join(map(self.text, operands))})", ATOM
 
     def added(self, outcome: list | Branch, to: str) -> list[str]:
-        """Return the statements that add what a kernel computed to an array, leaving out what is
-        nought."""
+        """Return the statements that add a kernel's outcome to an array, without zeros."""
         return self._statements(
             outcome, lambda i, value: self._addition(self.element(to, i), value)
         )
 
     def assigned(self, outcome: list | Branch, to: str, first: int = 0) -> list[str]:
-        """Return the statements that set an array, from its element ``first`` on, to what a kernel
-        computed."""
+        """Return the statements that assign a kernel's outcome to an array, from ``first`` on."""
         return self._statements(
             outcome, lambda i, value: self._assignment(self.element(to, first + i), value)
         )
@@ -69,8 +67,9 @@ class Language:
         self, outcome: list | Branch, statement: Callable[[int, Any], list[str]]
     ) -> list[str]:
         if isinstance(outcome, Branch):
-            ways = [self._statements(way, statement) for way in (outcome.yes, outcome.no)]
-            return self.choice(self._question(outcome.condition), *ways) if any(ways) else []
+            yes = self._statements(outcome.yes, statement)
+            no = self._statements(outcome.no, statement)
+            return self.branch(self._condition(outcome.condition), yes, no) if yes or no else []
         return [line for i, value in enumerate(outcome) for line in statement(i, value)]
 
     def _addition(self, target: str, value: Any) -> list[str]:
@@ -79,51 +78,51 @@ class Language:
         return [f"{target} = {target} + {self.text(value)};"]
 
     def _assignment(self, target: str, value: Any) -> list[str]:
-        # What a sensor leaves alone is not worth a line.
+        # A sensor leaves most torques unchanged.
         return [] if self.text(value) == target else [f"{target} = {self.text(value)};"]
 
-    def _question(self, condition: Condition) -> str:
+    def _condition(self, condition: Condition) -> str:
         operator = self.unequal if condition.operator == "!=" else condition.operator
         return f"{self.text(condition.left)} {operator} {self.text(condition.right)}"
 
 
 def identifier(text: str) -> str:
-    """Return a name that every language takes: letters, digits and underscores of ASCII, a letter
-    first."""
+    """Return a name of ASCII letters, digits and underscores that starts with a letter."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")
     return name if name[:1].isalpha() else f"x{name}"
 
 
 def function_name(stem: str, suffix: str, keywords: Iterable[str] = ()) -> str:
-    """Return the name of a file's functions, which is the file's.
+    """Return the name of a file's functions, which is the file's stem.
 
     Raises
     ------
     InputError
-        Where it is no name.
+        If it is no name in the language.
     """
     if stem != identifier(stem) or stem in keywords:
         raise InputError(
-            f"{one_line(stem)}{suffix}: its functions are called as the file is, expected letters"
-            " and digits of ASCII and single underscores, a letter first, and no word of the"
-            " language; name it by -o"
+            f"{one_line(stem)}{suffix}: its functions have the file's name, expected ASCII letters,"
+            " digits and single underscores, a letter first, and no keyword. Name the file with -o"
         )
     return stem
 
 
 def unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """Return the names, a number behind each that was there before; none is empty."""
-    known, names_made = set(taken), []
+    """Return the names, with a number after each repeated one; none is empty."""
+    used = set(taken)
+    results = []
     for name in names:
-        base, number, chosen = name or "unnamed", 1, name or "unnamed"
-        while chosen in known:
+        base = name or "unnamed"
+        candidate, number = base, 1
+        while candidate in used:
             number += 1
-            chosen = f"{base}_{number}"
-        known.add(chosen)
-        names_made.append(chosen)
-    return names_made
+            candidate = f"{base}_{number}"
+        used.add(candidate)
+        results.append(candidate)
+    return results
 
 
 def one_line(text: str) -> str:
-    """Return text whose every character can be seen: no line breaks, no control characters."""
+    """Return text with escapes for line breaks and control characters."""
     return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)

@@ -38,8 +38,8 @@ LANGUAGE = Language(
     element=lambda name, index: f"{name}({index + 1})",
     power=lambda base, exponent: f"{base}^{exponent}",
     unequal="~=",
-    choice=lambda question, yes, no: [
-        f"if {question}",
+    branch=lambda condition, yes, no: [
+        f"if {condition}",
         *_indented(yes),
         *(["else", *_indented(no)] if no else []),
         "end",
@@ -51,14 +51,14 @@ function [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
 {comment}
 %
 % [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
-%   q, dq, ddq  {joints} x 1: angles as the encoders give them, their rates; SI units
-%   t           seconds since the run began; 0 unless given
-%   memory      {memories} x 1: {memory_of}; zeros unless given
+%   q, dq, ddq  {joints} x 1: encoder angles and their rates; SI units
+%   t           seconds since the start of the run; 0 by default
+%   memory      {memories} x 1: {memory_of}; zeros by default
 %   tau         {joints} x 1: torque that the drives must deliver
 %   M, C, G     mass matrix with rotors, Coriolis matrix (dM/dt - 2 C is skew), gravity torque:
 %               the rest of tau, friction and springs, is tau - M*ddq - C*dq - G
 %   rate        {memories} x 1: d(memory)/dt
-%   reading     {joints} x 1: what the torque channels say where the drives deliver tau
+%   reading     {joints} x 1: reading of the torque channels at drive torque tau
 if nargin < 4
     t = 0;
 end
@@ -94,7 +94,7 @@ if nargout > 1
     for k = 1:{joints}
         unit = zeros({joints}, 1);
         unit(k) = 1;
-        % The velocity torque is a quadratic form in dq; its polarisation is the Christoffel matrix.
+        % The velocity torque is a quadratic form in dq; its polarization is the Christoffel matrix.
         C(:, k) = 0.5 * (velocity_torque(still, at.dq + unit, G) ...
             - velocity_torque(still, at.dq, G) - velocity_torque(still, unit, G));
     end
@@ -129,9 +129,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
             comment=comment([*exported.heading(MATLAB), "", *order]),
             joints=joints,
             memories=model.memories,
-            memory_of=one_line(
-                ", ".join(dict.fromkeys(model.memory_of)) or "no effect here has one"
-            ),
+            memory_of=one_line(", ".join(dict.fromkeys(model.memory_of)) or "no effect has memory"),
             sensor_shift=_column(model.sensor_shift),
             link_shift=_column(model.link_shift),
             functions="\n\n".join(_functions(model)),
@@ -140,7 +138,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def comment(lines: Iterable[str]) -> str:
-    """Return a comment that nothing in it can end."""
+    """Return a comment that no text in it can end."""
     return "\n".join(f"% {one_line(line)}".rstrip() for line in lines)
 
 
@@ -169,7 +167,7 @@ def _functions(model: Equations) -> Iterable[str]:
 
 
 def _function(head: str, lines: list[str], model: Equations) -> str:
-    """Return a function that knows the constants it uses."""
+    """Return a function with the constants that it uses."""
     known = set(re.findall(r"\w+", "\n".join(lines)))
     used = [
         f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}"
@@ -180,7 +178,7 @@ def _function(head: str, lines: list[str], model: Equations) -> str:
 
 
 def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return [comment([f"{equation.label}: {equation.says}"]), *statements]
+    return [comment([f"{equation.label}: {equation.text}"]), *statements]
 
 
 def _indented(lines: Iterable[str]) -> list[str]:

@@ -1,8 +1,8 @@
-"""MJCF: MuJoCo's own form of a model.
+"""MJCF: MuJoCo's model format.
 
 A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is
-positive. A joint's ``qpos`` is what its encoder gives, an actuator's ``ctrl`` what its torque
-channel would say.
+positive. A joint's ``qpos`` is its encoder's angle, an actuator's ``ctrl`` the reading of its
+torque channel.
 """
 
 from collections.abc import Mapping
@@ -16,12 +16,13 @@ from pipelines.effects.joint_elasticity import DAMPING_RATIO
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, approximate, exact
-from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
+from pipelines.export.holding import Holdings, held_friction, holding_from, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
 OFF_CENTRE_M = 0.01
+"""Shift of the centre of mass of a body on two slides."""
 TIMESTEP_S = 0.001
 
 
@@ -29,8 +30,7 @@ def _friction(term: Term) -> Holding:
     return held_friction(
         term,
         approximate(
-            "joint damping and frictionloss: exact while the joint moves, stuck joints creep a"
-            " little"
+            "joint damping and frictionloss: exact in motion, but standing joints creep a little"
         ),
     )
 
@@ -41,7 +41,7 @@ def _elasticity(term: Term) -> Holding:
     )
 
 
-HELD: Held = {
+HOLDINGS: Holdings = {
     "rigid_body": lambda term: exact("bodies of nominal masses that have these X"),
     "friction": _friction,
     "quadratic_drag": lambda term: exact(
@@ -57,7 +57,7 @@ HELD: Held = {
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model."""
+    """Return the model's text by suffix."""
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
@@ -77,8 +77,8 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         _actuator(actuators, name, joint, exported)
     root.extend([part for part in (springs, actuators) if len(part)])
     masses = (
-        "Masses are nominal where X does not determine them: what joints feel is kept. Shapes are"
-        " drawn only."
+        "Masses are nominal where X does not determine them; joint torques are unchanged. Shapes"
+        " are for display only."
     )
     return {".xml": document(root, [*exported.heading(MJCF), "", masses])}
 
@@ -95,10 +95,12 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     if soft:
         ET.SubElement(element, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
-    # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a
-    # slide's centre is, its motion does not ask.
-    aside = OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
-    centre = numbers(*(body.centre + aside))
+    # MuJoCo treats two slides of a body centred at their frame as independent. The shift has no
+    # effect on the motion of a slide.
+    offset = (
+        OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
+    )
+    centre = numbers(*(body.centre + offset))
     ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
     ET.SubElement(
@@ -108,8 +110,7 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
 
 
 def _frame(body: Body) -> dict[str, str]:
-    """Return where the joint is, set back by the shift: at angle zero the link is where its encoder
-    says so."""
+    """Return the joint's frame, set back by the encoder's shift."""
     carried = {"gravcomp": number(body.carried)} if body.carried else {}
     axis = np.array(body.axis)
     if body.joint.kind == "prismatic":
@@ -119,24 +120,24 @@ def _frame(body: Body) -> dict[str, str]:
 
 
 def _joint(body: Body, exported: Exported) -> dict[str, str]:
-    """Return what a drive does at its joint."""
-    name, says = body.joint.name, {}
+    """Return friction and rotor inertia of a drive as attributes of its joint."""
+    name, attributes = body.joint.name, {}
     damping = [0.0, 0.0]
     friction, drag = exported.of("friction", name), exported.of("quadratic_drag", name)
     if friction and _friction(friction).degree is not Degree.NOT:
         coulomb, damping[0] = sound_friction(friction)
-        says["frictionloss"] = number(coulomb)
-        # Fast enough to hold within two steps, the fastest that MuJoCo allows.
-        says["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)
+        attributes["frictionloss"] = number(coulomb)
+        # Two steps are the shortest time constant that MuJoCo allows.
+        attributes["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)
     if drag:
         damping[1] = drag.values[0]
     if any(damping):
-        says["damping"] = numbers(*damping) if damping[1] else number(damping[0])
+        attributes["damping"] = numbers(*damping) if damping[1] else number(damping[0])
     rotor, soft = exported.of("rotor_inertia", name), exported.of("joint_elasticity", name)
     armature = rotor.values[0] if rotor else 0.0
     if soft:
         armature += motor_inertia(soft.effect, exported.model, exported.geometry)
-    return says | ({"armature": number(armature)} if armature else {})
+    return attributes | ({"armature": number(armature)} if armature else {})
 
 
 def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
@@ -148,30 +149,29 @@ def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
 
 
 def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
-    """Return the joint between motor and link; it turns against the twist of the transmission."""
+    """Return the joint between motor and link, whose angle is minus the transmission's twist."""
     soft = exported.of("joint_elasticity", joint.name)
     if soft is None:
         return {}
     stiffness, hardening = soft.values
-    says = numbers(stiffness, 0.0, stiffness * hardening) if hardening else number(stiffness)
+    text = numbers(stiffness, 0.0, stiffness * hardening) if hardening else number(stiffness)
     damping = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * soft.effect.motor_inertia)
-    return {"stiffness": says, "damping": number(damping)}
+    return {"stiffness": text, "damping": number(damping)}
 
 
 def _spring_across(
     springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported
 ) -> None:
-    """Add the spring of a link that hangs behind a soft joint: its angle is the sum of two."""
+    """Add the spring of a link behind an elastic joint, whose angle is a sum of two."""
     if exported.of("joint_elasticity", joint.name) is None:
         return
-    says = _spring(
-        joint, exported.shift()[[j.name for j in exported.joints].index(joint.name)], exported
-    )
-    if says:
+    place = [other.name for other in exported.joints].index(joint.name)
+    spring = _spring(joint, exported.shift()[place], exported)
+    if spring:
         across = ET.SubElement(
-            springs, "fixed", name=f"{names[0]}_spring", stiffness=says["stiffness"]
+            springs, "fixed", name=f"{names[0]}_spring", stiffness=spring["stiffness"]
         )
-        across.set("springlength", says["springref"])
+        across.set("springlength", spring["springref"])
         for part in names:
             ET.SubElement(across, "joint", joint=part, coef="1")
 
@@ -181,8 +181,7 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     if gain is None and offset is None:
         ET.SubElement(actuators, "motor", name=name, joint=name)
         return
-    # The channel says g T where the drive delivers T, or g T + o; asked for u, the drive delivers
-    # what makes it say u.
+    # The channel reads g T or g T + o; for a command u the drive delivers the T that reads u.
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
     at_zero = -(offset.values[0] if offset else 0.0)
     if gain and offset and _comes_before(exported, gain, offset):
@@ -207,6 +206,6 @@ MJCF = Format(
     "mjcf",
     "MuJoCo model",
     ".xml",
-    looked_up(HELD, "orientation of the joint's frame", "MJCF"),
+    holding_from(HOLDINGS, "orientation of the joint's frame", "MJCF"),
     write,
 )

@@ -1,7 +1,6 @@
-"""The table of docs/export.md: what each format holds of each effect.
+"""The table of docs/export.md: how each format holds each effect.
 
-``python -m pipelines.export.reference docs/export.md`` brings it up to date; a test says when it is
-not.
+``python -m pipelines.export.reference docs/export.md`` updates it; a test fails if it is outdated.
 """
 
 import re
@@ -11,24 +10,24 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.effects import EFFECTS, Effect
-from pipelines.export import FORMATS, Degree, Format
+from pipelines.export import FORMATS, Degree, Exported, Format
 from pipelines.model import Term
 
 BEGIN, END = "<!-- written by `make docs` -->", "<!-- until here -->"
 
 COLUMNS = {"MJCF": "mjcf", "URDF": "urdf", "MATLAB and C": "c"}
-"""JSON holds everything, and MATLAB and C hold the same."""
+"""MATLAB and C hold the same terms, and JSON all of them."""
 
 
 def table() -> str:
-    """Return the table as Markdown, exoid's own effects only."""
+    """Return the table of exoid's own effects as Markdown."""
     formats = {format.name: format for format in FORMATS}
-    ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
+    own = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
     rows = [
         f"| [{effect.name}](effects/{effect.name}.md) | "
         + " | ".join(_cell(formats[name], _plausible(effect)) for name in COLUMNS.values())
         + " |"
-        for effect in ours
+        for effect in own
     ]
     return "\n".join(
         [f"| effect | {' | '.join(COLUMNS)} |", "|---" * (1 + len(COLUMNS)) + "|", *rows]
@@ -36,18 +35,16 @@ def table() -> str:
 
 
 def _plausible(effect: type[Effect]) -> Term:
-    """Return an effect in the middle of its typical range."""
+    """Return an effect with values in the middle of their typical ranges."""
     bound = effect(joint=None if effect.whole_leg else (effect.joints or ("hip",))[0])
     return Term(bound, bound.values_from(np.array([np.mean(p.typical) for p in bound.parameters])))
 
 
-def _cell(format: Format, term: Term) -> str:
+def _cell(format: Format[Exported], term: Term) -> str:
     holding = format.holding(term)
-    return (
-        f"– ({holding.how})"
-        if holding.degree is Degree.NOT
-        else f"**{holding.degree}**: {holding.how}"
-    )
+    if holding.degree is Degree.NOT:
+        return f"– ({holding.how})"
+    return f"**{holding.degree}**: {holding.how}"
 
 
 if __name__ == "__main__":

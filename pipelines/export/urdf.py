@@ -1,7 +1,7 @@
 """URDF, as pinocchio, ROS and MATLAB's Robotics System Toolbox read it.
 
 A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is
-positive. A joint's position is what its encoder gives. URDF tells neither gravity nor rotors.
+positive. A joint's position is its encoder's angle. URDF has neither gravity nor rotors.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ import numpy as np
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, exact
-from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
+from pipelines.export.holding import Holdings, held_friction, holding_from, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -21,11 +21,11 @@ from pipelines.model import Term
 
 def _friction(term: Term) -> Holding:
     return held_friction(
-        term, exact("dynamics of the joint: damping and friction; not every reader heeds them")
+        term, exact("dynamics of the joint: damping and friction; some readers ignore them")
     )
 
 
-HELD: Held = {
+HOLDINGS: Holdings = {
     "rigid_body": lambda term: exact("links of nominal masses that have these X"),
     "friction": _friction,
     "mass_off_axis": lambda term: exact("place of the link's centre of mass"),
@@ -33,25 +33,25 @@ HELD: Held = {
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model."""
+    """Return the model's text by suffix."""
     root = ET.Element("robot", name=one_line(stem))
     joints = unique(one_line(joint.name) for joint in exported.joints)
     links = unique([f"{name}_link" for name in joints], ["base", *joints])
     ET.SubElement(root, "link", name="base")
     parent = "base"
-    bodies_made = bodies(exported)
-    for name, link, body in zip(joints, links, bodies_made, strict=True):
+    machine_bodies = bodies(exported)
+    for name, link, body in zip(joints, links, machine_bodies, strict=True):
         _link(root, link, body)
         _joint(root, name, parent, link, body, exported)
         parent = link
-    # Of a lift, whose weight a counterweight carries in part, that part of gravity.
-    gravity = number(exported.geometry.gravity_m_s2 * (1.0 - bodies_made[0].carried))
+    # A counterweight carries part of a lift's weight, so gravity is reduced.
+    gravity = number(exported.geometry.gravity_m_s2 * (1.0 - machine_bodies[0].carried))
     comments = [
         (
-            "Masses are nominal where X does not determine them: what joints feel is kept. Limits"
-            " are not the machine's."
+            "Masses are nominal where X does not determine them; joint torques are unchanged."
+            " Limits are not the machine's."
         ),
-        f"Gravity is the reader's to set: {gravity} m/s² along -z.",
+        f"Set gravity in the reader: {gravity} m/s² along -z.",
     ]
     return {".urdf": document(root, [*exported.heading(URDF), "", *comments])}
 
@@ -68,7 +68,7 @@ def _joint(
     root: ET.Element, name: str, parent: str, link: str, body: Body, exported: Exported
 ) -> None:
     joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
-    # Set back by the shift: at angle zero the link is where its encoder says so.
+    # Set back by the encoder's shift.
     back, turns = -body.shift * np.array(body.axis), body.joint.kind == "revolute"
     place, turned = (body.place, back) if turns else (back, np.zeros(3))
     ET.SubElement(joint, "origin", xyz=numbers(*place), rpy=numbers(*turned))
@@ -82,4 +82,6 @@ def _joint(
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
 
 
-URDF = Format("urdf", "URDF model", ".urdf", looked_up(HELD, "origin of the joint", "URDF"), write)
+URDF = Format(
+    "urdf", "URDF model", ".urdf", holding_from(HOLDINGS, "origin of the joint", "URDF"), write
+)

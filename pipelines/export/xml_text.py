@@ -1,4 +1,4 @@
-"""XML that no name and no comment can break."""
+"""XML documents and numbers in them, safe for any name and comment."""
 
 import re
 from collections.abc import Iterable
@@ -8,22 +8,20 @@ from pipelines.export.language import one_line
 
 
 def document(root: ET.Element, comment: Iterable[str]) -> str:
-    """Return an XML document that begins with a comment."""
+    """Return an XML document with a comment at the top."""
     ET.indent(root)
     text = "\n".join(f"  {line}".rstrip() for line in map(one_line, comment))
-    # Two hyphens end a comment, and so does one before its end.
+    # Two hyphens are not allowed in a comment, nor is one at its end.
     safe = re.sub(r"-(?=-)", "- ", text)
-    return (
-        '<?xml version="1.0"'
-        f' encoding="utf-8"?>\n<!--\n{safe}\n-->\n{ET.tostring(root, encoding="unicode")}\n'
-    )
+    body = ET.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="utf-8"?>\n<!--\n{safe}\n-->\n{body}\n'
 
 
 def number(value: float) -> str:
-    """Write a number so that it is read back as it was."""
+    """Return a number with all its digits."""
     return repr(float(value))
 
 
 def numbers(*values: float) -> str:
-    """Write numbers so that they are read back as they were."""
+    """Return numbers with all their digits."""
     return " ".join(map(number, values))

@@ -1,8 +1,7 @@
-"""What a model has beside rigid body and friction: chosen by name, or named by a diagnosis.
+"""Effects of a model in addition to rigid body and friction: chosen, or named by a diagnosis.
 
-Amplitudes, which torques are linear in, are fitted, in each run where each run has its own. Shapes,
-as a stiffness or an encoder's offset, are held at what the diagnosis found, and are as sure as it
-was.
+Amplitudes, in which torques are linear, are fitted, per run if they differ from run to run. Shapes,
+such as a stiffness or an encoder's offset, keep the values and the uncertainty of the diagnosis.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,32 +23,30 @@ from pipelines.model import BASELINE, Term, terms_next_to_bodies
 from pipelines.model.per_run import guess, own_term
 from pipelines.wording.label import effect_at
 
-WHY = (
-    "others have shapes that a diagnosis finds (--causes), or cannot be told from rigid body and"
+REASON = (
+    "others have shapes from a diagnosis (--causes), or cannot be separated from rigid body and"
     " friction"
 )
 
 
 @dataclass(frozen=True)
 class Extension:
-    """Terms beside rigid body and friction."""
+    """Terms in addition to rigid body and friction."""
 
     terms: tuple[Term, ...] = ()
-    """Of what each run has for itself, as the first run has it."""
+    """With the first run's values of parameters that differ from run to run."""
     shape_covariance: NDArray | None = None
-    """(s, s) of the terms' shapes, one after the other; None where they are taken for certain."""
+    """(s, s) of the terms' shapes, in their order; None if they are assumed exact."""
     critical: float = 1.96
     """Half-width of a shape's 95 % interval in standard errors."""
     own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
-    """By a run's file, the terms as they are there; None of what never came."""
+    """Terms by the file of a run; None for an effect that does not occur in it."""
     bodies: Mapping[str, NDArray] = field(default_factory=dict)
-    """By kind of run, and ``human``: the rigid bodies, (k,), that a diagnosis found beside them;
-    empty without one."""
+    """Rigid bodies (k,) of the diagnosis, by kind of run and ``human``; may be empty."""
     recordings: Mapping[str, str] = field(default_factory=dict)
-    """By a run's file, the hash of its recording."""
+    """Hash of its recording, by the file of a run."""
     remarks: tuple[str, ...] = ()
-    """What was left out or guessed, and what was learnt from runs to validate on, a sentence
-    each."""
+    """A sentence for each effect left out, value guessed, or value from a validation run."""
 
     @property
     def covariance(self) -> NDArray:
@@ -58,13 +55,13 @@ class Extension:
         return np.zeros((s, s)) if self.shape_covariance is None else self.shape_covariance
 
     def with_terms(self, terms: Iterable[Term]) -> "Extension":
-        """Return it with more terms; those that it has already are left out, and that is told."""
-        have = {(term.effect.label, term.effect.run) for term in self.terms}
+        """Return it with more terms; a remark names terms that it has already."""
+        existing = {(term.effect.label, term.effect.run) for term in self.terms}
         more, remarks = [], list(self.remarks)
         for term in terms:
-            if (term.effect.label, term.effect.run) in have:
+            if (term.effect.label, term.effect.run) in existing:
                 remarks.append(
-                    f"{term.effect.label} is among the causes already, and is fitted as it is there"
+                    f"{term.effect.label} is one of the causes already, and is fitted as such"
                 )
             else:
                 more.append(term)
@@ -85,21 +82,22 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     Raises
     ------
     InputError
-        Where there is none of this name or at this joint, or its shape would have to be known.
+        If there is no such effect at such a joint, or its shape is unknown.
     """
     effects = [
-        effect_at(label, machine, _shapeless, "--effect", WHY) for label in dict.fromkeys(labels)
+        effect_at(label, machine, _has_no_shape, "--effect", REASON)
+        for label in dict.fromkeys(labels)
     ]
     return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
 def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
-    """Refuse runs that lack a temperature that an effect depends on.
+    """Refuse runs without a temperature on which an effect depends.
 
     Raises
     ------
     InputError
-        Names the effect, the run and the column.
+        With the effect, the run and the column.
     """
     for effect in (term.effect for term in terms if term.effect.needs_temperature):
         for run in (run for run in runs if effect.acts(run.run)):
@@ -108,58 +106,56 @@ def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
                 continue
             column = f"{effect.joint}_temperature_c"
             raise InputError(
-                f"{run.file}: holds no {column}, on which {effect.label} depends; "
-                "record the temperature, or leave the effect out"
+                f"{run.file}: has no column {column}, on which {effect.label} depends. Record the"
+                " temperature, or leave the effect out"
             )
 
 
-def _shapeless(effect: type[Effect]) -> bool:
-    """Tell whether amplitudes are all that is to be known of an effect, and are the same in every
-    run."""
+def _has_no_shape(effect: type[Effect]) -> bool:
+    """Return whether only amplitudes of an effect are unknown, and are the same in every run."""
     has_defaults = all(p.default is not None for p in effect.shape)
-    alike = not any(p.per_run for p in (*effect.linear, *effect.shape))
-    return effect.name not in BASELINE and bool(effect.linear) and has_defaults and alike
+    is_same = not any(p.per_run for p in (*effect.linear, *effect.shape))
+    return effect.name not in BASELINE and bool(effect.linear) and has_defaults and is_same
 
 
 def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Extension:
-    """Return the extension by what a diagnosis named and wrote as a ``parameters/1`` table.
+    """Return the extension with the causes of a diagnosis, from its ``parameters/1`` table.
 
     Parameters
     ----------
     table : Table
         ``parameters.parquet`` of ``exoid diagnose``.
     runs : sequence of Run
-        That are to be fitted and judged.
+        Runs to train on and to validate on.
     recordings : sequence of Path
-        Where each of them is.
+        The file of each run.
 
     Raises
     ------
     InputError
-        Where the table is of another machine.
+        If the table is of another machine.
     """
     _refuse_another_machine(table, runs[0])
     kinds = {run.run for run in runs if run.purpose == "train"}
     with about(table.path):
         others = terms_next_to_bodies(table.frame, runs[0].machine)
     causes = [one for one in others if one[0].effect.name not in BASELINE]
-    acting = [one for one in causes if any(one[0].effect.acts(kind) for kind in kinds)]
+    absent = [term for term, _ in causes if not any(term.effect.acts(kind) for kind in kinds)]
+    acting = [(term, rows) for term, rows in causes if all(term is not one for one in absent)]
     remarks = [
-        f"{term.effect.label} is left out: it acts in none of these runs to train on"
-        for term, _ in causes
-        if all(term is not other for other, _ in acting)
+        f"{term.effect.label} is left out: it acts in none of these training runs"
+        for term in absent
     ]
     terms = tuple(term for term, _ in acting)
     own, hashes = {}, {}
-    for run, path in (
-        zip(runs, recordings, strict=True) if any(term.effect.per_run for term in terms) else ()
-    ):
-        this = hashes[run.file] = recording_behind(path)
-        with about(table.path):
-            own[run.file] = tuple(own_term(term, table, this) for term in terms)
-        remarks += _about(
-            run, path, [term for term in terms if term.effect.acts(run.run)], table, this
-        )
+    if any(term.effect.per_run for term in terms):
+        for run, path in zip(runs, recordings, strict=True):
+            sha256 = recording_behind(path)
+            hashes[run.file] = sha256
+            with about(table.path):
+                own[run.file] = tuple(own_term(term, table, sha256) for term in terms)
+            in_run = [term for term in terms if term.effect.acts(run.run)]
+            remarks += _remarks(run, path, in_run, table, sha256)
     return Extension(
         terms,
         _of_shapes(table, acting),
@@ -173,18 +169,14 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
 
 def _refuse_another_machine(table: Table, run: Run) -> None:
     mechanism = table.metadata.get("mechanism") or run.machine.mechanism.name
-    theirs = [
-        *(
-            f"{one['name']} ({one['kind']})"
-            for one in table.metadata.get("joints") or run.joint_metadata
-        )
-    ]
-    ours = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
+    joints = table.metadata.get("joints") or run.joint_metadata
+    of_table = [f"{one['name']} ({one['kind']})" for one in joints]
+    of_runs = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
     remedy = "give the parameters.parquet of a diagnosis of the same machine"
-    if theirs != ours or mechanism != run.machine.mechanism.name:
+    if of_table != of_runs or mechanism != run.machine.mechanism.name:
         raise InputError(
-            f"{table.path}: is of a {mechanism} with the joints {', '.join(theirs)}, the runs are"
-            f" of a {run.machine.mechanism.name} with {', '.join(ours)}; {remedy}"
+            f"{table.path}: is of a {mechanism} with the joints {', '.join(of_table)}, the runs are"
+            f" of a {run.machine.mechanism.name} with {', '.join(of_runs)}; {remedy}"
         )
     geometry = table.metadata.get("geometry") or {}
     for name, length in run.machine.metadata(run.geometry).items():
@@ -194,24 +186,26 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
             )
 
 
-def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: str) -> list[str]:
-    """Say what is guessed of a run's own values, and what was learnt from a run that is to
-    judge."""
-    own = [term for term in terms if term.effect.per_run]
-    guesses = [guess(term, table, sha256, path) for term in own]
-    learnt = [term.effect.label for term, guessed in zip(own, guesses, strict=True) if not guessed]
-    sentences = [guessed for guessed in guesses if guessed]
-    if learnt and run.purpose == "validate":
-        sentences.append(
-            f"{run.file}: what it has for itself of {' and '.join(learnt)} was learnt from this"
-            " run, so its error is not quite that of a run no fit has seen; the verdict's is"
+def _remarks(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: str) -> list[str]:
+    """Return a sentence on each guessed value, and on values fitted to a validation run."""
+    remarks, fitted = [], []
+    for term in terms:
+        if term.effect.per_run:
+            remark = guess(term, table, sha256, path)
+            if remark:
+                remarks.append(remark)
+            else:
+                fitted.append(term.effect.label)
+    if fitted and run.purpose == "validate":
+        remarks.append(
+            f"{run.file}: its values of {' and '.join(fitted)} were fitted to this run, so its"
+            " error is slightly too small. The verdict's error is not"
         )
-    return sentences
+    return remarks
 
 
 def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDArray:
-    """Return the covariance of the shapes of some terms, (s, s), from that of the rows that tell of
-    each."""
+    """Return the covariance of the terms' shapes, (s, s), from that of their rows."""
     stated = table.metadata.get("covariance")
     error = table.frame["std_error"].to_numpy(float)
     covariance = np.nan_to_num(

@@ -1,4 +1,4 @@
-"""The figures of an identification: what the model predicts, and what is left."""
+"""The figures of an identification: predicted torque and residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,29 +12,29 @@ from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows
-from pipelines.plotting.style import BLUE as LEFT
+from pipelines.plotting.style import BLUE as RESIDUAL
 from pipelines.plotting.style import GREY as MEASURED
 from pipelines.plotting.style import ORANGE as PREDICTED
 from pipelines.plotting.style import STYLE, save
 
-BINS, FEWEST = 25, 8
-"""Of the running mean of a residual, and the samples a bin needs to have one."""
-
-
+BINS = 25
+"""Bins of the running mean of a residual."""
+FEWEST = 8
+"""Fewest samples of a bin with a mean."""
 MOST = 20_000
-"""Rows of a run that are drawn; of a longer one every second, fourth, ..."""
+"""Most rows drawn of a run; of a longer run every second, fourth, ... row is drawn."""
 
 
 @dataclass
-class _Drawn:
-    """What is drawn of one run, and what is said of all of it."""
+class _RunData:
+    """The drawn rows of one run, and sums over all its rows."""
 
     frame: pd.DataFrame
     every: int = 1
     passed: int = 0
     scored: int = 0
     squares: dict[str, float] = field(default_factory=dict)
-    """Of each column, over the scored rows."""
+    """Sum of squares of each column over the scored rows."""
 
     def add(self, frame: pd.DataFrame, columns: Sequence[str]) -> None:
         scored = frame[frame["scored"]]
@@ -64,24 +64,24 @@ def draw(residuals: Rows, folder: Path) -> None:
         for name, run in _validation_runs(residuals).items():
             stem = Path(name).stem
             save(_prediction(run, joints, stem), folder / f"torque-{stem}")
-            save(_what_is_left(run, joints, stem), folder / f"residual-{stem}")
+            save(_residuals(run, joints, stem), folder / f"residual-{stem}")
 
 
-def _validation_runs(residuals: Rows) -> dict[str, _Drawn]:
+def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
     columns = [
         joint.column(quantity) for joint in residuals.joints for quantity in ("residual", "torque")
     ]
-    runs: dict[str, _Drawn] = {}
+    runs: dict[str, _RunData] = {}
     for piece in residuals.pieces():
         frame = piece.to_pandas()
         for name, rows in frame[frame["purpose"] == "validate"].groupby("file", sort=False):
-            runs.setdefault(str(name), _Drawn(rows.iloc[:0])).add(rows, columns)
+            runs.setdefault(str(name), _RunData(rows.iloc[:0])).add(rows, columns)
     return runs
 
 
-def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
-    """Draw measured and predicted torque over time, the difference on the same scale beneath."""
-    run = drawn.frame
+def _prediction(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
+    """Draw measured and predicted torque over time, with the residual on the same scale."""
+    frame = run.frame
     figure, axes = plt.subplots(
         2 * len(joints),
         1,
@@ -92,30 +92,30 @@ def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
     for j, joint in enumerate(joints):
         torque, residual = axes[2 * j], axes[2 * j + 1]
         torque.plot(
-            run["time_s"], run[joint.column("torque")], color=MEASURED, lw=2.2, label="measured"
+            frame["time_s"], frame[joint.column("torque")], color=MEASURED, lw=2.2, label="measured"
         )
         torque.plot(
-            run["time_s"],
-            run[joint.column("predicted")],
+            frame["time_s"],
+            frame[joint.column("predicted")],
             color=PREDICTED,
             lw=0.9,
             label="predicted",
         )
         torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
-        torque.set_title(f"{joint.name}: {_error(drawn, joint)}", loc="left", fontsize=9)
-        _residual_over(residual, run["time_s"], run, joint)
-        residual.set_ylabel(f"left, {joint.unit('torque')}")
+        torque.set_title(f"{joint.name}: {_error(run, joint)}", loc="left", fontsize=9)
+        _residual_over(residual, frame["time_s"], frame, joint)
+        residual.set_ylabel(f"residual, {joint.unit('torque')}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
     axes[-1].set_xlabel("time, s")
-    figure.suptitle(f"{title}: torque no fit has seen", x=0.02, ha="left", fontweight="bold")
+    figure.suptitle(f"{title}: torque of a validation run", x=0.02, ha="left", fontweight="bold")
     figure.align_ylabels()
     figure.tight_layout()
     return figure
 
 
-def _what_is_left(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
-    """Draw the residual against time, angle and speed: noise has no shape in any of them."""
-    run = drawn.frame
+def _residuals(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
+    """Draw the residual against time, angle and speed; noise shows no pattern in any of them."""
+    frame = run.frame
     figure, axes = plt.subplots(
         len(joints), 3, figsize=(10, 2.7 * len(joints)), squeeze=False, sharey="row"
     )
@@ -125,24 +125,24 @@ def _what_is_left(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figur
             f"{joint.name} {q}, {joint.unit(q)}": joint.column(q) for q in ("angle", "velocity")
         }
         for axis, (label, column) in zip(row, against.items(), strict=True):
-            _residual_over(axis, run[column], run, joint, dots=True)
+            _residual_over(axis, frame[column], frame, joint, dots=True)
             axis.set_xlabel(label)
         row[0].set_ylabel(f"{joint.name} residual, {joint.unit('torque')}")
-        row[0].set_title(_error(drawn, joint), loc="left", fontsize=9)
+        row[0].set_title(_error(run, joint), loc="left", fontsize=9)
     figure.legend(
         *axes[0, -1].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4
     )
-    figure.suptitle(f"{title}: what the model leaves", x=0.02, ha="left", fontweight="bold")
+    figure.suptitle(f"{title}: residual", x=0.02, ha="left", fontweight="bold")
     figure.tight_layout()
     return figure
 
 
 def _residual_over(
-    axis: Axes, x: pd.Series, run: pd.DataFrame, joint: Joint, dots: bool = False
+    axis: Axes, x: pd.Series, frame: pd.DataFrame, joint: Joint, dots: bool = False
 ) -> None:
-    residual, scored = run[joint.column("residual")].to_numpy(), run["scored"].to_numpy()
+    residual, scored = frame[joint.column("residual")].to_numpy(), frame["scored"].to_numpy()
     if not dots:
-        axis.plot(x, np.where(scored, residual, np.nan), color=LEFT, lw=0.7)
+        axis.plot(x, np.where(scored, residual, np.nan), color=RESIDUAL, lw=0.7)
         return
     axis.plot(
         x[~scored],
@@ -153,24 +153,23 @@ def _residual_over(
         alpha=0.5,
         label="near a reversal",
     )
-    axis.plot(x[scored], residual[scored], ".", ms=1.2, color=LEFT, alpha=0.6, label="scored")
+    axis.plot(x[scored], residual[scored], ".", ms=1.2, color=RESIDUAL, alpha=0.6, label="scored")
     axis.axhline(0, color="black", lw=0.6)
     if not scored.any():
         return
-    bins = run.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[
+    bins = frame.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[
         joint.column("residual")
     ]
     mean = bins.mean().where(bins.count() >= FEWEST)
     axis.plot([b.mid for b in mean.index], mean, color=PREDICTED, lw=1.6, label="mean")
-    # A joint that sticks leaves errors ten times the rest, which would flatten what there is to
-    # see.
+    # Residuals of a sticking joint are ten times the others and are cut off.
     height = 6 * residual[scored].std()
     if height > 0.0:
         axis.set_ylim(-height, height)
 
 
-def _error(drawn: _Drawn, joint: Joint) -> str:
-    if not drawn.scored:
+def _error(run: _RunData, joint: Joint) -> str:
+    if not run.scored:
         return "no sample away from reversals to score"
-    residual, torque = (drawn.rms(joint.column(name)) for name in ("residual", "torque"))
+    residual, torque = (run.rms(joint.column(name)) for name in ("residual", "torque"))
     return f"RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"

@@ -1,5 +1,4 @@
-"""The rows of ``parameters/1`` that an identification writes, and how each goes with what was
-fitted and held."""
+"""The rows of ``parameters/1`` of an identification, and their slopes by fitted values."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +13,7 @@ from pipelines.model import BASELINE, Term
 
 
 def rows(training: Training, values: NDArray) -> Iterator[Row]:
-    """Yield the rows for some values of the columns, (p,)."""
+    """Yield the rows for the values of the columns, (p,)."""
     terms = list(_sloped(training, values))
     bodies = [one for one in terms if isinstance(one[0].effect, RigidBody)]
     machine, *wearer = bodies
@@ -33,8 +32,7 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
 
 
 def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray]]:
-    """Yield each term, as the first run to train on that has it has it, and how its values change,
-    (v, p + s)."""
+    """Yield each term with the first training run's values, and their slopes (v, p + s)."""
     layout = training.layout
     units = np.eye(layout.shapes(len(layout.terms) - 1).stop)
     for number, term in enumerate(training.model):

@@ -1,4 +1,4 @@
-"""The runs that an identification is given, and whether they suffice."""
+"""The runs of an identification, checked for completeness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,22 +11,28 @@ from pipelines.mechanics.run import Run, kinds_of
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of one machine, by what they are for."""
+    """Runs of one machine."""
 
     motions: tuple[Run, ...]
 
     def of(self, purpose: str, run: str | None = None) -> list[Run]:
-        """Return those of a purpose and, if asked, of a kind of run."""
+        """Return the runs of a purpose, optionally of one kind."""
         return [m for m in self.motions if m.purpose == purpose and run in (None, m.run)]
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of run there are to fit, exo_alone first."""
+        """The kinds of training run, exo_alone first."""
         return kinds_of(self.of("train"))
 
 
 def checked(motions: Sequence[Run]) -> Runs:
-    """Refuse runs that do not belong together or do not suffice for two steps and a validation."""
+    """Return the runs of an identification.
+
+    Raises
+    ------
+    InputError
+        If they are of several machines, or training or validation runs are missing.
+    """
     runs = Runs(tuple(motions))
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     if not runs.of("train", "exo_alone"):

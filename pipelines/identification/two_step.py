@@ -1,10 +1,10 @@
-"""The two-step fit, by whatever estimator.
+"""The two-step fit, with any estimator.
 
 Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds both and fits the
-rigid body of the wearer; step 1's covariance is carried into step 2's intervals. What the model has
-beside them is fitted in step 1, or in step 2 where it acts with a human only. A fit of everything
-at once is computed beside it as a check. Least squares goes through each training run once to
-compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
+rigid body of the wearer; step 1's covariance is carried into step 2's intervals. Other effects are
+fitted in step 1, or in step 2 if they act with a human only. A fit of all parameters at once is the
+check. Least squares reads each training run once to compress its rows, from which every fit
+follows, and twice for the covariance of the residual.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,19 +32,19 @@ from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
 
 BIASED = (
-    f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz ="
-    f" {CUTOFF_HZ:g}, and see to encoder counts and time stamps"
+    f"{IN_WORDS}, so every fit underestimates inertia. Set filter.cutoff_hz ="
+    f" {CUTOFF_HZ:g}, and check encoder counts and time stamps"
 )
-SLOWLY = f"{IN_WORDS}, so that nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the diagnosis"
+LOW_PASSED = f"{IN_WORDS}, so nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the diagnosis"
 STEP = 0.25
-"""Standard errors by which a shape is moved to see what the values make of it."""
-ROUNDS, RESTS = 12, 1e-3
-"""In which loads follow the rigid bodies that they are of, and the relative change at which these
-are at rest."""
-RESTLESS = (
-    f"the rigid bodies and the loads that they make did not come to agree in {ROUNDS} rounds, so"
-    " these values are not to be trusted: some shape that is held, as a soft spring's, does not go"
-    " with these runs"
+"""Difference step of a shape, in its standard errors."""
+ROUNDS = 12
+"""Most iterations of loads and rigid bodies."""
+TOLERANCE = 1e-3
+"""Relative change of rigid bodies at which the iteration has converged."""
+NOT_CONVERGED = (
+    f"rigid bodies and loads did not converge in {ROUNDS} iterations, so these values are not"
+    " reliable. A fixed shape, such as a soft spring's, may not fit these runs"
 )
 
 FitT = TypeVar("FitT", bound=Fit, covariant=True)
@@ -52,41 +52,39 @@ FitT = TypeVar("FitT", bound=Fit, covariant=True)
 
 @dataclass(frozen=True)
 class Identified:
-    """What an identification found and how far to trust it."""
+    """The result of an identification, with its uncertainty and remarks."""
 
     parameters: pd.DataFrame
     """``parameters/1``."""
     covariance: NDArray
-    """In the order of ``parameters``."""
+    """(r, r), in the order of ``parameters``."""
     one_step: NDArray
-    """The values of a fit of everything at once, in the same order."""
+    """(r,) values of a fit of all parameters at once, in the same order."""
     validation: Validation
     runs: tuple[Run, ...]
-    """As they were fitted and judged."""
+    """Training runs, then validation runs."""
     training: Training
     values: NDArray
-    """(p,) of the training's columns."""
+    """(p,) values of the training's columns."""
     extension: Extension
     collinear: list[str]
-    """What this motion cannot separate, a sentence each."""
+    """A sentence for each set of parameters that the motion cannot separate."""
     unrealizable: list[str]
-    """Which rigid bodies, and which friction, no real leg could have, a sentence each."""
+    """A sentence for each rigid body or friction that no real leg can have."""
     method: dict[str, Any]
-    """How it was found, for the file's metadata."""
+    """Description of the method, for the file's metadata."""
     remarks: list[str]
-    """What the method says of these data, and of a machine that would stand on its head, a sentence
-    each."""
+    """Sentences of the method on these data, and on a machine with reversed gravity."""
     angle_noise: list[str]
-    """A sentence where noise of the angles biases every fit; empty where it does not."""
+    """A sentence if noise of the angles biases every fit; otherwise empty."""
 
     def model_of(self, run: Run) -> Model | None:
-        """Return what was found, as it is in a run; None where none of its kind was trained on."""
+        """Return the model with a run's values; None without a training run of its kind."""
         return _as_model(self.training, self.values, run)
 
     @property
     def models(self) -> dict[str, Model]:
-        """What was found, for each kind of run; what each run has for itself is as in the first
-        trained on."""
+        """The model of each kind of run, with the values of its first training run."""
         first = {run.run: run for run in reversed(self.training.runs)}
         return {
             kind: self.training.model_of(run, self.values).for_run(kind)
@@ -95,24 +93,24 @@ class Identified:
 
     @property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
-        """What each run has for itself, by the effect's label, as ``parameters/1`` tells it."""
+        """Values that differ from run to run, by the effect's label, as in ``parameters/1``."""
         by_label: dict[str, list[dict[str, Any]]] = {}
         for run in self.runs if self.extension.recordings else ():
             for i, effect in enumerate(term.effect for term in self.training.model):
-                own = [(place, p.name) for place, p in enumerate(effect.parameters) if p.per_run]
-                if own and effect.acts(run.run):
-                    term = self.training.term_of(run, i, self.values)
-                    values = None if term is None else effect.physical(term.values)
-                    by_label.setdefault(effect.label, []).append(
-                        {
-                            "name": run.file,
-                            "sha256": self.extension.recordings[run.file],
-                            "values": {
-                                name: None if values is None else float(values[at])
-                                for at, name in own
-                            },
-                        }
-                    )
+                places = {p.name: at for at, p in enumerate(effect.parameters) if p.per_run}
+                if not places or not effect.acts(run.run):
+                    continue
+                term = self.training.term_of(run, i, self.values)
+                values: dict[str, float | None] = dict.fromkeys(places)
+                if term is not None:
+                    physical = effect.physical(term.values)
+                    values = {name: float(physical[at]) for name, at in places.items()}
+                entry = {
+                    "name": run.file,
+                    "sha256": self.extension.recordings[run.file],
+                    "values": values,
+                }
+                by_label.setdefault(effect.label, []).append(entry)
         return by_label
 
 
@@ -123,8 +121,7 @@ def identify(
     *,
     reversals: bool = False,
 ) -> Identified:
-    """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the
-    human's.
+    """Identify friction, the exoskeleton's rigid body and, from runs with one, the human's.
 
     Parameters
     ----------
@@ -133,23 +130,23 @@ def identify(
     estimator : Estimator, optional
         The method of both steps; weighted least squares unless given.
     extension : Extension, optional
-        What the model has beside rigid body and friction. Whole runs are then held in memory, for
-        it may remember.
+        Effects in addition to rigid body and friction. Whole runs are then held in memory, because
+        effects may have memory.
     reversals : bool
-        Whether samples near reversals are fitted, too.
+        Whether samples near reversals are also fitted.
 
     Raises
     ------
     InputError
-        Where runs are missing, do not belong together or lack what the method needs.
+        If runs are missing, are of several machines or lack a column that the method needs.
     NotIdentifiable
-        Where the motion cannot separate the parameters.
+        If the motion cannot separate the parameters.
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
     loud = is_loud(runs.of("train"))
     refuse_unread(extension.terms, [*runs.of("train"), *runs.of("validate")])
-    training, at_rest = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
+    training, has_converged = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
     judged = [training.loaded(run) for run in runs.of("validate")]
     steps = {
         kind: Step(one.problem, estimated(one.fit))
@@ -185,8 +182,8 @@ def identify(
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, runs.motions[0].machine),
             *extension.remarks,
-            *[RESTLESS] * (not at_rest),
-            *[SLOWLY.format("fitted or scored" if estimator.masks else "scored")]
+            *[NOT_CONVERGED] * (not has_converged),
+            *[LOW_PASSED.format("fitted or scored" if estimator.masks else "scored")]
             * (training.cutoff_hz is not None),
         ],
         angle_noise=[BIASED] * (loud and training.cutoff_hz is None),
@@ -196,10 +193,9 @@ def identify(
 def _training(
     runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None
 ) -> tuple[Training, bool]:
-    """Return what is fitted to what, with the loads that terms may go with, and whether those are
-    at rest.
+    """Return runs and model to fit, with loads, and whether loads and bodies have converged.
 
-    The plain model is fitted piece by piece, whatever is above the cut-off.
+    A model without extension is fitted piece by piece, without a cut-off.
     """
     train = tuple(runs.of("train"))
     plain = Model.of(baseline(runs.motions[0].machine, runs.kinds))
@@ -210,55 +206,55 @@ def _training(
     train = tuple(run.whole() for run in train)
     training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
     bodies = extension.bodies
-    if not set(_whose(training)) <= set(bodies):
+    if not set(_body_keys(training)) <= set(bodies):
         alone = Training(train, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
-    return _under_its_own_loads(training, bodies)
+    return _with_consistent_loads(training, bodies)
 
 
-def _whose(training: Training) -> list[str]:
-    """Return whose rigid bodies are found: each kind of run's, and the wearer's own."""
+def _body_keys(training: Training) -> list[str]:
+    """Return the keys of the fitted rigid bodies: each kind of run, and the wearer."""
     return [*training.kinds, *["human"] * ("with_human" in training.kinds)]
 
 
-def _under_its_own_loads(
+def _with_consistent_loads(
     training: Training, bodies: Mapping[str, NDArray]
 ) -> tuple[Training, bool]:
-    """Return the training with the loads of the rigid bodies that it finds, and whether it found
-    them in the end.
+    """Return the training with loads of the fitted rigid bodies, and whether these converged.
 
-    The first round's are of ``bodies``. Behind an elastic joint what is found overshoots, round
-    after round, so each step is as long as the last two tell (Aitken, 1926, Proc. Royal Society of
-    Edinburgh 46).
+    The iteration starts from ``bodies``. Behind an elastic joint fixed-point steps overshoot, so
+    their length follows from the last two (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
     """
-    kinds = _whose(training)
+    kinds = _body_keys(training)
     sizes = np.cumsum([len(bodies[kind]) for kind in kinds])[:-1]
-    at, last = np.concatenate([bodies[kind] for kind in kinds]), None
+    values = np.concatenate([bodies[kind] for kind in kinds])
+    last_step, last_length = None, 1.0
     for _ in range(ROUNDS):
-        now = dict(zip(kinds, np.split(at, sizes), strict=True))
+        now = dict(zip(kinds, np.split(values, sizes), strict=True))
         training = training.with_bodies(
             {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
         )
         fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
-        step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - at
-        if np.all(np.abs(step) < RESTS * np.abs(at)):
+        step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - values
+        if np.all(np.abs(step) < TOLERANCE * np.abs(values)):
             return training, True
-        growth = (
-            0.0
-            if last is None
-            else float(step @ last[0] / (last[0] @ last[0])) / last[1] + 1.0 - 1.0 / last[1]
-        )
-        length = 1.0 / (1.0 - np.clip(growth, -3.0, 0.5))
-        last, at = (step, length), at + length * step
+        growth = 0.0
+        if last_step is not None:
+            ratio = float(step @ last_step / (last_step @ last_step))
+            growth = ratio / last_length + 1.0 - 1.0 / last_length
+        last_length = 1.0 / (1.0 - np.clip(growth, -3.0, 0.5))
+        last_step = step
+        values = values + last_length * step
     return training, False
 
 
 def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
-    """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,)
-    each."""
+    """Return the rigid body of each kind of run, and the wearer's, (k,) each."""
     layout = training.layout
     bodies = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
-    return bodies | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
+    return bodies | (
+        {"human": values[layout.bodies[-1]]} if "human" in _body_keys(training) else {}
+    )
 
 
 def _as_model(training: Training, values: NDArray, run: Run) -> Model | None:
@@ -276,8 +272,7 @@ class Step(Generic[FitT]):
 
 
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
-    """Fit what is there in the empty exoskeleton, then, that being held, what comes with a
-    human."""
+    """Fit the parameters of the empty exoskeleton, then, with these fixed, the human's."""
     empty = training.layout.acting_in("exo_alone")
     values = np.zeros(len(empty))
     steps = {}
@@ -309,34 +304,35 @@ def _method(
     }
 
 
-def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]:
-    """Return how least-squares values answer to shapes that are held, (p, h), and the shapes'
-    covariance, (h, h).
+def _sensitivities(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]:
+    """Return the slopes of least-squares values by fixed shapes, and the shapes' covariance.
 
-    ``covariance`` (s, s) is that of the terms' shapes, one after the other; of what each run has
-    for itself, as its first run has it. Other runs' are taken to be as sure, and for themselves.
+    They are (p, h) and (h, h) arrays. ``covariance`` (s, s) is that of the terms' shapes, in the first run if they differ from run to
+    run. Shapes in other runs have the same variance, and are independent.
     """
     error = np.sqrt(np.diag(covariance))
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
-    own, others = [], []
+    first, others = [], []
     for (i, k), e in zip(shapes, error, strict=True):
-        having = [training.runs[run].file for run in training.layout.terms[i].runs]
-        apart = training.model.terms[i].effect.shape[k].per_run
-        own.append((i, k, e, having[:1] if apart else having))
-        others += [(i, k, e, [file]) for file in having[1:]] if apart else []
-    answers = [_answer(training, *moved) for moved in (*own, *others)]
+        files = [training.runs[run].file for run in training.layout.terms[i].runs]
+        if training.model.terms[i].effect.shape[k].per_run:
+            first.append((i, k, e, files[:1]))
+            others += [(i, k, e, [file]) for file in files[1:]]
+        else:
+            first.append((i, k, e, files))
+    slopes = [_sensitivity(training, *shape) for shape in (*first, *others)]
     every = block_diag(covariance, np.diag([e**2 for _, _, e, _ in others]))
-    return np.reshape(answers, (len(answers), training.layout.size)).T, every
+    return np.reshape(slopes, (len(slopes), training.layout.size)).T, every
 
 
-def _answer(
+def _sensitivity(
     training: Training, term: int, shape: int, error: float, files: Sequence[str]
 ) -> NDArray:
-    """Return how least-squares values, (p,), change with a term's shape in some runs."""
+    """Return the slope of least-squares values, (p,), by a term's shape in some runs."""
     if error == 0.0 or not files:
         return np.zeros(training.layout.size)
     now = abs(training.model.terms[term].shape[shape])
-    # A play or a stiffness of which little is known must not fall below nought.
+    # An uncertain backlash or stiffness must stay positive.
     step = min(STEP * error, 0.5 * now or np.inf)
     ahead, behind = (
         _values(_in_steps(training.reshaped(term, shape, moved, files), WeightedLeastSquares()))
@@ -351,14 +347,12 @@ def _covariance(
     extension: Extension,
     training: Training,
 ) -> NDArray:
-    """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of
-    the rest.
+    """Return the covariance of some rows, with the uncertainty of step 1 and of shapes.
 
-    A shape and the amplitudes beside it are estimated from what each explains beyond the others:
-    given the shape, the error of an amplitude hardly goes with that of the shape, and not at all in
-    white noise.
+    A shape and its amplitudes are estimated from what each explains beyond the others: given the
+    shape, an amplitude's error hardly correlates with the shape's, and not at all in white noise.
     """
-    to_shapes, of_shapes = _answers(training, extension.covariance)
+    to_shapes, of_shapes = _sensitivities(training, extension.covariance)
     p, h = to_shapes.shape
     of_linear = np.zeros((p, p))
     for step in steps.values():
@@ -378,14 +372,13 @@ def _critical(
 ) -> NDArray:
     """Return the half-width of each row's interval in standard errors.
 
-    What is fitted with a human is no surer than the less sure of both steps, what is held as sure
-    as it was found.
+    Parameters fitted with a human have the larger value of both steps; fixed ones keep theirs.
     """
     slopes = np.array([row.slope for row in rows])
-    critical, least = np.full(len(rows), extension.critical), 0.0
+    critical, largest = np.full(len(rows), extension.critical), 0.0
     for step in steps.values():
-        least = max(least, step.fit.critical)
-        critical[slopes[:, step.problem.fitted].any(axis=1)] = least
+        largest = max(largest, step.fit.critical)
+        critical[slopes[:, step.problem.fitted].any(axis=1)] = largest
     return critical
 
 
@@ -393,8 +386,7 @@ def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
     driving = table[(table["effect"] == "friction") & (table["ci95_high"] < 0.0)]
     return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
         f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']}"
-        f" ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) and would drive the joint; look for a"
-        " wrong sign of its torque or its angle, or for what is taken for friction (exoid"
-        " diagnose)"
+        f" ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) and drives the joint. Check the signs"
+        " of its torque and angle, or look for a missing effect with exoid diagnose"
         for row in driving.to_dict("records")
     ]

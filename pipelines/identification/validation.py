@@ -1,4 +1,4 @@
-"""How well a model predicts the torque of runs that no fit has seen."""
+"""The torque error of a model on validation runs, and its residuals."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -18,12 +18,12 @@ class Score:
     """Torque error of one group of runs, every array (J,) N·m."""
 
     rmse: NDArray
-    """Away from reversals, as verdicts count it."""
+    """Away from reversals, as in verdicts."""
     rmse_unmasked: NDArray
     """On every valid sample."""
     torque_rms: NDArray
     samples: int
-    """Blocks that ``rmse`` counts."""
+    """Number of blocks of ``rmse``."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,16 @@ class Validation:
 
 
 ModelOf = Callable[[Run], Model | None]
-"""Returns the model of a run, None where its kind has none."""
+"""Returns the model of a run; None for a kind of run without a model."""
 
 
 def validate(
     motions: Sequence[Run], model_of: ModelOf, cutoff_hz: float | None = None
 ) -> Validation:
-    """Score each run's model on it, by kind of run; runs without one are left out, and what is
-    above a cut-off."""
+    """Return the torque error of each run's model, pooled and by kind of run.
+
+    Runs without a model do not count, nor do frequencies above ``cutoff_hz``.
+    """
     joints = motions[0].joints
     sums: dict[str, _Sums] = {}
     for motion in motions:
@@ -77,7 +79,7 @@ def validate(
 
 @dataclass(frozen=True)
 class _Sums:
-    """Square sums, (J,) each, and how many blocks they are over."""
+    """Sums of squares, (J,) each, and their numbers of blocks."""
 
     residual: NDArray
     torque: NDArray
@@ -119,9 +121,16 @@ def _root(squares: NDArray, count: int) -> NDArray:
 def residuals(
     motions: Sequence[Run], model_of: ModelOf, name: str, cutoff_hz: float | None = None
 ) -> Iterator[pa.Table]:
-    """Yield the rows of ``residuals/1``, piece by piece, of all runs that have a model.
+    """Yield the rows of ``residuals/1``, piece by piece, of all runs with a model.
 
-    ``name`` is ``baseline`` or ``extended``.
+    Parameters
+    ----------
+    motions : sequence of Run
+    model_of : callable
+    name : str
+        ``baseline`` or ``extended``.
+    cutoff_hz : float, optional
+        Frequency above which residuals are removed.
     """
     for motion in motions:
         model = model_of(motion)

@@ -1,2 +1,1 @@
-"""The report: one page that shows what the other stages found; it computes nothing of its own but
-running means."""
+"""The report: one page with the results of the other stages, computed from their files only."""

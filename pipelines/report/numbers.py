@@ -1,13 +1,13 @@
-"""Numbers as text: as many digits as they deserve."""
+"""Numbers as text, with as many digits as their uncertainty justifies."""
 
 from math import floor, isfinite, log10
 
 DIGITS = 3
-"""Significant ones, where nothing says how sure a number is."""
-OF_HALF = 2
-"""Significant digits of half an interval that its middle and ends are written to."""
+"""Significant digits of a number without an interval."""
+HALF_DIGITS = 2
+"""Significant digits of half an interval, to which its middle and ends are rounded."""
 PLAIN = (1e-4, 1e6)
-"""Sizes between which a number is written without a power of ten."""
+"""Range of magnitudes written without a power of ten."""
 
 
 def digits(value: float | None) -> str:
@@ -17,12 +17,11 @@ def digits(value: float | None) -> str:
     return _written(value, _decimals(value, DIGITS))
 
 
-def beside(value: float, half: float | None) -> str:
-    """Return a number to two digits of half its interval; as ``digits`` does where that has no
-    width."""
+def digits_for(value: float, half: float | None) -> str:
+    """Return a number to two digits of half its interval; like ``digits`` without an interval."""
     if not half or not isfinite(half):
         return digits(value)
-    return _written(value, _decimals(half, OF_HALF))
+    return _written(value, _decimals(half, HALF_DIGITS))
 
 
 def _decimals(value: float, significant: int) -> int:

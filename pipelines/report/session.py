@@ -1,5 +1,4 @@
-"""A session as its folders hold it: every file of exoid's, known by its contract and not by its
-name."""
+"""A session: the files of exoid in some folders, recognized by their contracts, not their names."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,8 +13,8 @@ from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 
 DOCUMENTS = ("verdict/1", "detectability/1")
-OURS = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
-"""What a damaged document of exoid's still says of itself."""
+CONTRACT_KEY = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
+"""Recognizes a damaged document of exoid."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Artifact:
     contract: str
     """Name and version, as ``residuals/1``."""
     metadata: dict[str, Any]
-    """Of a table what its ``exoid`` entry holds; of a document its ``provenance``."""
+    """The ``exoid`` entry of a table, or the ``provenance`` of a document."""
     sha256: str
 
     @property
@@ -41,39 +40,39 @@ class Artifact:
 
     @property
     def causes(self) -> dict[str, str] | None:
-        """Name and hash of the diagnosis' file whose causes a model refits; None of any other."""
+        """Name and hash of the file whose causes a model refits; None for other models."""
         return self.method.get("causes")
 
     @property
     def effects(self) -> list[str]:
-        """Labels of what a model was told to have beside rigid body and friction."""
+        """Labels of the effects given with ``--effect``."""
         return list(self.method.get("effects") or [])
 
     @property
-    def besides(self) -> str:
-        """What a model of ``exoid identify`` has beside rigid body and friction, in words; nothing
-        of a baseline."""
-        return ", ".join([*(["the named causes, refitted"] if self.causes else []), *self.effects])
+    def additions(self) -> str:
+        """The effects of an identified model in addition to the baseline's, in words."""
+        causes = ["the named causes, refitted"] if self.causes else []
+        return ", ".join([*causes, *self.effects])
 
     @property
     def method(self) -> dict[str, Any]:
-        """How a model was found."""
+        """The method with which a model was identified."""
         stated = self.metadata.get("method")
         return stated if isinstance(stated, dict) else {}
 
-    def is_made_of(self, other: "Artifact") -> bool:
-        """Tell whether the other file, byte for byte, is one of its inputs."""
+    def has_input(self, other: "Artifact") -> bool:
+        """Return whether the other file, byte for byte, is one of its inputs."""
         return any(one["sha256"] == other.sha256 for one in self.inputs)
 
 
 @dataclass(frozen=True)
 class Session:
-    """What was found in some folders."""
+    """The files of exoid in some folders."""
 
     folders: tuple[Path, ...]
     artifacts: tuple[Artifact, ...]
     unreadable: dict[Path, str] = field(default_factory=dict)
-    """What is wrong with each file that looks like exoid's."""
+    """The error of each file of exoid that cannot be read."""
     config: Path | None = None
     _tables: dict[Path, Table] = field(default_factory=dict, repr=False, compare=False)
 
@@ -87,21 +86,24 @@ class Session:
         return [one for one in self.artifacts if one.kind == kind]
 
     def file_of(self, name: str, digest: str) -> Path | None:
-        """Return the file of these bytes, whoever made it; None where the folders hold none of them
-        under that name."""
-        ours = (one.path for one in self.artifacts if one.sha256 == digest)
-        return next(ours, None) or next(
-            (p for p in self._others if p.name == name and sha256(p) == digest), None
-        )
+        """Return the file with these bytes, of any origin; None if the folders lack it.
+
+        A file that no stage wrote must also have that name.
+        """
+        for one in self.artifacts:
+            if one.sha256 == digest:
+                return one.path
+        same_name = (path for path in self._others if path.name == name)
+        return next((path for path in same_name if sha256(path) == digest), None)
 
     @cached_property
     def _others(self) -> list[Path]:
-        """Every file of the folders that no stage wrote: maps, logs, settings."""
+        """The files that no stage wrote: maps, logs, settings."""
         known = {one.path for one in self.artifacts}
         return [path for folder in self.folders for path in _below(folder) if path not in known]
 
     def shown(self, path: Path) -> str:
-        """Return a path as the page writes it: below the session's folder, with slashes."""
+        """Return a path for display: relative to the session's folder, with slashes."""
         for folder in self.folders:
             if path.is_relative_to(folder):
                 inside = path.relative_to(folder).as_posix()
@@ -110,7 +112,7 @@ class Session:
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """The machine's joints, as the file that says most says them."""
+        """The machine's joints, from the first kind of file that the session has."""
         order = (
             "parameters",
             "residuals",
@@ -128,68 +130,61 @@ class Session:
 
     @cached_property
     def verdict_file(self) -> Artifact | None:
-        """The diagnosis's file: the only one, or that in ``diagnosed/``, where `make` has it; two
-        would contradict.
+        """The verdict: the only one, or the one in ``diagnosed/``.
 
         Raises
         ------
         InputError
-            Where there are several, and none in ``diagnosed/``.
+            If there are several, and none or several in ``diagnosed/``.
         """
         files = self.of_kind("verdict")
-        usual = [
-            one
-            for one in files
-            if one.path.parent in [folder / "diagnosed" for folder in self.folders]
-        ]
-        files = usual or files
+        usual = [folder / "diagnosed" for folder in self.folders]
+        files = [one for one in files if one.path.parent in usual] or files
         if len(files) > 1:
             names = ", ".join(self.shown(one.path) for one in files)
             raise InputError(
-                f"{self.folders[0]}: holds {len(files)} verdicts ({names}), expected one; name the"
-                " folders of one diagnosis, or lay two sessions side by side with --compare"
+                f"{self.folders[0]}: holds {len(files)} verdicts ({names}), expected one. Name the"
+                " folders of one diagnosis, or compare two sessions with --compare"
             )
         return files[0] if files else None
 
     @cached_property
     def verdict(self) -> dict[str, Any] | None:
-        """What the diagnosis says; None where none was made."""
+        """The verdict's content; None without a diagnosis."""
         return verdicts.read(self.verdict_file.path) if self.verdict_file else None
 
     @property
     def has_damaged_verdict(self) -> bool:
-        """Whether there is a verdict that cannot be read, and no other."""
+        """Whether the only verdict cannot be read."""
         return not self.verdict_file and any(
             path.name == "verdict.json" for path in self.unreadable
         )
 
     @cached_property
     def extended(self) -> Artifact | None:
-        """The parameters of the model with the named causes: those beside the verdict."""
+        """The parameters of the model with the named causes, in the verdict's folder."""
         return self._next_to_verdict("parameters")
 
     @cached_property
     def identified(self) -> list[Artifact]:
-        """The other models, as ``exoid identify`` writes them: the baselines, then those that have
-        more."""
+        """The models of ``exoid identify``, baselines first."""
         others = [one for one in self.of_kind("parameters") if one is not self.extended]
-        return sorted(others, key=lambda one: bool(one.besides))
+        return sorted(others, key=lambda one: bool(one.additions))
 
     @property
     def baselines(self) -> list[Artifact]:
-        """Those of rigid body and friction alone."""
-        return [one for one in self.identified if not one.besides]
+        """The models of rigid body and friction only."""
+        return [one for one in self.identified if not one.additions]
 
     @cached_property
     def residuals(self) -> Table | None:
-        """What is left before and after; of the identification alone where no diagnosis was
-        made."""
+        """The residuals of the diagnosis, else of the identification."""
         file = self._next_to_verdict("residuals") or next(iter(self.of_kind("residuals")), None)
         return self.table(file) if file else None
 
     @cached_property
     def candidates(self) -> Table | None:
-        """Every cause that was tried."""
+        """Every set of causes that was compared."""
         file = self._next_to_verdict("candidates")
         return self.table(file) if file else None
 
@@ -200,26 +195,25 @@ class Session:
         return self._tables[artifact.path]
 
     def simulations(self, model: Artifact | None) -> list[Artifact]:
-        """Return the simulations of one model, byte for byte."""
-        return [one for one in self.of_kind("simulation") if model and one.is_made_of(model)]
+        """Return the simulations of one model."""
+        return [one for one in self.of_kind("simulation") if model and one.has_input(model)]
 
-    def simulations_by_model(self, what: str) -> dict[str, list[Artifact]]:
-        """Return the simulations of a kind on the ``baseline`` and on the ``extended`` model (see
-        ``simulated``)."""
+    def simulations_by_model(self, kind: str) -> dict[str, list[Artifact]]:
+        """Return the simulations of a kind of the ``baseline`` and the ``extended`` model."""
         baseline = [one for model in self.baselines for one in self.simulations(model)]
         extended = self.simulations(self.extended)
         return {
-            "baseline": [one for one in baseline if simulated(one) == what],
-            "extended": [one for one in extended if simulated(one) == what],
+            "baseline": [one for one in baseline if simulation_kind(one) == kind],
+            "extended": [one for one in extended if simulation_kind(one) == kind],
         }
 
     def recorded(self, artifact: Artifact) -> Artifact | None:
-        """Return the recording or motion that a replay was made of."""
+        """Return the recording or motion of a replay."""
         return next(
             (
                 one
                 for one in self.artifacts
-                if one.kind in ("recording", "motion") and artifact.is_made_of(one)
+                if one.kind in ("recording", "motion") and artifact.has_input(one)
             ),
             None,
         )
@@ -231,24 +225,32 @@ class Session:
         return next((one for one in self.of_kind(kind) if one.path.parent == folder), None)
 
 
-def simulated(artifact: Artifact) -> str:
-    """Say what a ``simulation/1`` file holds: ``loop`` (adaptive control), ``windows`` or
-    ``drives`` (replays)."""
+def simulation_kind(artifact: Artifact) -> str:
+    """Return the kind of a simulation: ``loop`` (adaptive control), ``windows`` or ``drives``.
+
+    The last two are replays: in windows of a second, and in the drives' own loop.
+    """
     if "windows" in artifact.metadata:
         return "windows"
     return "drives" if "closed_loop_rmse_rad" in artifact.metadata else "loop"
 
 
 def find(folders: Sequence[Path], config: Path | None = None) -> Session:
-    """Return what some folders hold, or refuse folders that hold nothing of exoid's."""
+    """Return the session in some folders.
+
+    Raises
+    ------
+    InputError
+        If a folder does not exist, or none holds a file of exoid.
+    """
     artifacts: dict[Path, Artifact] = {}
     unreadable: dict[Path, str] = {}
     for folder in folders:
         if not folder.is_dir():
-            what = "is a file" if folder.exists() else "no such folder"
+            problem = "is a file" if folder.exists() else "no such folder"
             raise InputError(
-                f"{folder}: {what}, expected an experiment's folder; name the one that its stages"
-                " wrote to"
+                f"{folder}: {problem}, expected an experiment's folder; name the one that its"
+                " stages wrote to"
             )
         for path in _files(folder):
             try:
@@ -259,15 +261,14 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
             if artifact:
                 artifacts.setdefault(path.resolve(), artifact)
     if config is None:
-        config = next(
-            (path for folder in folders if (path := folder / "exoid.toml").is_file()), None
-        )
+        paths = (folder / "exoid.toml" for folder in folders)
+        config = next((path for path in paths if path.is_file()), None)
     if not artifacts:
         reason = f" ({next(iter(unreadable.values()))})" if unreadable else ""
         where = ", ".join(map(str, folders))
         raise InputError(
-            f"{where}: no file of exoid's in it{reason}, expected recordings, models or a verdict; "
-            "name the folder that `make` or `exoid diagnose` wrote to"
+            f"{where}: no file of exoid's in it{reason}, expected recordings, models or a verdict."
+            " Name the folder that `make` or `exoid diagnose` wrote to"
         )
     return Session(tuple(folders), tuple(artifacts.values()), unreadable, config)
 
@@ -295,11 +296,11 @@ def _document(path: Path) -> Artifact | None:
     try:
         content = verdicts.parsed(path)
     except ContractError:
-        if path.name == "verdict.json" or OURS.search(
+        if path.name == "verdict.json" or CONTRACT_KEY.search(
             path.read_text(encoding="utf-8", errors="replace")
         ):
             raise
-        return None  # somebody else's
+        return None  # Not written by exoid.
     contract = content.get("contract") if isinstance(content, dict) else None
     if contract not in DOCUMENTS:
         return None

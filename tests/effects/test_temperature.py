@@ -141,6 +141,6 @@ def test_an_identification_with_temperature_refuses_runs_without(warm_and_cold):
     with pytest.raises(InputError) as caught:
         identify(unread, extension=known)
     assert str(caught.value) == (
-        "run_0.parquet: holds no knee_temperature_c, on which friction_temperature@knee depends; "
-        "record the temperature, or leave the effect out"
+        "run_0.parquet: has no column knee_temperature_c, on which friction_temperature@knee"
+        " depends; record the temperature, or leave the effect out"
     )

@@ -1,11 +1,18 @@
-"""What a kernel computes, written down."""
+"""What a kernel computes, outcome_of down."""
 
 import math
 
 import pytest
 from numba import njit
 
-from pipelines.export.formula import Branch, Elements, NotWritable, constant, constants_in, written
+from pipelines.export.formula import (
+    Branch,
+    Elements,
+    NotWritable,
+    constant,
+    constants_in,
+    outcome_of,
+)
 from pipelines.export.matlab import LANGUAGE
 
 
@@ -38,10 +45,10 @@ def formula(kernel, limit=0.25):
         out = [0.0]
         return (Elements("q", 2), limit, out), out
 
-    return written(kernel, arguments)
+    return outcome_of(kernel, arguments)
 
 
-def test_a_choice_is_written_with_both_ways():
+def test_a_choice_is_outcome_of_with_both_ways():
     assert LANGUAGE.assigned(formula(_clipped, constant("limit", 0.25)), "out") == [
         "if q(2) ~= 0.0",
         "    if max(0.0, q(1) - limit) > 1.0",
@@ -55,7 +62,7 @@ def test_a_choice_is_written_with_both_ways():
     ]
 
 
-def test_constants_are_told_once_they_are_written():
+def test_constants_are_told_once_they_are_outcome_of():
     outcome = formula(_clipped, constant("limit", 0.25))
     assert isinstance(outcome, Branch) and set(constants_in(outcome)) == {"limit"}
 

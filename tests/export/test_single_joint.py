@@ -113,7 +113,7 @@ def test_pinocchio_asks_for_the_same_torque(kind, instants):
     made = single(kind, causes={"encoder_offset": {"offset": 0.07}})
     text = URDF.write(made, "machine")[".urdf"]
     model = pinocchio.buildModelFromXML(text)
-    told = float(text.split("Gravity is the reader's to set: ")[1].split()[0])
+    told = float(text.split("Set gravity in the reader: ")[1].split()[0])
     model.gravity.linear = np.array([0.0, 0.0, -told])
     data = model.createData()
     found = [

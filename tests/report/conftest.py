@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import sync_playwright
 
-from pipelines.report.report import report
+from pipelines.report.html.report import report
 from pipelines.report.session import find
 from tests.report.sessions import write_session
 

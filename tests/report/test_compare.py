@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.contracts import PARAMETERS
 from pipelines.errors import InputError
-from pipelines.report.compare import changes, compare, titles_of
+from pipelines.report.html.compare import changes, compare, titles_of
 from pipelines.report.sections.parameters import Estimate
 from pipelines.report.session import find
 from tests.report.sessions import (
@@ -127,7 +127,7 @@ def test_each_error_stands_beside_the_floor_of_its_own_session(tmp_path):
         "0.818 N·m, 1.64 times the floor of 0.500 N·m"
     )
     assert len(page.errors) == 4
-    assert "Errors beside the noise floor" in page.text
+    assert "Errors and the noise floor" in page.text
 
 
 def test_settings_that_differ_are_listed_and_those_that_do_not_or_only_draw_are_not(tmp_path):
@@ -145,7 +145,10 @@ def test_settings_that_differ_are_listed_and_those_that_do_not_or_only_draw_are_
         ("filter.cutoff_hz", '"auto"', "20.0")
     ]
     assert "<code>filter.cutoff_hz</code>" in page.text
-    assert "No setting differs" in compare(sessions[0], sessions[0], ("a", "a")).text
+    assert (
+        "No setting that files of both sessions state differs"
+        in compare(sessions[0], sessions[0], ("a", "a")).text
+    )
 
 
 def test_parameters_of_a_cause_that_only_one_session_names_are_told_as_such(tmp_path):
@@ -206,6 +209,6 @@ def test_without_verdicts_the_page_says_why_no_errors_are_laid_side_by_side(tmp_
         write_parameters(tmp_path / name)
         sessions.append(find([tmp_path / name]))
     assert (
-        "a verdict of each session, so no errors can be laid side by side"
+        "a verdict of each session, so errors cannot be compared"
         in compare(*sessions, ("a", "b")).text
     )

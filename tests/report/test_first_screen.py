@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from pipelines.report.report import report
-from pipelines.report.sections.error_budget import causes_in_words, labels_in_words
+from pipelines.report.html.report import report
 from pipelines.report.sections.key_figures import tiles
 from pipelines.report.session import find
+from pipelines.wording.causes import causes_in_words, labels_in_words
 from tests.report.sessions import AXIS, decision_of, verdict_of, write_session, write_verdict
 
 FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
@@ -127,7 +127,7 @@ def test_a_gain_is_of_the_error_that_the_other_causes_leave(tmp_path):
     of_two, _ = gains(
         folder, cause() | {"gain": cause()["gain"] | {"rmse_reduction_nm": 0.1}}, cause("backlash")
     )
-    assert of_two.small.startswith("0.414 → 0.314 N·m at the knee, beside the other causes;")
+    assert of_two.small.startswith("0.414 → 0.314 N·m at the knee, given the other causes;")
 
 
 def text_of(part):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.contracts import RESIDUALS, SIMULATION, Joint
-from pipelines.report.report import report
+from pipelines.report.html.report import report
 from pipelines.report.session import find
 from tests.report.sessions import (
     AXIS,

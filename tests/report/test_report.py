@@ -13,12 +13,13 @@ import pytest
 from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, Joint, describe
 from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import InputError
-from pipelines.report.report import charts, report
-from pipelines.report.sections import provenance
+from pipelines.report.html.report import report
+from pipelines.report.sections import commands, provenance
 from pipelines.report.sections.animation import animations
 from pipelines.report.sections.error_budget import budget
 from pipelines.report.sections.standstill import moving
 from pipelines.report.session import find
+from pipelines.report.session_charts import charts
 from tests.report.sessions import (
     AXIS,
     RUN,
@@ -139,7 +140,7 @@ def test_what_was_made_of_an_older_recording_is_said_at_the_top(tmp_path):
     top = re.search(r'<section id="verdict".*?</section>', report(find([folder])), re.S)[0]
     assert len(re.findall("has changed since", top)) == 1
     assert "with_human_validate.parquet has changed since" in top
-    assert "more files were made of it; `exoid run` or `make` makes again" in top
+    assert "more files were made of it; `exoid run` or `make` makes them again" in top
 
 
 def imported(folder, **given):
@@ -160,7 +161,7 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     tmp_path,
 ):
     folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
-    lines = [command.line for command in provenance.commands(find([folder]))]
+    lines = [command.line for command in commands.commands(find([folder]))]
     assert (
         lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o"
         f" {folder / 'recordings'}/"
@@ -173,12 +174,12 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     )
     assert "Made of files that are not in these folders" in report(find([folder]))
     (folder / "machine.toml").write_text("[joint]\n")
-    assert "--map old/machine.toml" in provenance.commands(find([folder]))[0].line
+    assert "--map old/machine.toml" in commands.commands(find([folder]))[0].line
 
 
 def test_the_commands_that_repeat_it_end_with_the_report(session_folder):
     session = find([session_folder])
-    assert provenance.commands(session)[-1].line == f"exoid report {session_folder}"
+    assert commands.commands(session)[-1].line == f"exoid report {session_folder}"
     assert f"exoid report {session_folder} --title Leg -o pages/leg.html" in report(
         session, "Leg", Path("pages/leg.html")
     )
@@ -240,7 +241,7 @@ def test_two_verdicts_are_refused_in_a_line_that_says_what_to_do(tmp_path):
 
 
 def test_folders_with_nothing_of_exoids_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"no file of exoid's in it.*name the folder"):
+    with pytest.raises(InputError, match=r"no file of exoid's in it.*Name the folder"):
         find([tmp_path])
     with pytest.raises(InputError, match="no such folder"):
         find([tmp_path / "nowhere"])
@@ -277,10 +278,10 @@ def test_where_the_causes_make_it_worse_that_is_said_on_the_tile_and_below(tmp_p
     top = verdict_part(report(find([folder])))
     assert re.search(r"22\.4 → 36\.7 <span>mrad</span></div><small>worse with the causes", top)
     assert "the knee&#39;s torque error is 2.95 → 3.38 N·m with the causes" in top
-    assert "What is named raises the most that can hold it" in top
+    assert "The named causes raise the breakaway torque" in top
     assert (
-        "the knee strays 22.4 → 36.7 mrad with the causes: nothing corrects such a simulation"
-        in top
+        "the knee&#39;s error is 22.4 → 36.7 mrad with the causes: such a simulation has no"
+        " feedback" in top
     )
     assert "the hip strays" not in top
 

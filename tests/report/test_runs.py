@@ -6,10 +6,10 @@ import pytest
 
 from pipelines.contracts import PARAMETERS, RESIDUALS, Joint
 from pipelines.contracts.provenance import sha256
-from pipelines.report.report import report
+from pipelines.report.html.report import report
 from pipelines.report.sections.fit_quality import scores
 from pipelines.report.sections.key_figures import tiles
-from pipelines.report.sections.not_simulated import unmoved
+from pipelines.report.sections.not_simulated import refusal
 from pipelines.report.sections.parameters import models
 from pipelines.report.session import find
 from tests.report.sessions import (
@@ -54,7 +54,7 @@ def test_a_model_that_cannot_move_is_said_to_with_the_reason_where_its_numbers_a
     tmp_path,
 ):
     session = session_with(tmp_path, "backlash", play=0.01)
-    assert unmoved(session, RUN).startswith(
+    assert refusal(session, RUN).startswith(
         "backlash at the joint: backlash can only be simulated for an exoskeleton's joints"
     )
     page = report(session)
@@ -67,17 +67,17 @@ def test_a_model_that_cannot_move_is_said_to_with_the_reason_where_its_numbers_a
 
 def test_a_model_that_could_move_and_was_not_simulated_is_not_here_yet(tmp_path):
     session = session_with(tmp_path, "torque_offset", offset=0.1)
-    assert unmoved(session, RUN) == ""
+    assert refusal(session, RUN) == ""
     assert "Not here yet: this run, simulated with the causes" in report(session)
 
 
 def test_a_run_that_was_simulated_with_the_causes_lacks_nothing(session_folder):
-    assert unmoved(find([session_folder]), RUN) == ""
+    assert refusal(find([session_folder]), RUN) == ""
     assert "simulated with the causes." not in report(find([session_folder]))
 
 
 @pytest.mark.parametrize(
-    ("away", "says"), [(0.5, "larger with the causes; only about"), (2.5, "larger with the causes")]
+    ("away", "says"), [(0.5, "larger with the causes; only near"), (2.5, "larger with the causes")]
 )
 def test_the_row_in_which_the_causes_make_a_run_worse_says_so_and_whether_only_about_reversals(
     tmp_path, away, says

@@ -1,4 +1,4 @@
-"""A figure as data: drawn with a mouse to zoom on the page, and with matplotlib on paper."""
+"""A chart as data, which the page draws with uPlot and figure files with matplotlib."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from pipelines.report.charts.downsampling import extremes
 
 
 class Role(StrEnum):
-    """What a curve stands for; page and paper give each role its colour."""
+    """The role of a curve, which determines its colour."""
 
     MEASURED = "measured"
     WANTED = "wanted"
@@ -25,12 +25,12 @@ class Mark(StrEnum):
     LINE = "line"
     DOTS = "dots"
     MEAN = "mean"
-    """A thick line through few points: over rows that it has no value in."""
+    """A thick line through few points, across rows without a value."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """One curve of n points; NaN where it has none, which interrupts a ``LINE``."""
+    """One curve, values (n,); NaN interrupts a ``LINE``."""
 
     label: str
     values: NDArray
@@ -43,12 +43,12 @@ class Panel:
     """Curves on one axis."""
 
     label: str
-    """Of the vertical axis, with the unit."""
+    """Label of the vertical axis, with the unit."""
     series: tuple[Series, ...]
     band: float | None = None
     """Half the height of the noise floor's band about zero."""
     reach: float | None = None
-    """Half the height that is shown; what all curves need unless given."""
+    """Half the height shown; None for the height of all curves."""
     title: str = ""
 
 
@@ -57,17 +57,17 @@ class Chart:
     """Panels one above the other that share their horizontal axis."""
 
     key: str
-    """Its name in links and as a file."""
+    """Name in links and of the file."""
     title: str
     caption: str
     x_label: str
     x: NDArray
-    """(n,) never falling."""
+    """(n,), not decreasing."""
     panels: tuple[Panel, ...]
     group: str = ""
     """Charts of one group zoom together."""
     rows: int = field(default=0)
-    """How many rows it had before it was thinned; 0 where it never was."""
+    """Number of rows before thinning; 0 if it was not thinned."""
 
     @property
     def width(self) -> int:
@@ -80,8 +80,7 @@ class Chart:
         return [series for panel in self.panels for series in panel.series]
 
     def thinned(self, rows: int) -> "Chart":
-        """Return the chart with so many rows at most, each of them a row it had; every peak
-        stays."""
+        """Return the chart with at most ``rows`` of its rows, with every peak."""
         if len(self.x) <= rows:
             return self
         kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)
@@ -93,7 +92,7 @@ class Chart:
 
 
 def thinned_alike(charts: Sequence[Chart], values: int) -> list[Chart]:
-    """Return charts that together hold so many numbers at most: the longest give way first."""
+    """Return charts with at most ``values`` numbers in total, the longest thinned first."""
     low, high = 1, max((len(chart.x) for chart in charts), default=1)
     while low < high:
         rows = (low + high + 1) // 2

@@ -1,4 +1,4 @@
-"""The page's charts on paper: the same data, drawn by matplotlib as PDF and PNG."""
+"""The page's charts, drawn by matplotlib."""
 
 from collections.abc import Sequence
 
@@ -11,23 +11,23 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pipelines.plotting.style import BLUE, CAUSES, GREY, NOISE, WANDERS
+from pipelines.report.charts.bars import Bar, Fall
 from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.numbers import digits
-from pipelines.report.sections.error_budget import Bar, Fall
 
 ROWS = 6000
-"""Of a chart, at most: more no printer resolves, and a PDF of them opens slowly."""
+"""Most rows of a chart: no printer resolves more, and the PDF would open slowly."""
 COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
 WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
 TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {
     f"cause{n}": c for n, c in enumerate(CAUSES, 1)
 }
 WIDE, NARROW = 7.2, 3.6
-"""Inches: of two columns of a paper, and of one."""
+"""Widths of two columns of a paper and of one, inches."""
 
 
 def chart_figure(chart: Chart) -> Figure:
-    """Return a chart, its panels one above the other."""
+    """Return the figure of a chart, its panels one above the other."""
     chart = chart.thinned(ROWS)
     cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
     heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
@@ -86,14 +86,14 @@ def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
         return
     x, values = chart.x, series.values
     if series.mark is Mark.MEAN:
-        own = ~np.isnan(values)  # over the rows of others
-        x, values = x[own], values[own]
+        known = ~np.isnan(values)
+        x, values = x[known], values[known]
     width = 1.8 if series.mark is Mark.MEAN else WIDTHS[series.role]
     axis.plot(x, values, color=colour, lw=width, label=label)
 
 
 def budget_figure(bars: Sequence[Bar]) -> Figure:
-    """Return the error budget: one bar a joint, each to its own scale."""
+    """Return the figure of the error budget: one bar per joint, each with its own scale."""
     figure, axes = plt.subplots(
         len(bars), 1, figsize=(WIDE, 0.5 + 1.25 * len(bars)), squeeze=False, layout="constrained"
     )
@@ -125,7 +125,7 @@ def budget_figure(bars: Sequence[Bar]) -> Figure:
 
 
 def falls_figure(falls: Sequence[Fall]) -> Figure:
-    """Return each joint's error before and after, and its noise floor."""
+    """Return the figure of each joint's error without and with the causes, and its noise floor."""
     figure, axis = plt.subplots(figsize=(NARROW, 0.6 + 0.75 * len(falls)), layout="constrained")
     for row, fall in enumerate(falls):
         bars = [(fall.before, GREY)] + ([(fall.after, BLUE)] if fall.after is not None else [])

@@ -1,1 +1,1 @@
-"""The sections of a report, one a file."""
+"""The sections of a report, one a file; each has a function ``context`` (see ``section.py``)."""

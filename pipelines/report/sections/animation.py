@@ -1,6 +1,7 @@
-"""The machine in motion: measured, and as each model has it move in simulations of one second."""
+"""The machine in motion: measured, and in simulations of one second with each model."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,19 +9,20 @@ from numpy.typing import NDArray
 from pipelines.contracts import Table
 from pipelines.contracts.joints import Kind
 from pipelines.report.sections.fit_quality import MODELS, replayed
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 
 FRAMES_HZ = 50.0
 LONGEST_S = 40.0
-"""Of a longer run the stretch is shown in which the first model is furthest off."""
+"""Of a longer run, the stretch with the largest error of the first model is shown."""
 DRAWN: dict[tuple[Kind, ...], str] = {
     ("revolute", "revolute"): "leg",
     ("revolute",): "pendulum",
     ("prismatic",): "slider",
 }
-"""Machines that there is a drawing of, by the kinds of their joints."""
+"""Drawings by the kinds of a machine's joints."""
 SHANK_TO_THIGH = 1.05
-"""The shank's drawn length: no file tells it, and no torque depends on it."""
+"""Assumed ratio of lengths: no file holds the shank's, and no torque depends on it."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,9 @@ class Animation:
 
     run: str
     kind: str
-    """How the machine is drawn, as in ``DRAWN``."""
+    """Name of the drawing: a value of ``DRAWN``."""
     lengths: tuple[float, ...]
-    """Of the links as drawn, m; of a slider how far it goes either way."""
+    """Lengths of the drawn links, or half the travel of a slider, m."""
     time: NDArray
     """(n,) s."""
     angles: dict[str, NDArray]
@@ -39,8 +41,16 @@ class Animation:
     labels: dict[str, str]
 
 
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's animations."""
+    return {
+        "is_leg": drawn_as(content.session) == "leg",
+        "animations": animations(content.session),
+    }
+
+
 def animations(session: Session) -> list[Animation]:
-    """Return one for each replayed run of a machine that can be drawn."""
+    """Return an animation of each replayed run, if the machine can be drawn."""
     if not drawn_as(session):
         return []
     results = []
@@ -51,7 +61,7 @@ def animations(session: Session) -> list[Animation]:
 
 
 def drawn_as(session: Session) -> str:
-    """Return how a session's machine is drawn; nothing where there is no drawing of it."""
+    """Return the drawing's name for a session's machine; empty if there is none."""
     return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
 
 
@@ -60,8 +70,8 @@ def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animatio
     tables = {
         model: table for model, table in tables.items() if len(table.frame) == len(first.frame)
     }
-    time, off = first.frame["time_s"].to_numpy(), np.abs(first.stacked("error")).sum(axis=1)
-    rows = _frames(time, off)
+    time = first.frame["time_s"].to_numpy()
+    rows = _frames(time, np.abs(first.stacked("error")).sum(axis=1))
     angles = {"measured": first.stacked("reference")[rows]}
     labels = {"measured": "measured"}
     for model, table in tables.items():
@@ -71,11 +81,11 @@ def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animatio
     return Animation(run, kind, lengths, time[rows], angles, labels)
 
 
-def _frames(time: NDArray, off: NDArray) -> NDArray:
-    """Return the rows to show: some each second, of the stretch with most error."""
+def _frames(time: NDArray, error: NDArray) -> NDArray:
+    """Return the rows to show, at ``FRAMES_HZ``, of the stretch with the largest error."""
     begin = time[0]
     if time[-1] - begin > LONGEST_S:
-        total = np.concatenate([[0.0], np.cumsum(off**2)])
+        total = np.concatenate([[0.0], np.cumsum(error**2)])
         ends = np.searchsorted(time, time + LONGEST_S)
         whole = time + LONGEST_S <= time[-1]
         begin = time[np.argmax(np.where(whole, total[ends] - total[:-1], -1.0))]

@@ -1,8 +1,8 @@
-"""The adaptive loop on the model without and with the named causes: tracking, error, torque, and
-the sweep of Kv."""
+"""Adaptive control of the model without and with the named causes, and the sweep of Kv."""
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,18 +10,55 @@ import pandas as pd
 from pipelines.contracts import Joint
 from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.sections.fit_quality import MODELS, models_of
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 from pipelines.workflow.graph import SWEEP
 
 GAIN = "feedback_gain_nm_s_rad"
 LIMIT = 4.0
-"""How many times the largest settled error a panel shows: the start, from rest, would flatten the
-rest."""
+"""Height of a panel in largest settled errors; the start from rest exceeds it."""
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's part on control."""
+    session, verdict = content.session, content.verdict
+    return {
+        "control": _comparison(verdict) if verdict else None,
+        "control_is_compared": "extended" in loops(session),
+        "loops": content.charts.control,
+    }
+
+
+def _comparison(verdict: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the table of tracking errors and torques; None without a simulated loop."""
+    loop_of = verdict.get("control") or {}
+    words_of = {"without": "rigid body and friction"}
+    if verdict["causes"]:
+        words_of["with"] = "with the causes"
+    rows = [
+        {
+            "key": key,
+            "words": words,
+            "error": {
+                joint: 1e3 * value for joint, value in loop_of[key]["tracking_rmse_rad"].items()
+            },
+            "torque": loop_of[key]["peak_torque_nm"],
+        }
+        for key, words in words_of.items()
+        if loop_of.get(key)
+    ]
+    if not rows:
+        return None
+    return {
+        "run": loop_of["run"].replace("_", " "),
+        "joints": list(rows[0]["torque"]),
+        "rows": rows,
+        "settled_s": (loop_of.get("controller") or {}).get("settled_after_s"),
+    }
 
 
 def loops(session: Session) -> dict[str, Artifact]:
-    """Return one adaptive loop of each model; where there are several, that with a person in the
-    leg."""
+    """Return one adaptive loop of each model, with a wearer if there are several."""
     results = {}
     for model, simulations in session.simulations_by_model("loop").items():
         ranked = sorted(
@@ -33,7 +70,7 @@ def loops(session: Session) -> dict[str, Artifact]:
 
 
 def control_charts(session: Session) -> Iterator[Chart]:
-    """Yield a chart for each joint, then that of the sweep."""
+    """Yield a chart for each joint, then the chart of the sweep."""
     of_models = loops(session)
     tables = {model: session.table(one).frame for model, one in of_models.items()}
     if not tables:
@@ -70,9 +107,7 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
     return Chart(
         key=f"control-{joint.name}",
         title=f"{joint.name} under adaptive RBF control",
-        caption=(
-            f"From rest; errors count from {settled:g} s on, when the network has learnt the leg."
-        ),
+        caption=(f"From rest; errors count from {settled:g} s on, when the network has adapted."),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(
@@ -111,7 +146,7 @@ def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     return Chart(
         key="kv-sweep",
         title="Largest settled error against the feedback gain",
-        caption="Each gain is a simulation of its own.",
+        caption="One simulation per gain.",
         x_label="feedback gain Kv, N·m·s/rad",
         x=first[GAIN].to_numpy(dtype=float),
         panels=tuple(panels),

@@ -1,10 +1,11 @@
-"""What the first screen shows of the decision: what is missing, and how the residual splits."""
+"""The two cards of the decision: whether something is missing, and how the residual splits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pipelines.report.sections.error_budget import torque_unit
+from pipelines.report.sections.section import Content
 from pipelines.wording.findings import PARTS, Row, Shares, outcomes, rows, searched_runs, shares
 
 OUTCOMES = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
@@ -39,7 +40,7 @@ class Split:
     parts: tuple[Part, ...]
     with_person_only: float | None
     predicted: dict[str, float]
-    """Share of the variance that a curve of one variable alone predicts."""
+    """Share of the variance that a curve of one variable predicts."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,13 @@ class Decision:
     """The runs whose residual is split."""
 
 
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's cards of the decision."""
+    return {"decision": decision(content.verdict) if content.verdict else None}
+
+
 def decision(verdict: Mapping[str, Any]) -> Decision | None:
-    """Return what a verdict says of the decision; None where it says nothing of it."""
+    """Return a verdict's decision; None in files of older versions."""
     cases = outcomes(verdict)
     if not cases:
         return None

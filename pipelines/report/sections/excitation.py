@@ -1,10 +1,11 @@
-"""The excitation: how good it is, what it was to bring, and how near its bounds it comes."""
+"""The excitation: its condition, expected standard errors, and margins to its bounds."""
 
 from dataclasses import dataclass
 from math import pi
 from typing import Any
 
 from pipelines.report.numbers import digits
+from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import unit
 from pipelines.report.session import Artifact, Session
 
@@ -24,7 +25,12 @@ class Excitation:
     margins: tuple[dict[str, Any], ...]
     """Each with joint, quantity, unit, low, high, lowest, highest and margin."""
     errors: tuple[tuple[str, float | None, str], ...]
-    """Each parameter's standard error foreseen, and its unit."""
+    """Name, expected standard error and unit of each parameter."""
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's part on the excitation."""
+    return {"excitations": excitations(content.session)}
 
 
 def excitations(session: Session) -> list[Excitation]:

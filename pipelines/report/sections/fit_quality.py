@@ -1,4 +1,4 @@
-"""Measured beside simulated over whole runs, before and after the causes are named."""
+"""Measured and simulated torque and angle of whole runs, without and with the causes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.report.charts.chart import Chart, Panel, Role, Series
-from pipelines.report.sections.standstill import moving, strays_further, torque_error_grew
+from pipelines.report.sections.standstill import moving, simulation_error_grew, torque_error_grew
 from pipelines.report.session import Artifact, Session
 
 MODELS = {
     "baseline": (Role.BEFORE, "rigid body and friction"),
     "extended": (Role.AFTER, "with the causes"),
 }
-"""The models of ``residuals/1``, and how charts call them."""
+"""Role and legend of the models of ``residuals/1``."""
 
 
 def run_names(session: Session) -> list[str]:
@@ -28,13 +28,13 @@ def run_names(session: Session) -> list[str]:
 
 
 def models_of(session: Session) -> dict[str, tuple[Role, str]]:
-    """Return the models to be drawn: a diagnosis that names nothing has only one."""
+    """Return the models to draw: without a named cause, the baseline only."""
     named = session.verdict is None or bool(session.verdict["causes"])
     return {name: title for name, title in MODELS.items() if named or name == "baseline"}
 
 
 def torque_charts(session: Session) -> Iterator[Chart]:
-    """Yield a chart for each run and joint: torque, and what each model leaves of it."""
+    """Yield a chart for each run and joint: torque, and the residual of each model."""
     if session.residuals is None:
         return
     frame, floors = session.residuals.frame, (session.verdict or {}).get("noise_floor_nm", {})
@@ -62,9 +62,9 @@ def _torque_chart(
         key=f"torque-{_stem(run)}-{joint.name}",
         title=f"{joint.name} {quantity}",
         caption=(
-            "Measured and computed from the motion, in the blocks that were fitted; below, what"
-            " each model leaves away from"
-            f" reversals{', on the band of the noise floor' if floor else ''}."
+            "Measured and computed from the motion, in the blocks that were fitted; below, each"
+            " model's error away from reversals"
+            f"{', on the band of the noise floor' if floor else ''}."
         ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
@@ -77,20 +77,19 @@ def _torque_chart(
 
 
 def angle_charts(session: Session) -> Iterator[Chart]:
-    """Yield a chart for each replayed run and joint: the angle in simulations of a second under the
-    recorded torque."""
+    """Yield a chart of simulated angles for each replayed run and joint."""
     for run, replays in replayed(session).items():
         tables = {model: session.table(one).frame for model, one in replays.items()}
         for joint in session.joints:
             yield _angle_chart(run, joint, tables)
 
 
-def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
-    """Return the replays of a kind (see ``session.simulated``), by run and model that is to be
-    drawn."""
+def replayed(session: Session, kind: str = "windows") -> dict[str, dict[str, Artifact]]:
+    """Return the replays of a kind (see ``session.simulation_kind``), by run and drawn model."""
     results: dict[str, dict[str, Artifact]] = {}
-    for model, replays in session.simulations_by_model(what).items():
-        for one in replays if model in models_of(session) else ():
+    drawn = models_of(session)
+    for model, replays in session.simulations_by_model(kind).items():
+        for one in replays if model in drawn else ():
             source = session.recorded(one)
             run = source.path.name if source else one.inputs[-1]["name"]
             results.setdefault(run, {}).setdefault(model, one)
@@ -99,17 +98,17 @@ def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Art
 
 @dataclass(frozen=True)
 class Score:
-    """How far off the replays of a run are, in one respect."""
+    """One error of a run, for each model."""
 
     words: str
     values: tuple[float | None, ...]
-    """One a model, in the order of ``MODELS``; None where there is no such replay."""
+    """One per model, in the order of ``MODELS``; None if there is no such replay."""
     note: str = ""
-    """What is to be said of the row, in few words."""
+    """Remark on the row, in few words."""
 
 
 LARGER = "larger with the causes"
-STANDS = "no model of speed can tell what holds a joint that stands"
+STANDS = "a model of speed cannot predict the torque that holds a standing joint"
 SCORES = {
     "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
     "drives": (
@@ -117,36 +116,35 @@ SCORES = {
         ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
     ),
 }
-"""Of each kind of replay: the metadata's key, what it is about, in words, and in which multiple of
-the unit."""
+"""For each kind of replay: metadata key, quantity, words, factor and prefix of the unit."""
 
 
 def scores(session: Session, run: str) -> list[Score]:
-    """Return how far off each model is in a run: its torque, and what the replays' files say, joint
-    by joint."""
+    """Return the errors of each model in a run: computed torque, then replays."""
     results = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
-    for what, rows in SCORES.items():
-        replays = replayed(session, what).get(run, {})
-        for key, quantity, words, times, prefix in rows if replays else ():
+    for kind, rows in SCORES.items():
+        replays = replayed(session, kind).get(run, {})
+        for key, quantity, words, factor, prefix in rows if replays else ():
             for joint in session.joints:
-                texts = [
-                    (
-                        replays[model].metadata.get(key, {}).get(joint.name)
-                        if model in replays
-                        else None
-                    )
+                values = tuple(
+                    _stated_error(replays.get(model), key, joint, factor)
                     for model in models_of(session)
-                ]
+                )
                 name = joint.place if quantity == "angle" else joint.effort
                 where = (
                     f"{joint.name} {name}, {words.format(drive=joint.effort)},"
                     f" {prefix}{joint.unit(quantity)}"
                 )
-                values = tuple(None if value is None else times * value for value in texts)
-                results.append(Score(where, values, LARGER if strays_further(*values) else ""))
-                if what == "windows":
+                note = LARGER if simulation_error_grew(*values) else ""
+                results.append(Score(where, values, note))
+                if kind == "windows":
                     results += _while_moving(session, replays, joint, where)
     return [score for score in results if any(value is not None for value in score.values)]
+
+
+def _stated_error(replay: Artifact | None, key: str, joint: Joint, factor: float) -> float | None:
+    value = replay.metadata.get(key, {}).get(joint.name) if replay else None
+    return None if value is None else factor * value
 
 
 def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
@@ -156,7 +154,7 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     rows = session.residuals.frame
     rows = rows[rows["file"] == run]
     floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
-    grew_away = False
+    grew_away_from_reversals = False
     for words, chosen in (
         ("away from reversals", rows[rows["scored"]]),
         ("reversals included", rows),
@@ -167,24 +165,18 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         ]
         values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in errors)
         grew = floor is not None and torque_error_grew(*values, floor=floor)
-        about = (
-            ""
-            if grew_away or words == "away from reversals"
-            else f"; only about reversals, where {STANDS}"
-        )
-        yield Score(
-            f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}",
-            values,
-            LARGER + about if grew else "",
-        )
-        grew_away = grew
+        note = LARGER if grew else ""
+        if grew and words == "reversals included" and not grew_away_from_reversals:
+            note += f"; only near reversals: {STANDS}"
+        label = f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}"
+        yield Score(label, values, note)
+        grew_away_from_reversals = grew
 
 
 def _while_moving(
     session: Session, replays: dict[str, Artifact], joint: Joint, where: str
 ) -> Iterator[Score]:
-    """Yield the error in those seconds in which the joint never stands, where there are such and
-    others."""
+    """Yield the error in the windows without standstill, if there are windows of both kinds."""
     values: list[float | None] = []
     kept = of = 0
     for model in models_of(session):
@@ -215,8 +207,8 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
         key=f"angle-{_stem(run)}-{joint.name}",
         title=f"{joint.name} {where} in simulations of one second",
         caption=(
-            f"Each second the model starts where the machine was and gets the recorded {drive};"
-            " below, how far it strays."
+            f"Each second the model starts from the measured state and receives the recorded"
+            f" {drive}; below, its error."
         ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
@@ -226,7 +218,7 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
 
 
 def broken(frame: pd.DataFrame, column: str) -> NDArray:
-    """Return a column (n,) with a gap where a window begins: no line may join two simulations."""
+    """Return a column (n,) with NaN where a window begins, so that no line joins two windows."""
     begins = frame["window"].diff().fillna(0) != 0
     return frame[column].where(~begins, np.nan).to_numpy()
 

@@ -1,5 +1,4 @@
-"""The numbers of the first screen: how sure, how much, how much is left, and what simulations make
-of it."""
+"""The numbers of the first screen: probability, gain, remaining error and simulation error."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,10 +6,12 @@ from typing import Any
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
 from pipelines.report.numbers import digits
-from pipelines.report.sections.error_budget import cause_in_words, falls, ties_of, torque_unit
+from pipelines.report.sections.error_budget import falls, torque_unit
 from pipelines.report.sections.fit_quality import replayed
-from pipelines.report.sections.standstill import strays_further
+from pipelines.report.sections.section import Content
+from pipelines.report.sections.standstill import simulation_error_grew
 from pipelines.report.session import Session
+from pipelines.wording.causes import cause_in_words, ties_of
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,17 @@ class Tile:
     """Whether the number speaks against naming the causes."""
 
 
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's key figures."""
+    return {"tiles": tiles(content.session)}
+
+
 def tiles(session: Session) -> list[Tile]:
-    """Return what a hurried reader wants to know; nothing without a verdict."""
+    """Return the key figures; none without a verdict."""
     verdict = session.verdict
     if not verdict:
         return []
-    # The tree of findings tells how probable each cause is; older verdicts have none.
+    # The tree of findings shows each probability; verdicts of older versions have no tree.
     skipped = bool(verdict.get("findings"))
     results = [
         tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]
@@ -44,7 +50,7 @@ def tiles(session: Session) -> list[Tile]:
 
 
 def worst_joint(session: Session) -> Joint | None:
-    """Return the joint that the first cause gains most at, or that is furthest above its floor."""
+    """Return the joint of the first cause's largest gain, or furthest above its floor."""
     verdict = session.verdict
     if not verdict:
         return None
@@ -58,7 +64,7 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
     joint = cause["gain"]["joint"]
     remaining = verdict["extended_rmse_nm"][joint]
-    qualifier = ", beside the other causes" if len(verdict["causes"]) > 1 else ""
+    qualifier = ", given the other causes" if len(verdict["causes"]) > 1 else ""
     unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
     words = cause_in_words(cause)
     return [
@@ -79,27 +85,26 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
 
 
 def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
-    """Return how far simulations of a second stray, at the joint that matters most."""
+    """Return the error of simulations of one second, at the worst joint."""
     joint = worst_joint(session)
     before = verdict["baseline_simulation_rmse_rad"].get(joint.name) if joint else None
     if not joint or before is None:
         return []
     after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
     big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
-    is_worse = strays_further(before, after)
+    is_worse = simulation_error_grew(before, after)
     small = "rms of all runs, as the diagnosis fits them"
     if verdict["causes"] and after is None:
         small = "without the causes; with them it cannot be simulated"
     elif is_worse:
-        small = "worse with the causes; why is said below"
+        small = "worse with the causes; the reason is below"
     return [
         Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", small, is_worse)
     ]
 
 
 def _loop_tiles(session: Session) -> list[Tile]:
-    """Return how far the drives' simulated torque is off, of the run where naming the causes gains
-    most."""
+    """Return the drives' simulated torque error, in the run with the largest gain."""
     joint, key = worst_joint(session), "closed_loop_rmse_nm"
     pairs = [
         [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]

@@ -1,25 +1,23 @@
-"""Why a model with its causes was not simulated, where a run was replayed without them alone."""
+"""The reason why a run was replayed without the causes only."""
 
 from pipelines.dynamics.plant import plant_from_table
 from pipelines.errors import ExoidError
-from pipelines.report.sections.error_budget import labels_in_words
 from pipelines.report.sections.fit_quality import models_of, replayed
 from pipelines.report.session import Session
+from pipelines.wording.causes import labels_in_words
 from pipelines.wording.label import cause_label
 
 
 def lacks_causes(session: Session, run: str) -> bool:
-    """Tell whether a run was simulated without the causes, and not with them, where some are
-    named."""
+    """Return whether causes are named, but the run was simulated without them only."""
     is_named = session.extended is not None and "extended" in models_of(session)
     return is_named and set(replayed(session).get(run, {})) == {"baseline"}
 
 
-def unmoved(session: Session, run: str) -> str:
-    """Return why a run's model with the causes cannot move; nothing where it was simulated, or
-    could be.
+def refusal(session: Session, run: str) -> str:
+    """Return why a run cannot be simulated with the causes; empty if it was, or can be.
 
-    The forward dynamics are asked, which is what refused it: no file tells.
+    No file holds the reason, so the forward dynamics are built again.
     """
     if session.extended is None or not lacks_causes(session, run):
         return ""
@@ -27,9 +25,8 @@ def unmoved(session: Session, run: str) -> str:
     try:
         plant_from_table(session.table(session.extended), kind or "with_human")
     except ExoidError as error:
-        # What follows tells those who asked for a simulation what to do.
-        what, _, _ = str(error).partition("; ")
-        return labels_in_words(
-            what, [cause_label(cause) for cause in (session.verdict or {}).get("causes", [])]
-        )
+        # The rest of the message advises the user of `exoid simulate`.
+        reason, _, _ = str(error).partition("; ")
+        causes = (session.verdict or {}).get("causes", [])
+        return labels_in_words(reason, [cause_label(cause) for cause in causes])
     return ""

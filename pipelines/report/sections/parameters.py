@@ -4,7 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import pandas as pd
+
 from pipelines.contracts import Table
+from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
 
@@ -22,26 +25,24 @@ class Estimate:
     value: float
     low: float | None
     high: float | None
-    """Ends of the 95 % interval; None where there is none."""
+    """Ends of the 95 % interval; None if there is none."""
     std_error: float | None = None
     each_run: bool = False
-    """Whether each run has its own, of which this is the first training run's."""
+    """Whether values differ from run to run; this is the first training run's."""
     meaning: str = ""
-    """What it is, in words; nothing where nobody here knows."""
+    """In words; empty for an unknown effect."""
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What makes it the same parameter in two models."""
+        """Identity of the parameter across models."""
         return self.effect, self.joint, self.run, self.name
 
     @property
     def words(self) -> str:
-        """Say which it is."""
-        run, own = (
-            f"({self.run})" if self.run else "",
-            "(per run: the first training run's)" if self.each_run else "",
-        )
-        return " ".join(filter(None, (self.joint, self.symbol, run, own)))
+        """Joint, symbol and run."""
+        run = f"({self.run})" if self.run else ""
+        per_run = "(per run: the first training run's)" if self.each_run else ""
+        return " ".join(filter(None, (self.joint, self.symbol, run, per_run)))
 
     @property
     def half(self) -> float | None:
@@ -49,8 +50,8 @@ class Estimate:
         return None if self.low is None or self.high is None else 0.5 * (self.high - self.low)
 
     @property
-    def is_taken(self) -> bool:
-        """Whether it was taken and not fitted, or chosen among a few values."""
+    def is_assumed(self) -> bool:
+        """Whether the value was assumed instead of fitted, or chosen from a few values."""
         return self.low is not None and self.low == self.high
 
 
@@ -64,18 +65,28 @@ class Model:
     estimates: tuple[Estimate, ...]
     collinear: tuple[str, ...]
     unrealizable: tuple[str, ...] | None
-    """Why it is no real machine; None where the file does not say."""
+    """Reasons why no real machine has these values; None if the file has no such key."""
     remarks: tuple[str, ...]
-    """What its method, or what is strange about it, is worth a sentence."""
+    """Sentences on its method and its peculiarities."""
     angle_noise: tuple[str, ...]
-    """Why the angles let its rigid bodies be too light; empty where they do not."""
+    """Sentences on inertia underestimated because of noisy angles."""
     validation: dict[str, dict[str, dict[str, float]]]
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's tables of models."""
+    shown = models(content.session)
+    return {
+        "has_baseline": bool(content.session.baselines),
+        "models": shown,
+        "parameters": side_by_side(shown),
+    }
 
 
 def models(session: Session) -> list[Model]:
     """Return every model of a session, those of ``exoid identify`` first."""
     results = [
-        (one, f"With {one.besides}" if one.besides else "Rigid body and friction")
+        (one, f"With {one.additions}" if one.additions else "Rigid body and friction")
         for one in session.identified
     ]
     if session.extended:
@@ -94,20 +105,20 @@ class Row:
     """One parameter in every model."""
 
     first: Estimate
-    """As the first model that has it says it: which it is, and its unit."""
+    """The estimate of the first model that has the parameter."""
     estimates: tuple[Estimate | None, ...]
-    """One a model; None where it has no such parameter."""
+    """One per model; None if the model lacks the parameter."""
 
     @property
     def span(self) -> tuple[float, float]:
-        """The range that all its intervals lie in."""
+        """The range that contains all intervals."""
         known = [e for e in self.estimates if e]
         ends = [value for e in known for value in (e.value, e.low, e.high) if value is not None]
         return min(ends), max(ends)
 
 
 def side_by_side(shown: Sequence[Model]) -> list[Row]:
-    """Return every parameter of some models, in the order of the first that has it."""
+    """Return each parameter of some models with its estimates."""
     by_key: dict[tuple[str, str, str, str], dict[int, Estimate]] = {}
     for number, model in enumerate(shown):
         for estimate in model.estimates:
@@ -147,7 +158,7 @@ def estimates(table: Table) -> list[Estimate]:
 
 def _estimate(row: Mapping[str, Any]) -> Estimate:
     low, high, error = (
-        None if row[key] is None or row[key] != row[key] else float(row[key])
+        None if pd.isna(row[key]) else float(row[key])
         for key in ("ci95_low", "ci95_high", "std_error")
     )
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))

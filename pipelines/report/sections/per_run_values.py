@@ -1,5 +1,4 @@
-"""What each run has for itself of a named cause: an offset that is set anew at its start, an onset,
-a phase."""
+"""Values of a named cause that differ from run to run: a zero, an onset, a phase."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,11 +13,11 @@ class RunValues:
     file: str
     purpose: str
     estimates: tuple[Estimate | None, ...]
-    """One a parameter; None where the cause never came in this run."""
+    """One per parameter; None if the cause does not occur in this run."""
 
 
 @dataclass(frozen=True)
-class OwnValues:
+class PerRunValues:
     """A table of all runs."""
 
     headings: tuple[str, ...]
@@ -26,15 +25,14 @@ class OwnValues:
     runs: tuple[RunValues, ...]
 
 
-def own_values(cause: dict[str, Any]) -> OwnValues | None:
-    """Return what each run has of a verdict's cause; None where all share everything, or an older
-    file lacks it."""
+def per_run_values(cause: dict[str, Any]) -> PerRunValues | None:
+    """Return a cause's values in each run; None if all runs share them."""
     runs = cause.get("each_run") or []
     if not runs:
         return None
     units = {one["name"]: "" if one["unit"] == "1" else one["unit"] for one in cause["parameters"]}
     names = tuple(runs[0]["values"])
-    return OwnValues(
+    return PerRunValues(
         tuple(
             ", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names
         ),

@@ -1,4 +1,4 @@
-"""How well each run was recorded: what its file says of itself, and what its times say."""
+"""The quality of each recording: from its metadata, and from its time stamps."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,59 +6,67 @@ from typing import Any
 import numpy as np
 
 from pipelines.contracts import MOTION, RECORDING
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 
-RATE_TOLERANCE, ROUNDING = 0.005, 1e-4
+RATE_TOLERANCE = 0.005
+"""Relative difference of sampling rates that counts as equal."""
+ROUNDING = 1e-4
+"""Unevenness that rounding explains, in sample periods."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recording, or, where only that is there, a motion."""
+    """One recording, or a motion if there are no recordings."""
 
     file: str
     run: str
     purpose: str
     about: str
-    """Rig, subject and session, as the file names them."""
+    """Rig, subject and session, from the file."""
     samples: int
     duration_s: float
     rate_hz: float
-    """As the file says it."""
+    """From the file."""
     measured_rate_hz: float
-    """One over the middle of the steps of time."""
+    """Inverse of the median time step."""
     jitter_ms: float
-    """Half the width within which 98 % of the steps of time lie."""
+    """Half the width of the interval that contains 98 % of the time steps."""
     gaps: int
     missing: int
     abort: str
     recovered: bool
     latency: dict[str, float] | None
-    """How long answers took: ``median_ms``, ``p99_ms``, ``longest_ms``; None where the file does
-    not say."""
+    """Response times of the devices: ``median_ms``, ``p99_ms``, ``longest_ms``; None if absent."""
     clocks: tuple[str, ...]
     imported: str
     filter: str
-    """The filter and why its cut-off, where the run was filtered."""
+    """Filter and reason of its cut-off; empty if the run was not filtered."""
 
     @property
     def rate_is_off(self) -> bool:
-        """Whether the times tell another rate than the file says."""
+        """Whether the time stamps contradict the stated rate."""
         return abs(self.measured_rate_hz / self.rate_hz - 1.0) > RATE_TOLERANCE
 
     @property
     def is_even(self) -> bool:
-        """Whether every step of time is the same, but for how numbers are rounded."""
+        """Whether all time steps are equal up to rounding."""
         return self.jitter_ms * 1e-3 * self.rate_hz < ROUNDING
 
     @property
     def notes(self) -> list[str]:
-        """Return what else is to be said of it."""
-        texts = {
+        """Notes on import, clocks and filter."""
+        notes = {
             "imported from": self.imported,
             "clocks": "; ".join(self.clocks),
             "filtered by": self.filter,
         }
-        return [f"{words} {what}" for words, what in texts.items() if what]
+        return [f"{words} {note}" for words, note in notes.items() if note]
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's table of recordings."""
+    return {"recordings": runs(content.session)}
 
 
 def runs(session: Session) -> list[Run]:
@@ -76,12 +84,11 @@ def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> Run:
     near = step[step < 1.5 * usual] if len(step) else step
     jitter = float(np.subtract(*np.percentile(near, [99, 1]))) / 2 if len(near) else 0.0
     gaps = about.get("gaps") or []
-    named = (about.get(key) for key in ("rig", "subject", "session"))
     return Run(
         file=session.shown(artifact.path),
         run=about["run"],
         purpose=about["purpose"],
-        about=", ".join(str(one) for one in named if one),
+        about=origin(artifact),
         samples=len(time),
         duration_s=float(time[-1] - time[0]),
         rate_hz=float(about["sample_rate_hz"]),
@@ -96,6 +103,12 @@ def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> Run:
         imported=_imported(about.get("imported")),
         filter=_filter(motion.metadata.get("filter")) if motion else "",
     )
+
+
+def origin(artifact: Artifact) -> str:
+    """Return rig, subject and session of a recording; empty if its metadata have none."""
+    keys = ("rig", "subject", "session")
+    return ", ".join(str(artifact.metadata[key]) for key in keys if artifact.metadata.get(key))
 
 
 def _time(artifact: Artifact) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""What each model leaves of the torque, against what the residuals' table knows: angle, speed, load
-and time."""
+"""Residuals of each model against angle, speed, load and time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 from pipelines.contracts import Joint
 from pipelines.report.charts.chart import Chart, Mark, Panel, Series
 from pipelines.report.sections.fit_quality import MODELS, models_of
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.signals.binned_mean import FEWEST, binned_mean
 
 DOTS = 2500
-"""At most, or a cloud hides its shape."""
-TALLEST = 99.5
-"""Percentile of the residual's size that a panel must show."""
+"""Most dots of a chart; more would hide the shape of the cloud."""
+REACH_PERCENTILE = 99.5
+"""Percentile of the residual's magnitude that a panel must show."""
 DEPENDENCES = {
     "angle": "angle",
     "velocity": "speed",
     "acceleration": "acceleration",
     "torque": "load",
 }
-"""Columns of the residuals' table, and the variables of the verdict's ``depends_on`` that they
-are."""
+"""Variables of the verdict's ``depends_on``, by quantity of the residuals' table."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,62 @@ class Against:
     """One column that residuals are drawn against."""
 
     variable: str
-    """As the verdict's ``depends_on`` calls it."""
+    """Its name in the verdict's ``depends_on``."""
     title: str
     label: str
     column: str
 
 
+@dataclass(frozen=True)
+class Predicted:
+    """A variable and the share of the error that it predicts."""
+
+    words: str
+    before: float
+    after: float | None
+
+
+@dataclass(frozen=True)
+class JointResiduals:
+    """One joint's residual charts, and the variables on which its error depends."""
+
+    name: str
+    charts: tuple[Chart, ...]
+    depends: tuple[Predicted, ...]
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's charts of residuals."""
+    session = content.session
+    rows = []
+    for joint in session.joints:
+        prefix = f"residual-{joint.name}-"
+        charts = [chart for chart in content.charts.residuals if chart.key.startswith(prefix)]
+        if charts:
+            depends = tuple(_predicted(session, joint))
+            rows.append(JointResiduals(joint.name, tuple(charts), depends))
+    return {"residuals": rows, "hero": content.charts.hero}
+
+
+def _predicted(session: Session, joint: Joint) -> list[Predicted]:
+    verdict = session.verdict or {}
+    words = {one.variable: one.title for one in against(session, joint)}
+    named = bool(verdict.get("causes"))
+    return [
+        Predicted(
+            words.get(one["variable"], one["variable"].replace("_", " ")),
+            one["share_before"],
+            one["share_after"] if named else None,
+        )
+        for one in verdict.get("depends_on", {}).get(joint.name, [])
+    ]
+
+
 def against(session: Session, joint: Joint) -> list[Against]:
-    """Return what a joint's residuals can be drawn against; the other joint's motion too where
-    there is one."""
+    """Return the columns against which a joint's residuals are drawn.
+
+    With two joints, the other joint's columns are included.
+    """
     charts = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
@@ -74,14 +121,13 @@ def residual_charts(session: Session) -> Iterator[Chart]:
 
 def _reach(frame: pd.DataFrame, joint: Joint) -> float | None:
     size = np.abs(frame[joint.column("residual")].to_numpy())
-    return 1.1 * float(np.percentile(size, TALLEST)) if len(size) else None
+    return 1.1 * float(np.percentile(size, REACH_PERCENTILE)) if len(size) else None
 
 
 def _chart(
     session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None
 ) -> Chart:
-    """Return dots and running means; every model has its dots at the same places, for they are
-    those of the motion."""
+    """Return dots and running means; all models share x, because the motion is the same."""
     rows = {model: frame[frame["model"] == model] for model in models_of(session)}
     rows = {model: table for model, table in rows.items() if len(table)}
     x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
@@ -125,17 +171,17 @@ def _chart(
 def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
     """Return a running mean of y (n,) along x (n,): places and means, (k,) each.
 
-    The bins span all but the outermost 0.5 % at either end, where a mean would be of hardly any.
+    The bins exclude the outermost 0.5 % at either end, which hold too few points for a mean.
     """
     low, high = np.percentile(x, [0.5, 99.5])
     return binned_mean(x, y, low, high + 1e-12)
 
 
-def telling(session: Session, joint: Joint) -> str:
-    """Return the variable that foretold most of what naming the causes took away; of all there is,
-    where none is named.
+def most_explained_variable(session: Session, joint: Joint) -> str:
+    """Return the variable whose predicted error the named causes reduce most.
 
-    Shares are of the variance that each model leaves, so they count by its mean square.
+    Without a cause it is the variable that predicts most of the error. Shares are relative to each
+    model's residual variance, so they are weighted by its mean square.
     """
     verdict = session.verdict or {}
     known = {one.variable for one in against(session, joint)}
@@ -147,7 +193,9 @@ def telling(session: Session, joint: Joint) -> str:
     before, after = (
         verdict[f"{model}_rmse_nm"][joint.name] ** 2 for model in ("baseline", "extended")
     )
-    taken = after if verdict["causes"] else 0.0
-    return max(ranking, key=lambda one: one["share_before"] * before - one["share_after"] * taken)[
-        "variable"
-    ]
+    remaining = after if verdict["causes"] else 0.0
+
+    def explained(one: dict[str, Any]) -> float:
+        return float(one["share_before"] * before - one["share_after"] * remaining)
+
+    return str(max(ranking, key=explained)["variable"])

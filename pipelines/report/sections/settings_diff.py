@@ -1,4 +1,4 @@
-"""Which settings differ between two sessions, as the files of each say them."""
+"""Settings that differ between two sessions, from the metadata of their files."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -8,35 +8,35 @@ from typing import Any
 from pipelines.report.session import Session
 
 SECTIONS = ("mechanism", "design", "acquire", "filter", "identify", "simulate")
-"""Of exoid.toml, that files repeat."""
+"""Sections of exoid.toml that files repeat."""
 OF_DRAWING = ("identify.figures", "simulate.figures")
-"""Which no number depends on."""
+"""Settings of figures, on which no number depends."""
 
 
 @dataclass(frozen=True)
-class SettingApart:
+class SettingDifference:
     """One setting that differs."""
 
     name: str
-    """As exoid.toml has it: ``filter.cutoff_hz``."""
+    """Section and key, such as ``filter.cutoff_hz``."""
     first: str
     second: str
 
 
-def settings_apart(first: Session, second: Session) -> list[SettingApart]:
-    """Return every setting that both sessions' files tell, and tell differently.
+def settings_diff(first: Session, second: Session) -> list[SettingDifference]:
+    """Return the settings that files of both sessions state, with different values.
 
-    Files of one session that were made with different settings all have their say.
+    If files of one session disagree, all their values are listed.
     """
-    one, other = (_stated(session) for session in (first, second))
+    one, other = _settings(first), _settings(second)
     return [
-        SettingApart(name, " and ".join(one[name]), " and ".join(other[name]))
+        SettingDifference(name, " and ".join(one[name]), " and ".join(other[name]))
         for name in one
         if name in other and set(one[name]) != set(other[name]) and name not in OF_DRAWING
     ]
 
 
-def _stated(session: Session) -> dict[str, list[str]]:
+def _settings(session: Session) -> dict[str, list[str]]:
     by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}

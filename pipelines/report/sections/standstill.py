@@ -1,5 +1,4 @@
-"""Where naming the causes makes a simulation worse, and what the files tell of why: standstill,
-mostly."""
+"""Sentences on errors that the causes increase, mostly because a joint stands still."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,19 +11,30 @@ from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
 from pipelines.model import BY_NAME
 from pipelines.report.numbers import digits
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 
 SLOW = 0.1
-"""Share of its rms speed below which a joint is taken for standing."""
+"""Share of its rms speed below which a joint counts as standing."""
 OVER_S = 0.1
-"""Over which speed is measured: an encoder's noise is no motion."""
+"""Time over which speed is measured, s, so that encoder noise does not count as motion."""
 NOTABLE = 1.1
-"""How many times a simulation's error must grow for words to be made of it."""
+"""Factor by which a simulation's error must grow to be mentioned."""
 
 
 def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
-    """Return (n,) whether each row of a replay is of a second in which the machine's joint never
-    stood."""
+    """Return whether the measured joint moved throughout the window of each row.
+
+    Parameters
+    ----------
+    frame : DataFrame of n rows
+        A replay: ``time_s``, ``window``, and the measured angle as reference.
+    joint : Joint
+
+    Returns
+    -------
+    (n,) array of bool
+    """
     time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
     windows = frame["window"].to_numpy()
     span = max(1, round(OVER_S / float(np.median(np.diff(time)))))
@@ -33,9 +43,13 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     return ~np.isin(windows, windows[span:][within & slow])
 
 
-def worse(session: Session) -> list[str]:
-    """Return a sentence for each way in which the causes make things worse at a joint, and why as
-    far as is known."""
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's sentences on increased errors."""
+    return {"worse": increased_errors(content.session)}
+
+
+def increased_errors(session: Session) -> list[str]:
+    """Return a sentence for each error that the causes increase, with the reason if known."""
     verdict = session.verdict
     if not verdict or not verdict["causes"]:
         return []
@@ -43,20 +57,20 @@ def worse(session: Session) -> list[str]:
 
 
 def torque_error_grew(before: float | None, after: float | None = None, *, floor: float) -> bool:
-    """Tell whether a torque error's mean square grows by more than noise has."""
+    """Return whether a torque error's mean square grows by more than that of the noise."""
     return before is not None and after is not None and after**2 - before**2 > floor**2
 
 
-def strays_further(before: float | None, after: float | None = None) -> bool:
-    """Tell whether a simulation's error grows by more than a trifle."""
+def simulation_error_grew(before: float | None, after: float | None = None) -> bool:
+    """Return whether a simulation's error grows by more than ``NOTABLE``."""
     return before is not None and after is not None and after > NOTABLE * before
 
 
 def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
-    name, push = joint.name, joint.effort
+    name, effort = joint.name, joint.effort
     if name not in verdict["noise_floor_nm"]:
         return
-    (before, after), (all_before, all_after), (strayed, strays) = (
+    (before, after), (all_before, all_after), (simulated_before, simulated_after) = (
         (verdict[f"baseline_{key}"][name], verdict[f"extended_{key}"][name])
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
@@ -69,20 +83,21 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
     grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])
     if grew:
         yield (
-            f"Reversals included, {the(name)}'s {push} error is {digits(all_before)} →"
+            f"Reversals included, {the(name)}'s {effort} error is {digits(all_before)} →"
             f" {digits(all_after)} {joint.unit('torque')} with the causes, and {digits(before)} →"
-            f" {digits(after)} away from them: a joint that stands is held by any {push} up to the"
-            " one that breaks it free, and no model of speed can tell which"
-            + (". What is named raises the most that can hold it" if holds else "")
+            f" {digits(after)} away from them. Any {effort} below breakaway holds a standing joint,"
+            " so a model of speed cannot predict it"
+            + (f". The named causes raise the breakaway {effort}" if holds else "")
         )
-    if strays_further(strayed, strays):
+    if simulation_error_grew(simulated_before, simulated_after):
         why = (
-            f"nothing corrects such a simulation, and a small error of {push} decides when a joint"
-            " that stands comes free; the table of each run tells apart the seconds in which it"
-            " never stands"
+            f"such a simulation has no feedback, and a small {effort} error shifts the instant at"
+            " which a standing joint breaks free; each run's table lists the seconds without"
+            " standstill separately"
         )
         yield (
-            f"Simulated for 1 s by the recorded {push}, {the(name)} strays {digits(1e3 * strayed)}"
-            f" → {digits(1e3 * strays)} m{joint.unit('angle')} with the causes: "
-            + (why if grew or holds else "these files do not tell why")
+            f"Simulated for 1 s with the recorded {effort}, {the(name)}'s error is"
+            f" {digits(1e3 * simulated_before)} → {digits(1e3 * simulated_after)}"
+            f" m{joint.unit('angle')} with the causes: "
+            + (why if grew or holds else "these files do not show the reason")
         )

@@ -1,7 +1,7 @@
-"""What the symbols of a model's parameters stand for: each term with its equation, as the effects
-themselves say."""
+"""Meaning, unit and equation of the symbols of a model's parameters, from the effects."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.effects import Effect, Parameter
@@ -9,11 +9,12 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.model import effect_named
+from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 
 
 @dataclass(frozen=True)
-class Explained:
+class Term:
     """One term of the models."""
 
     title: str
@@ -21,48 +22,57 @@ class Explained:
     parameters: tuple[Parameter, ...]
 
 
-def terms(session: Session) -> list[Explained]:
-    """Return every kind of term in a session's models, once; of effects that are not known here,
-    none."""
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's list of terms."""
+    return {"terms": terms(content.session)}
+
+
+def terms(session: Session) -> list[Term]:
+    """Return each term of a session's models once, without unknown effects."""
     rows = [
         (row["effect"], row["joint"] if isinstance(row["joint"], str) else None)
         for one in session.of_kind("parameters")
         for row in session.table(one).frame[["effect", "joint"]].to_dict("records")
     ]
-    results: dict[str, Explained] = {}
+    results: dict[str, Term] = {}
     for name, joint in rows:
         effect = bound(session, name, joint)
         if effect and name not in results:
-            results[name] = Explained(effect.title, effect.equation, parameters(effect))
+            results[name] = Term(effect.title, effect.equation, parameters(effect))
     return list(results.values())
 
 
 def meaning(session: Session, effect: str, joint: str, name: str) -> str:
-    """Return what one parameter is, as its effect says; nothing where the effect is not known
-    here."""
-    of = bound(session, effect, joint or None)
-    return next((one.meaning for one in parameters(of) if one.name == name), "") if of else ""
+    """Return a parameter's meaning; empty for an unknown effect."""
+    return next((one.meaning for one in _parameters_of(session, effect, joint or None, name)), "")
 
 
 def unit(session: Session, key: str) -> str:
-    """Return the unit of a parameter of rigid body or friction by its name in an excitation's file:
-    ``hip_viscous``."""
+    """Return the unit of a parameter by its key in a trajectory file, such as ``hip_viscous``."""
     joint = next((one for one in session.joints if key.startswith(f"{one.name}_")), None)
-    of = bound(session, "friction" if joint else "rigid_body", joint.name if joint else None)
-    name = key.removeprefix(f"{joint.name}_") if joint else key
-    return next((one.unit for one in parameters(of) if one.name == name), "") if of else ""
+    if joint:
+        named = _parameters_of(session, "friction", joint.name, key.removeprefix(f"{joint.name}_"))
+    else:
+        named = _parameters_of(session, "rigid_body", None, key)
+    return next((one.unit for one in named), "")
+
+
+def _parameters_of(
+    session: Session, effect_name: str, joint: str | None, name: str
+) -> list[Parameter]:
+    effect = bound(session, effect_name, joint)
+    return [one for one in parameters(effect) if one.name == name] if effect else []
 
 
 def parameters(effect: Effect) -> tuple[Parameter, ...]:
-    """Return an effect's parameters in the units of the joint that it is at."""
+    """Return an effect's parameters, in the units of its joint."""
     return tuple(
         one.at(effect.on, effect.joint) if effect.joint else one for one in effect.parameters
     )
 
 
 def bound(session: Session, name: str, joint: str | None) -> Effect | None:
-    """Return an effect at a joint of the session's machine; None where there is no such effect or
-    machine here."""
+    """Return an effect at a joint of the session's machine; None for an unknown one."""
     try:
         return effect_named(name)(joint=joint, on=_machine(session.joints, session))
     except InputError:

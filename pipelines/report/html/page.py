@@ -1,5 +1,4 @@
-"""One HTML file that needs nothing else: style, scripts and data are in it, and no text of a file
-can be a script."""
+"""One HTML file that holds its style, scripts and data; texts from files never run as scripts."""
 
 import base64
 import hashlib
@@ -20,33 +19,32 @@ from pipelines import __version__
 from pipelines.contracts import describe
 from pipelines.contracts.provenance import sha256
 from pipelines.report.charts.chart import Chart
-from pipelines.report.numbers import beside, digits
+from pipelines.report.numbers import digits, digits_for
 from pipelines.report.sections.animation import Animation
 from pipelines.report.session import Artifact
 from pipelines.workflow.graph import SWEEP
 
 LARGEST_BYTES = 5_000_000
-"""Of a page."""
+"""Size of a page."""
 VALUES = 600_000
-"""Numbers in all charts of a page: four bytes each, four thirds of that as text, and room for the
-words."""
+"""Numbers in all charts of a page: 5.3 bytes each as base64, which leaves room for words."""
 
 ASSETS = files("pipelines.report").joinpath("assets")
 
 
 def render(
     template: str,
-    drawn: Iterable[Chart],
-    moving: Iterable[Animation],
+    charts: Iterable[Chart],
+    animations: Iterable[Animation],
     context: Mapping[str, Any],
     artifacts: Iterable[Artifact],
 ) -> str:
-    """Return a page as text; ``told`` is what its template shows, all of which is escaped."""
+    """Return a page as text; every text of ``context`` is escaped."""
     style = asset("uPlot.min.css") + asset("page.css")
     scripts = [asset("sharp.js"), asset("uPlot.iife.min.js"), asset("page.js")]
     data = {
-        "charts": {chart.key: _chart(chart) for chart in drawn},
-        "animations": [_animation(one) for one in moving],
+        "charts": {chart.key: _chart(chart) for chart in charts},
+        "animations": [_animation(one) for one in animations],
     }
     return (
         _environment()
@@ -68,11 +66,13 @@ def render(
 
 
 def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
-    """Return what the page was made of, as every result of exoid's tells it."""
-    known = list(artifacts)
-    inputs = [{"name": one.path.name, "sha256": one.sha256} for one in known]
-    # A table without metadata, drawn where the loop of its model is.
-    sweeps = dict.fromkeys(one.path.with_name(SWEEP) for one in known if one.kind == "simulation")
+    """Return the page's inputs, as in the metadata of every file of exoid."""
+    artifacts = list(artifacts)
+    inputs = [{"name": one.path.name, "sha256": one.sha256} for one in artifacts]
+    # The sweep is a table without metadata, in the folder of its model's loop.
+    sweeps = dict.fromkeys(
+        one.path.with_name(SWEEP) for one in artifacts if one.kind == "simulation"
+    )
     inputs += [{"name": file.name, "sha256": sha256(file)} for file in sweeps if file.is_file()]
     return describe() | {"inputs": inputs}
 
@@ -92,13 +92,12 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"digits": digits, "beside": beside}
+    environment.filters |= {"digits": digits, "digits_for": digits_for}
     return environment
 
 
 def _digest(text: str) -> str:
-    """Return how a content security policy names an inline script or style: what is not named does
-    not run."""
+    """Return the hash that allows an inline script or style in a content security policy."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
@@ -109,7 +108,7 @@ def _uplot_version(script: str) -> str:
 
 
 def _in_a_script(data: Any) -> str:
-    """Return JSON that stays inside its script element whatever a text in it holds."""
+    """Return JSON in which no text can end the script element."""
     text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
@@ -153,8 +152,3 @@ def coded(values: NDArray, dtype: type[np.floating]) -> str:
     return base64.b64encode(
         np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()
     ).decode()
-
-
-def indented(settings: Mapping[str, Any]) -> str:
-    """Return settings as indented JSON, to be read."""
-    return json.dumps(settings, indent=1, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""Two sessions side by side: what changed, beyond what their intervals allow for."""
+"""The comparison of two sessions: verdicts, errors, settings, and changes of parameters."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -6,15 +6,14 @@ from math import hypot
 from typing import Any
 
 from pipelines.errors import InputError
+from pipelines.report.html.page import render
 from pipelines.report.numbers import digits
-from pipelines.report.page import render
-from pipelines.report.report import headline, machine, status
-from pipelines.report.sections.error_budget import any_label_in_words, cause_in_words, torque_unit
-from pipelines.report.sections.lead import lead
+from pipelines.report.sections.error_budget import torque_unit
+from pipelines.report.sections.headline import headline, lead, machine, status
 from pipelines.report.sections.parameters import Estimate, estimates
-from pipelines.report.sections.recordings import runs
-from pipelines.report.sections.settings_diff import SettingApart, settings_apart
+from pipelines.report.sections.settings_diff import SettingDifference, settings_diff
 from pipelines.report.session import Artifact, Session
+from pipelines.wording.causes import any_label_in_words, cause_in_words
 from pipelines.wording.label import cause_label
 
 
@@ -34,22 +33,19 @@ class Change:
 
     @property
     def half(self) -> float | None:
-        """Half the 95 % interval of the difference of independent estimates; None where one of them
-        has none.
+        """Half the 95 % interval of the difference of independent estimates; None without one.
 
-        Nor is there one of values that are each run's own: two first runs need not have the same.
-
-        Errors of independent sessions add in squares, and so do the intervals' halves: each is its
-        standard error times the critical value that its session's scatter asks for.
+        Values that differ from run to run have none, because two first runs may differ. The errors
+        of independent sessions add in squares, and so do the half widths.
         """
-        own = self.first.each_run or self.second.each_run
-        if own or self.first.half is None or self.second.half is None:
+        per_run = self.first.each_run or self.second.each_run
+        if per_run or self.first.half is None or self.second.half is None:
             return None
         return hypot(self.first.half, self.second.half)
 
     @property
     def is_beyond(self) -> bool | None:
-        """Whether the difference's interval leaves out zero; None where there is none."""
+        """Whether the difference's interval excludes zero; None without an interval."""
         return None if not self.half else abs(self.difference) > self.half
 
 
@@ -61,42 +57,41 @@ class ModelChanges:
     files: tuple[str, str]
     changes: tuple[Change, ...]
     only: tuple[tuple[str, ...], tuple[str, ...]]
-    """Parameters that only the one or the other session has."""
+    """Parameters of the first session only, and of the second only."""
 
     @property
     def beyond(self) -> int:
-        """How many have changed beyond their intervals."""
+        """Number of parameters that changed beyond their intervals."""
         return sum(bool(change.is_beyond) for change in self.changes)
 
     @property
     def judged(self) -> int:
-        """How many could have."""
+        """Number of parameters with an interval of the difference."""
         return sum(change.is_beyond is not None for change in self.changes)
 
 
 def changes(first: Sequence[Estimate], second: Sequence[Estimate]) -> list[Change]:
-    """Return the parameters that both have, in the order of the first."""
+    """Return the parameters of both, in the order of the first."""
     others = {one.key: one for one in second}
     return [Change(one.words, one.unit, one, others[one.key]) for one in first if one.key in others]
 
 
 @dataclass(frozen=True)
-class Compared:
-    """The page, and the count that stands on top of it."""
+class Comparison:
+    """The page, and its main results for the terminal."""
 
     text: str
     changed: int
     judged: int
     headline: str
-    """What changed, most telling first."""
+    """The changes, most important first."""
     errors: tuple[str, ...]
-    """Each joint's errors beside the floors, as a line."""
-    settings: tuple[SettingApart, ...]
+    """One line per joint and model: its errors and noise floors."""
+    settings: tuple[SettingDifference, ...]
 
 
 def titles_of(first: Session, second: Session) -> tuple[str, str]:
-    """Return what the sessions are called: their folders, as far up as it takes to tell them
-    apart."""
+    """Return the names of the sessions' folders, with as many parents as make them differ."""
     paths = [session.folders[0].resolve() for session in (first, second)]
     names = [path.name for path in paths]
     for path_a, path_b in zip(*(path.parents for path in paths), strict=False):
@@ -106,65 +101,63 @@ def titles_of(first: Session, second: Session) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compared:
-    """Lay two sessions side by side.
+def compare(first: Session, second: Session, titles: tuple[str, str]) -> Comparison:
+    """Compare two sessions of one machine.
 
     Raises
     ------
     InputError
-        Where they are of different machines, whose numbers have nothing to do with each other.
+        If their machines or the units of their parameters differ.
     """
     pair = (first, second)
     refuse_different_machines(pair, titles)
     models = list(_models(pair))
     refuse_different_units(models)
+    rows = _errors_and_floors(pair)
     context: dict[str, Any] = {
         "titles": titles,
-        "machines": [machine(session, runs(session)) for session in pair],
+        "machines": [machine(session) for session in pair],
         "verdicts": [session.verdict for session in pair],
         "leads": [lead(session.verdict) if session.verdict else "" for session in pair],
-        "unreadable": [trouble for session in pair for trouble in session.unreadable.values()],
+        "unreadable": [error for session in pair for error in session.unreadable.values()],
         "statuses": [status(session.verdict) for session in pair],
         "headlines": [headline(session) for session in pair],
         "models": models,
-        "settings": settings_apart(first, second),
-        "beside_floor": _next_to_floor(pair),
-        # A parameter that both models have is counted once, in the one that is told last and knows
-        # most.
+        "settings": settings_diff(first, second),
+        "errors_and_floors": rows,
+        # The last model has the most parameters; those of the other are not counted twice.
         "beyond": models[-1].beyond if models else 0,
         "judged": models[-1].judged if models else 0,
         "causes": _causes(pair),
-        "errors": _errors(pair),
+        "errors": _by_model(rows),
     }
-    context["headline"] = _what_changed(pair, context["beyond"], context["judged"])
+    context["headline"] = _change_in_words(pair, context["beyond"], context["judged"])
     text = render("compare.html", (), (), context, (*first.artifacts, *second.artifacts))
-    lines = tuple(row.words for row in context["beside_floor"])
-    return Compared(
+    return Comparison(
         text,
         context["beyond"],
         context["judged"],
         context["headline"],
-        lines,
+        tuple(row.words for row in rows),
         tuple(context["settings"]),
     )
 
 
-def _what_changed(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
+def _change_in_words(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
     """Return the headline: the verdict's change before that of the parameters."""
-    of_parameters = (
-        f"{beyond} of {judged} parameters changed beyond their intervals"
-        if beyond
-        else "no parameter changed beyond its interval"
-        if judged
-        else "nothing that both sessions have can be compared"
-    )
-    of_verdict = _verdict_changed(pair)
+    if beyond:
+        of_parameters = f"{beyond} of {judged} parameters changed beyond their intervals"
+    elif judged:
+        of_parameters = "no parameter changed beyond its interval"
+    else:
+        of_parameters = "nothing that both sessions have can be compared"
+    of_verdict = _verdict_change_in_words(pair)
     sentence = f"{of_verdict}; {of_parameters}" if of_verdict else of_parameters
     return sentence[:1].upper() + sentence[1:]
 
 
-def _verdict_changed(pair: tuple[Session, Session]) -> str:
-    """Say how the verdict changed; nothing where it did not, or one of the sessions has none."""
+def _verdict_change_in_words(pair: tuple[Session, Session]) -> str:
+    """Return the verdict's change; empty if there is none, or a session has no verdict."""
     if not all(session.verdict for session in pair):
         return ""
     first, second = (status(session.verdict)["words"] for session in pair)
@@ -177,8 +170,8 @@ def _verdict_changed(pair: tuple[Session, Session]) -> str:
 
 
 @dataclass(frozen=True)
-class NextToFloor:
-    """One error of a joint in both sessions, each beside its session's floor."""
+class ErrorAndFloor:
+    """One error of a joint in both sessions, with each session's noise floor."""
 
     joint: str
     model: str
@@ -188,12 +181,12 @@ class NextToFloor:
 
     @property
     def highest(self) -> float:
-        """The largest of the four."""
+        """The largest error or floor."""
         return max(*self.values, *self.floors)
 
     @property
     def words(self) -> str:
-        """Say it in a line."""
+        """Errors and floors in one line."""
         parts = [
             f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
             for v, f in zip(self.values, self.floors, strict=True)
@@ -201,16 +194,16 @@ class NextToFloor:
         return f"{self.joint}, {self.model}: {parts[0]} → {parts[1]}"
 
 
-def _next_to_floor(pair: tuple[Session, Session]) -> list[NextToFloor]:
-    """Return each joint's error without causes and, where either names any, with them."""
+def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
+    """Return each joint's error without the causes and, if any is named, with them."""
     first, second = (session.verdict for session in pair)
     if not first or not second:
         return []
     kinds = [("rigid body and friction", "baseline_rmse_nm")]
     if first["causes"] or second["causes"]:
-        kinds.append(("with what each names", "extended_rmse_nm"))
+        kinds.append(("with the causes that each names", "extended_rmse_nm"))
     return [
-        NextToFloor(
+        ErrorAndFloor(
             joint,
             words,
             torque_unit(first, joint),
@@ -223,14 +216,19 @@ def _next_to_floor(pair: tuple[Session, Session]) -> list[NextToFloor]:
 
 
 def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
-    """Refuse sessions whose machines differ in their joints' names or kinds, or in how these are
-    put together."""
-    for what, description in (("", _joints_in_words), ("mechanism ", _mechanism)):
+    """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism.
+
+    Raises
+    ------
+    InputError
+        If they differ.
+    """
+    for prefix, description in (("", _joints_in_words), ("mechanism ", _mechanism)):
         one, other = (description(session) for session in pair)
         if one and other and one != other:
             raise InputError(
-                f"{titles[0]} is of another machine than {titles[1]} ({what}{one}, and"
-                f" {what}{other}), expected two sessions of one machine; compare those"
+                f"{titles[0]} is of another machine than {titles[1]} ({prefix}{one}, and"
+                f" {prefix}{other}). Compare two sessions of one machine"
             )
 
 
@@ -239,21 +237,26 @@ def _joints_in_words(session: Session) -> str:
 
 
 def _mechanism(session: Session) -> str | None:
-    """Return the name of the mechanism that a session's first model says; None where none does."""
+    """Return the mechanism's name in a session's models; None if they have none."""
     names = (one.metadata.get("mechanism") for one in session.of_kind("parameters"))
     return next((name for name in names if isinstance(name, str)), None)
 
 
 def refuse_different_units(models: Iterable[ModelChanges]) -> None:
-    """Refuse a parameter that has one unit here and another there: a difference would mean
-    nothing."""
+    """Refuse parameters whose unit differs between the sessions.
+
+    Raises
+    ------
+    InputError
+        If a unit differs.
+    """
     for model in models:
         for change in model.changes:
             if change.first.unit != change.second.unit:
                 raise InputError(
                     f"{model.files[0]} and {model.files[1]}: {change.words} is in"
-                    f" {change.first.unit} and in {change.second.unit}, expected one unit; compare"
-                    " sessions of one machine"
+                    f" {change.first.unit} and in {change.second.unit}, expected one unit. Compare"
+                    " two sessions of one machine"
                 )
 
 
@@ -261,7 +264,7 @@ def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
     first, second = pair
     kinds = (
         ("Rigid body and friction", [next(iter(session.baselines), None) for session in pair]),
-        ("With what each names", [session.extended for session in pair]),
+        ("With the causes that each names", [session.extended for session in pair]),
     )
     for title, (one, other) in kinds:
         if one and other:
@@ -285,15 +288,13 @@ def _model(
 
 
 def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
-    """Return the parameters that a session has alone, those of the causes that it names as such."""
+    """Return the parameters of one session only, in words, with its named causes."""
     named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
     return tuple(
-        (
-            f"{e.words} of {any_label_in_words(label)}, which it names"
-            if (label := _label(e)) in named
-            else e.words
-        )
-        for e in alone
+        f"{one.words} of {any_label_in_words(_label(one))}, which it names"
+        if _label(one) in named
+        else one.words
+        for one in alone
     )
 
 
@@ -302,7 +303,7 @@ def _label(estimate: Estimate) -> str:
 
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
-    """Return every cause that either verdict names, with what each says of it."""
+    """Return the causes that either verdict names, with probability and gain in each."""
     named = [
         {cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])}
         for session in pair
@@ -335,9 +336,8 @@ def _cause_cell(session: Session, cause: dict[str, Any] | None) -> dict[str, Any
     }
 
 
-def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[NextToFloor]]]:
-    """Return for each error, without causes and with them, a pair of bars for each joint."""
-    rows = _next_to_floor(pair)
+def _by_model(rows: list[ErrorAndFloor]) -> list[tuple[str, list[ErrorAndFloor]]]:
+    """Return the errors of each model, with its title."""
     models = dict.fromkeys(row.model for row in rows)
     return [
         (model[:1].upper() + model[1:], [row for row in rows if row.model == model])

@@ -1,0 +1,1 @@
+"""HTML pages: the report of one session, and the comparison of two."""

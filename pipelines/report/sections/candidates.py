@@ -1,0 +1,104 @@
+"""Every set of causes and laws that the diagnosis compared."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pipelines.report.numbers import digits
+from pipelines.report.sections.section import Content
+from pipelines.report.session import Session
+from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
+
+MOST_CANDIDATES = 12
+"""Sets in sight; the others unfold."""
+TONES = {
+    "named": "good",
+    "indistinguishable": "warn",
+    "unlisted": "warn",
+    "absorbed": "",
+    "rejected": "",
+}
+
+Row = dict[Any, Any]
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's table of candidates."""
+    return {"candidates": _candidates(content.session), "most_candidates": MOST_CANDIDATES}
+
+
+def _candidates(session: Session) -> list[dict[str, Any]]:
+    if session.candidates is None:
+        return []
+    rows = session.candidates.frame.sort_values("rank").to_dict("records")
+    labels = {label for row in rows for label in row["causes"]}
+    named = next((row for row in rows if row["verdict"] == "named"), None)
+    # The table does not say whether another set's zeros are one for all runs or each run's own.
+    words = shares_in_words(session.verdict or {"causes": []})
+    shown = []
+    for row in rows:
+        extra = _beyond(row, named)
+        known = words if row["verdict"] in ("named", "indistinguishable") else {}
+        if extra is None or named is None:
+            gain = _total_gain(row)
+        else:
+            gain = _extra_gain(session, named, row)
+        shown.append(
+            {
+                "rank": row["rank"],
+                "is_more": extra is not None,
+                "words": [
+                    known.get(label) or any_label_in_words(label)
+                    for label in (row["causes"] if extra is None else extra)
+                ],
+                "probability": _probability(row["probability"]),
+                "verdict": row["verdict"],
+                "tone": TONES.get(row["verdict"], ""),
+                "falls": [
+                    f"{joint.name} {digits(row[joint.column('rmse_before')])} →"
+                    f" {digits(row[joint.column('rmse_after')])}"
+                    for joint in session.joints
+                    if np.isfinite(row[joint.column("rmse_after")])
+                ],
+                "gain": gain,
+                "reason": labels_in_words(_reason(row["reason"], extra or ()), labels),
+            }
+        )
+    return shown
+
+
+def _beyond(row: Row, named: Row | None) -> list[str] | None:
+    """Return the labels that a set has in addition to the named ones; None if it is no superset."""
+    if named is None or not set(named["causes"]) < set(row["causes"]):
+        return None
+    return [label for label in row["causes"] if label not in set(named["causes"])]
+
+
+def _reason(reason: str, extra: Sequence[str]) -> str:
+    """Return why a set is not named, without its probability and the labels, which have columns."""
+    first, _, others = reason.partition("; ")
+    sentence = others if first.startswith("its probability is ") else reason
+    return sentence.removeprefix(f"{' and '.join(sorted(extra))} ")
+
+
+def _probability(value: float) -> str:
+    """Return a probability in words; a dash for a set that was not weighed."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
+def _extra_gain(session: Session, less: Row, more: Row) -> str:
+    """Return the gain of a set over a smaller one, at the joint where it is largest."""
+    after = [joint.column("rmse_after") for joint in session.joints]
+    return digits(max(less[column] - more[column] for column in after))
+
+
+def _total_gain(row: Row) -> str:
+    """Return the gain of a set over the baseline with its interval, which a short run lacks."""
+    if not np.isfinite(row["gain_nm"]):
+        return "–"
+    low, high = row["gain_low_nm"], row["gain_high_nm"]
+    interval = f" ({digits(low)} … {digits(high)})" if high > low else " (no interval)"
+    return digits(row["gain_nm"]) + interval

@@ -1,0 +1,156 @@
+"""Command lines that make the files of a session again."""
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipelines.report.sections.provenance import resolved
+from pipelines.report.sections.section import Content
+from pipelines.report.session import Artifact, Session, simulation_kind
+from pipelines.settings import Experiment
+from pipelines.settings.identify import IdentifySettings
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's list of commands."""
+    return {"commands": commands(content.session, content.output, content.title)}
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command line."""
+
+    line: str
+    needs_settings: bool
+    """Whether it names an exoid.toml that the session does not hold."""
+
+
+def commands(
+    session: Session, output: Path | None = None, title: str | None = None
+) -> list[Command]:
+    """Return the command lines that make the session's files again, in order, then the page."""
+    made = [_COMMANDS[kind](session, one) for kind in _COMMANDS for one in session.of_kind(kind)]
+    page = ["report", *map(str, session.folders)]
+    if session.config and session.config.parent not in session.folders:
+        page += ["--config", str(session.config)]
+    if title:
+        page += ["--title", title]
+    if output:
+        page += ["-o", str(output)]
+    results = [command for command in made if command] + [(page, False)]
+    lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in results)
+    return [Command(line, needs) for line, needs in lines]
+
+
+Words = tuple[list[str], bool]
+"""The words of a command, and whether it needs an exoid.toml that the session does not hold."""
+
+
+def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Words:
+    """Return the option that names the settings; none if the defaults suffice."""
+    if session.config:
+        return ["--config", str(session.config)], False
+    defaults = Experiment()
+    usual = all(
+        value == getattr(defaults, name).model_dump(mode="json")
+        for name, value in resolved(artifact).items()
+    )
+    return ([], False) if usual and not always else (["--config", "exoid.toml"], True)
+
+
+def _path_of(session: Session, stated: dict[str, str]) -> str:
+    return str(session.file_of(stated["name"], stated["sha256"]) or stated["name"])
+
+
+def _inputs(session: Session, artifact: Artifact) -> list[str]:
+    return [_path_of(session, stated) for stated in artifact.inputs]
+
+
+def _folder(path: Path) -> str:
+    return f"{path.parent}/"
+
+
+def _design(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    return ["design", *config, "-o", str(artifact.path)], needs
+
+
+def _record(session: Session, artifact: Artifact) -> Words | None:
+    inputs = _inputs(session, artifact)
+    if "imported" in artifact.metadata:
+        return _import(session, artifact, inputs), False
+    run = (artifact.metadata.get("config") or {}).get("run") or {}
+    if not run or not inputs:
+        return None
+    config, needs = _config(session, artifact, always=True)
+    words = ["acquire", *config, "--run", run["name"], "--trajectory", inputs[0]]
+    return [*words, "-o", str(artifact.path)], needs
+
+
+def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str]:
+    """Return the words that import a log, by its path in these folders or in the first import."""
+    given = artifact.metadata["imported"].get("given") or {}
+    stated = zip(inputs, artifact.inputs, strict=True)
+    absent = [name for name, one in stated if name == one["name"]]
+    maps = [name for name in inputs if name.endswith(".toml")]
+    sources = [name for name in inputs if name not in maps]
+    if any(name in absent for name in sources) and given:
+        sources = [given["source"]]
+    if maps and maps[0] in absent and given:
+        maps = [given["map"]]
+    return ["import", *sources, *(["--map", maps[0]] if maps else []), "-o", _folder(artifact.path)]
+
+
+def _filter(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    return ["filter", *_inputs(session, artifact), *config, "-o", str(artifact.path)], needs
+
+
+def _identify(session: Session, artifact: Artifact) -> Words | None:
+    if artifact is session.extended:
+        return None  # The diagnosis writes it.
+    config, needs = _config(session, artifact)
+    causes = [_path_of(session, artifact.causes)] if artifact.causes else []
+    runs = [path for path in _inputs(session, artifact) if path not in causes]
+    words = [word for path in causes for word in ("--causes", path)]
+    words += [word for label in artifact.effects for word in ("--effect", label)]
+    settings = resolved(artifact).get("identify") or {}
+    if settings.get("method", IdentifySettings().method) != IdentifySettings().method:
+        words += ["--method", settings["method"]]
+    if settings.get("reversals"):
+        words.append("--reversals")
+    return ["identify", *runs, *words, *config, "-o", _folder(artifact.path)], needs
+
+
+def _diagnose(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    words = ["diagnose", *_inputs(session, artifact), *config]
+    return [*words, "--out", _folder(artifact.path)], needs
+
+
+def _simulate(session: Session, artifact: Artifact) -> Words | None:
+    inputs = _inputs(session, artifact)
+    kind = simulation_kind(artifact)
+    if kind == "drives" or not inputs:
+        return None  # Written together with the replay in windows.
+    config, needs = _config(session, artifact)
+    if kind == "windows":
+        words = ["simulate", inputs[0], "--replay", inputs[-1], *config]
+        return [*words, "-o", str(artifact.path)], needs
+    reference = ["--reference", inputs[1]] if len(inputs) > 1 else []
+    run = artifact.metadata.get("plant", {}).get("run", "with_human")
+    option = [] if run == "with_human" else ["--run", run]
+    words = ["simulate", inputs[0], *reference, *option, *config]
+    return [*words, "-o", _folder(artifact.path)], needs
+
+
+_COMMANDS = {
+    "trajectory": _design,
+    "recording": _record,
+    "motion": _filter,
+    "parameters": _identify,
+    "verdict": _diagnose,
+    "simulation": _simulate,
+}
+"""By contract, in the order of an experiment: the command that makes such a file."""

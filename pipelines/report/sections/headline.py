@@ -1,0 +1,85 @@
+"""The top of a page: machine, status and result in one sentence, and its first paragraph."""
+
+from typing import Any
+
+from pipelines.contracts.joints import either
+from pipelines.report.sections.recordings import origin
+from pipelines.report.sections.section import Content
+from pipelines.report.session import Session
+from pipelines.wording.causes import causes_in_words
+
+STATUS = {
+    "explained": ("explained", "good"),
+    "partly_explained": ("partly explained", "warn"),
+    "unknown_cause": ("cause unknown", "warn"),
+    "nothing_missing": ("nothing missing", "good"),
+}
+HEADLINES = {
+    "unknown_cause": "Something is missing that no listed cause explains",
+    "nothing_missing": "Nothing is missing that these data could show",
+}
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values that the template's top and several of its parts use."""
+    session, verdict = content.session, content.verdict
+    return {
+        "title": content.title or session.name,
+        "machine": machine(session),
+        "status": status(verdict),
+        "headline": headline(session),
+        "verdict": verdict,
+        "lead": lead(verdict) if verdict else "",
+        "faults": first_fault(verdict) if verdict else ("", 0),
+        "damaged_verdict": session.has_damaged_verdict,
+        "unreadable": list(session.unreadable.values()),
+        "quantity": either(joint.effort for joint in session.joints) or "torque",
+        "torque_unit": either(joint.unit("torque") for joint in session.joints) or "N·m",
+    }
+
+
+def machine(session: Session) -> str:
+    """Return the joints, and the rig, subject and session of the recordings, in words."""
+    joints = " and ".join(joint.name for joint in session.joints)
+    origins = [origin(one) for one in session.of_kind("recording") or session.of_kind("motion")]
+    about = list(dict.fromkeys(filter(None, origins)))
+    return " · ".join(filter(None, (joints, "; ".join(about[:3]))))
+
+
+def status(verdict: dict[str, Any] | None) -> dict[str, str]:
+    """Return a verdict's status in words, and the tone of its badge."""
+    if not verdict:
+        return {"words": "not diagnosed", "tone": ""}
+    if verdict.get("acquisition_at_fault"):
+        return {"words": "acquisition, not physics", "tone": "bad"}
+    words, tone = STATUS.get(verdict["status"], (verdict["status"].replace("_", " "), ""))
+    return {"words": words, "tone": tone}
+
+
+def headline(session: Session) -> str:
+    """Return the result in one short sentence."""
+    verdict = session.verdict
+    if not verdict:
+        return "The verdict cannot be read" if session.has_damaged_verdict else "Not diagnosed yet"
+    if verdict.get("acquisition_at_fault"):
+        return "The recordings are at fault, not the model"
+    if verdict["causes"]:
+        return f"The simulation misses {causes_in_words(verdict['causes'])}"
+    findings = verdict.get("findings")
+    if verdict["status"] == "unknown_cause" and findings:
+        return f"The simulation misses {findings[0]['words']}, and no listed cause explains it"
+    return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
+
+
+def lead(verdict: dict[str, Any]) -> str:
+    """Return the finding in two sentences; the whole summary in files of older versions."""
+    return str(verdict.get("finding") or verdict["summary"])
+
+
+def first_fault(verdict: dict[str, Any]) -> tuple[str, int]:
+    """Return the first data fault next to a finding, and the number of others; empty if none."""
+    faults = verdict["data_faults"]
+    if not faults or not verdict.get("finding"):
+        return "", 0
+    first = faults[0]
+    return f"{first['file']}, {first['channel']}: {first['what']}", len(faults) - 1

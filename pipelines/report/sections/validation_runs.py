@@ -1,0 +1,69 @@
+"""Each run with its charts of measured and simulated motion, and a table of errors."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipelines.report.charts.chart import Chart
+from pipelines.report.numbers import digits
+from pipelines.report.sections.fit_quality import Score, models_of, replayed, run_names, scores
+from pipelines.report.sections.not_simulated import lacks_causes, refusal
+from pipelines.report.sections.section import Content
+from pipelines.report.session import Session
+
+
+@dataclass(frozen=True)
+class ShownRun:
+    """One run's charts and errors."""
+
+    name: str
+    about: str
+    charts: tuple[Chart, ...]
+    replayed: bool
+    models: tuple[str, ...]
+    """Headings of the columns of scores."""
+    scores: tuple[Score, ...]
+    lacks_causes: bool
+    """Whether only the model without the causes was simulated."""
+    refusal: str
+    """Why the model with the causes cannot be simulated; empty if it can."""
+
+
+def context(content: Content) -> dict[str, Any]:
+    """Return the values of the template's part on measured and simulated motion."""
+    verdict = content.verdict or {}
+    return {
+        "runs": _runs(content),
+        "mask": verdict.get("scoring", {}).get("mask") or "slow motion",
+    }
+
+
+def _runs(content: Content) -> list[ShownRun]:
+    session = content.session
+    replays = replayed(session)
+    names = dict.fromkeys([*run_names(session), *replays])
+    return [
+        ShownRun(
+            name,
+            _about(session, name),
+            tuple(chart for chart in content.charts.measured if chart.group == name),
+            name in replays,
+            tuple(words for _, words in models_of(session).values()),
+            tuple(scores(session, name)),
+            lacks_causes(session, name),
+            refusal(session, name),
+        )
+        for name in sorted(names, key=lambda name: "human" not in name)
+    ]
+
+
+def _about(session: Session, name: str) -> str:
+    if session.residuals is None:
+        return ""
+    rows = session.residuals.frame
+    rows = rows[rows["file"] == name]
+    if not len(rows):
+        return ""
+    kind = {"exo_alone": "nobody in it", "with_human": "with a person"}[rows["run"].iloc[0]]
+    return f"{kind}, {digits(float(np.ptp(rows['time_s'])))} s"
