@@ -307,8 +307,9 @@ def _method(
 def _sensitivities(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]:
     """Return the slopes of least-squares values by fixed shapes, and the shapes' covariance.
 
-    They are (p, h) and (h, h) arrays. ``covariance`` (s, s) is that of the terms' shapes, in the first run if they differ from run to
-    run. Shapes in other runs have the same variance, and are independent.
+    They are (p, h) and (h, h) arrays. ``covariance`` (s, s) is that of the terms' shapes, in the
+    first run if they differ from run to run. Shapes in other runs have the same variance, and are
+    independent.
     """
     error = np.sqrt(np.diag(covariance))
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
