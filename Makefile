@@ -11,7 +11,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 # What blind examinations left, for `make blind-page`.
 LEGS = $(wildcard build/blind/report.json build/blind-full/report.json)
 MACHINES = $(wildcard build/blind-machines/report.json)
-# Seeds of the blind examination: tests/blind/README.md says why there are two ranges.
+# Seeds of the blind examination: tests/campaigns/blind/README.md says why there are two ranges.
 SEEDS ?= tuning
 # Sessions of each world from which the decision's criteria are learned.
 SESSIONS ?= 2000
@@ -53,50 +53,50 @@ format: $(INSTALLED) ## format the code
 	$(BIN)/ruff format
 
 bench: $(INSTALLED) ## measure speed
-	$(BIN)/python -m tests.bench
+	$(BIN)/python -m tests.campaigns.bench
 
 estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measured on simulated and real data; long
-	$(BIN)/python -m tests.estimators
+	$(BIN)/python -m tests.campaigns.estimators
 
 peers: $(VENV)/.peers ## the same recordings through exoid and other tools, and docs/peers.md from what came of it
-	$(BIN)/python -m tests.peers docs/peers.md
+	$(BIN)/python -m tests.campaigns.peers docs/peers.md
 
 real: $(INSTALLED) ## what docs/real-data.md says of other people's machines, measured on ../shared/data; some minutes
-	$(BIN)/python -m tests.real docs/real-data.md
+	$(BIN)/python -m tests.campaigns.real docs/real-data.md
 
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
-	$(BIN)/python -m tests.fuzz
+	$(BIN)/python -m tests.campaigns.fuzz
 
 faults: $(INSTALLED) ## let every fault loose on a run and write docs/faults.md from what became of it
-	$(BIN)/python -m tests.faults docs/faults.md
+	$(BIN)/python -m tests.campaigns.faults docs/faults.md
 
 blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it cannot see; SEEDS=reporting to report
-	$(BIN)/python -m tests.blind --cases 300 --seeds $(SEEDS) --out build/blind
+	$(BIN)/python -m tests.campaigns.blind --cases 300 --seeds $(SEEDS) --out build/blind
 
 blind-full: $(INSTALLED) ## the same on 300 sessions with nothing hidden and 30 of each cause and joint; takes hours
-	$(BIN)/python -m tests.blind --full --seeds $(SEEDS) --out build/blind-full
+	$(BIN)/python -m tests.campaigns.blind --full --seeds $(SEEDS) --out build/blind-full
 
 blind-machines: $(INSTALLED) ## the same on 200 machines of one joint
-	$(BIN)/python -m tests.blind --one-joint --cases 200 --seeds $(SEEDS) --out build/blind-machines
+	$(BIN)/python -m tests.campaigns.blind --one-joint --cases 200 --seeds $(SEEDS) --out build/blind-machines
 
-blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in tests/blind/fixed_set.json
-	$(BIN)/python -m tests.blind --fixed --write --out build/blind-fixed
+blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in tests/campaigns/blind/fixed_set.json
+	$(BIN)/python -m tests.campaigns.blind --fixed --write --out build/blind-fixed
 
 blind-page: $(INSTALLED) ## write docs/blind.md and docs/blind-machines.md from the examinations that were made
-	$(if $(LEGS),$(BIN)/python -m tests.blind.page $(LEGS) docs/blind.md)
-	$(if $(MACHINES),$(BIN)/python -m tests.blind.page $(MACHINES) docs/blind-machines.md)
+	$(if $(LEGS),$(BIN)/python -m tests.campaigns.blind.page $(LEGS) docs/blind.md)
+	$(if $(MACHINES),$(BIN)/python -m tests.campaigns.blind.page $(MACHINES) docs/blind-machines.md)
 
 evidence: $(INSTALLED) ## what the decision needs of SESSIONS simulated sessions of each world, in build/learn; goes on where it was stopped; hours
-	$(BIN)/python -m tests.learn evidence --seeds $(SEEDS) --cases $(SESSIONS)
+	$(BIN)/python -m tests.campaigns.learn evidence --seeds $(SEEDS) --cases $(SESSIONS)
 
 learn: $(INSTALLED) ## learn the decision's criteria from that evidence, into build/learn/learned.json
-	$(BIN)/python -m tests.learn fit
+	$(BIN)/python -m tests.campaigns.learn fit
 
 cross-validation: $(INSTALLED) ## learn the criteria without each world and each third of the forms, and judge them on what was left out; hours
-	$(BIN)/python -m tests.learn cross-validate
+	$(BIN)/python -m tests.campaigns.learn cross-validate
 
 sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion matters; `make docs` then writes docs/criteria.md
-	$(BIN)/python -m tests.learn sensitivity
+	$(BIN)/python -m tests.campaigns.learn sensitivity
 
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md

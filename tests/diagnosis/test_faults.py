@@ -21,8 +21,8 @@ from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig.plant import PlantSettings
-from tests.blind.cases import case
-from tests.blind.examine import Folders, neutral_name, prepare
+from tests.campaigns.blind.cases import case
+from tests.campaigns.blind.examine import Folders, neutral_name, prepare
 from tests.effects.catalogue import TERMS
 
 RICH = FourierTrajectory(

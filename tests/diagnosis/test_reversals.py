@@ -22,14 +22,14 @@ from pipelines.mechanics.read import read_motions
 from pipelines.mechanics.slow_motion import below
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.blocks import BlockAverage
-from tests.blind import smooth
-from tests.blind.cases import case
-from tests.blind.excitation import random_excitation
-from tests.blind.machine import random_machine
-from tests.blind.people import random_person
-from tests.blind.plan import JOINTS, Plan, Run
-from tests.blind.plant import Rig, record
-from tests.blind.session import Session, write
+from tests.campaigns.blind import smooth
+from tests.campaigns.blind.cases import case
+from tests.campaigns.blind.excitation import random_excitation
+from tests.campaigns.blind.machine import random_machine
+from tests.campaigns.blind.people import random_person
+from tests.campaigns.blind.plan import JOINTS, Plan, Run
+from tests.campaigns.blind.plant import Rig, record
+from tests.campaigns.blind.session import Session, write
 
 COUNTS = 2**17
 """Of a turn: 0.05 mrad each."""
