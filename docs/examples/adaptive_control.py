@@ -5,8 +5,7 @@ import numpy as np
 from pipelines.contracts import HIP_AND_KNEE
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term

@@ -22,8 +22,7 @@ from pipelines.diagnosis.selection.answer import NamedCause
 from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
-from pipelines.effects.force_sensor_zero import ForceSensorZero
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import ForceSensorZero, RigidBody
 from pipelines.estimation.collinearity import collinearities, profiled
 from pipelines.model import Column, unrealizable, upside_down
 

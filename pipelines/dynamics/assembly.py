@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
 from pipelines.effects.backlash import Backlash
+from pipelines.effects.baseline import RigidBody
 from pipelines.effects.kernel import address, derivative, reaction, reading, spring, torque_reading
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.instant import REFERENCE_C

@@ -9,7 +9,7 @@ from pipelines.contracts import Joint, joints_of
 from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.mobility import masses
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
@@ -118,7 +118,7 @@ def plant_from_table(
     InputError
         If the table has no model of that run.
     """
-    bodies = table.frame.loc[table.frame["effect"] == "rigid_body", "run"]
+    bodies = table.frame.loc[table.frame["effect"] == RigidBody.name, "run"]
     if not (bodies.isna() | (bodies == run)).any():
         known = ", ".join(sorted(set(bodies) - {"human"})) or "none"
         raise InputError(

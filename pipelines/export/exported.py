@@ -14,8 +14,7 @@ from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import cuffed
 from pipelines.dynamics.plant import make_plant
 from pipelines.effects import Side
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.errors import InputError, about
 from pipelines.export.format import Degree, Format, Holding, left_out
 from pipelines.mechanics.geometry import Geometry

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Effect
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.estimation.parameter_table import Row, rows_of
 from pipelines.estimation.problem import Training
 from pipelines.model import BASELINE, Term

@@ -16,6 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from pipelines.effects.baseline import Friction
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
 from pipelines.estimation.estimator import Estimate, Estimator, Fit, estimated
@@ -384,7 +385,7 @@ def _critical(
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
-    driving = table[(table["effect"] == "friction") & (table["ci95_high"] < 0.0)]
+    driving = table[(table["effect"] == Friction.name) & (table["ci95_high"] < 0.0)]
     return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
         f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']}"
         f" ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) and drives the joint. Check the signs"

@@ -3,9 +3,7 @@
 from collections.abc import Collection, Iterable
 
 from pipelines.effects import Effect
-from pipelines.effects.force_sensor_zero import ForceSensorZero
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import ForceSensorZero, Friction, RigidBody
 from pipelines.mechanics.machine import Machine
 
 BASELINE = (RigidBody.name, Friction.name)

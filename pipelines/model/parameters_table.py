@@ -3,7 +3,7 @@
 import pandas as pd
 
 from pipelines.effects import RUNS, Effect
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine

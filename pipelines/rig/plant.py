@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import Assembly, assemble, in_order
 from pipelines.dynamics.forward import DQ, Q, stages, workspace
 from pipelines.dynamics.pd_loop import advance, loop_at_rest, make_drives
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.kernel import Instant, reaction_at
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, SettingsError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG

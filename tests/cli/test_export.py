@@ -105,7 +105,7 @@ def test_what_cannot_be_is_refused_in_one_line(
 def test_a_leg_that_cannot_be_is_refused_with_file_and_reason(exoid, model, tmp_path):
     import numpy as np
 
-    from pipelines.effects.rigid_body import RigidBody
+    from pipelines.effects.baseline import RigidBody
     from pipelines.model import Term
 
     path = tmp_path / "unreal.parquet"

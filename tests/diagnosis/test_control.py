@@ -12,9 +12,8 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.control_benefit import CASE, control
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.parallel_spring import ParallelSpring
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term

@@ -5,8 +5,7 @@ import pytest
 
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term

@@ -21,10 +21,9 @@ from pipelines.dynamics.forward import (
     workspace,
 )
 from pipelines.dynamics.mobility import masses
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.instant import REACTION

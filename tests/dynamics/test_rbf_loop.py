@@ -8,10 +8,9 @@ from scipy.integrate import solve_ivp
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.mobility import masses, substeps_for
 from pipelines.dynamics.rbf_loop import Encoder, RbfController, follow_with_rbf
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.encoder_offset import EncoderOffset
-from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG

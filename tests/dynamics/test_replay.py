@@ -7,11 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.dynamics.replay import replay
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.encoder_offset import EncoderOffset
-from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.model import Model, Term
 

@@ -6,8 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.contracts import Joint
+from pipelines.effects.baseline import RigidBody
 from pipelines.effects.cogging import Cogging
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.export import JSON, C, Degree
 from pipelines.mechanics.geometry import Geometry

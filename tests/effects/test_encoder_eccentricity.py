@@ -8,9 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from pipelines.contracts import Joint
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.encoder_eccentricity import EncoderEccentricity
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term

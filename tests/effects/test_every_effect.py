@@ -11,10 +11,9 @@ from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, DTHETA, accelerations, workspace
 from pipelines.effects import EFFECTS, LAWS, Effect, Family, Side
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.outside import STATED
 from pipelines.effects.parallel_spring import ParallelSpring
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term

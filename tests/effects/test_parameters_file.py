@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.errors import InputError
 from pipelines.model import Model, Term, model_from_parameters
 from tests.effects.catalogue import TERMS

@@ -9,9 +9,8 @@ from numpy.testing import assert_allclose
 from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Side
 from pipelines.effects.backlash import CROSSING_TORQUE
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.torque_gain import TorqueGain
 from pipelines.estimation.regression import regressions

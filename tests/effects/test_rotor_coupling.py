@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, Q, resting_state, stages, step, workspace
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.effects.rotor_coupling import RotorCoupling
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.mechanics.geometry import Geometry

@@ -18,10 +18,10 @@ from pipelines.dynamics.forward import (
     workspace,
 )
 from pipelines.effects.backlash import SHAFT_STIFFNESS, STRIKING_RATIO, Backlash
+from pipelines.effects.baseline import RigidBody
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.kernel import address, swing_along
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.swing import behind_spring, rotor_among_links
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion

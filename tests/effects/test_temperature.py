@@ -10,10 +10,9 @@ from pipelines.diagnosis.candidates.library import _effects
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.evidence.prepared_runs import prepare
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.friction_temperature import FrictionTemperature
 from pipelines.effects.gain_drift import GainDrift
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.identification import Extension, identify
 from pipelines.model import Model, Term

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize_scalar
 
 from pipelines.contracts import Joint
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.torque_cross_talk import TorqueCrossTalk
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of

@@ -9,9 +9,8 @@ from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, accelerations, workspace
 from pipelines.effects import Side
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.kernel import Instant
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.export import exported
 from pipelines.export.exported import shift_of
 from pipelines.mechanics.motion import Motion

@@ -6,11 +6,10 @@ import pytest
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Table
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.encoder_offset import EncoderOffset
-from pipelines.effects.friction import Friction
 from pipelines.effects.mass_off_axis import MassOffAxis
 from pipelines.effects.parallel_spring import ParallelSpring
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.export import URDF, exported
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of

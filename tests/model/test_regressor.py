@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipelines.effects import CoulombAsymmetry, CuffCompliance, PassiveJointTorque, TorqueGain
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.model import Model, Term, baseline
 from tests.diagnosis.sessions import session

@@ -12,8 +12,7 @@ import pytest
 from pipelines.contracts import HIP_AND_KNEE, PARAMETERS, RECORDING
 from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
 from pipelines.dynamics.plant import Plant, make_plant
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.noise_floor import Floor
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion

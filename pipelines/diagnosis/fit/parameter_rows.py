@@ -14,8 +14,7 @@ from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.effects import RUNS
-from pipelines.effects.force_sensor_zero import ForceSensorZero
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import ForceSensorZero, RigidBody
 from pipelines.estimation.parameter_table import Row, interval, rows_of, table_of
 
 

@@ -19,7 +19,7 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.fitted_model import model_of_run
 from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.effects import Backlash, JointElasticity, PreslidingHysteresis
-from pipelines.effects.friction import Friction
+from pipelines.effects.baseline import Friction
 from pipelines.estimation.angle_noise import CUTOFF_HZ
 from pipelines.estimation.regression import turns
 from pipelines.mechanics.motion import Motion

@@ -5,6 +5,7 @@ from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.effects import Effect, Parameter
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
@@ -51,9 +52,11 @@ def unit(session: Session, key: str) -> str:
     """Return the unit of a parameter by its key in a trajectory file, such as ``hip_viscous``."""
     joint = next((one for one in session.joints if key.startswith(f"{one.name}_")), None)
     if joint:
-        named = _parameters_of(session, "friction", joint.name, key.removeprefix(f"{joint.name}_"))
+        named = _parameters_of(
+            session, Friction.name, joint.name, key.removeprefix(f"{joint.name}_")
+        )
     else:
-        named = _parameters_of(session, "rigid_body", None, key)
+        named = _parameters_of(session, RigidBody.name, None, key)
     return next((one.unit for one in named), "")
 
 

@@ -20,8 +20,7 @@ from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
 from pipelines.dynamics.plant import Plant, make_plant
 from pipelines.dynamics.replay import replay
 from pipelines.dynamics.tracking import track
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion

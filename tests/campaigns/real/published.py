@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.baseline import RigidBody
 from pipelines.effects.rotor_coupling import RotorCoupling
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.mechanics.motion import Motion
