@@ -206,16 +206,16 @@ class Contract:
         """Check a frame and its metadata; the message of a ContractError begins with ``source``."""
         self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)
 
-    def _refuse_other_contracts(self, found: str, path: Path) -> None:
-        name, _, version = found.partition("/")
+    def _refuse_other_contracts(self, label: str, path: Path) -> None:
+        name, _, version = label.partition("/")
         if name != self.name:
             raise ContractError(
-                f"{path}: holds {found}, expected {self.label}; `{self.made_by}` makes a"
+                f"{path}: holds {label}, expected {self.label}; `{self.made_by}` makes a"
                 f" {self.name} file"
             )
         if version != str(self.version):
             raise ContractError(
-                f"{path}: holds {found}, but exoid {__version__} knows {self.label}; "
+                f"{path}: holds {label}, but exoid {__version__} knows {self.label}; "
                 f"update exoid, or make the file again with `{self.made_by}`"
             )
 

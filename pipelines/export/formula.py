@@ -326,24 +326,24 @@ def _is(operand: Any, number: float) -> bool:
     return not isinstance(operand, Formula) and operand == number
 
 
-def _sum(left: Any, right: Any) -> Any:
-    if _is(left, 0):
-        return right
-    if _is(right, 0):
-        return left
-    if isinstance(right, Formula) and right.operator == "neg":
-        return Formula("-", (left, right.operands[0]))
-    return Formula("+", (left, right))
+def _sum(a: Any, b: Any) -> Any:
+    if _is(a, 0):
+        return b
+    if _is(b, 0):
+        return a
+    if isinstance(b, Formula) and b.operator == "neg":
+        return Formula("-", (a, b.operands[0]))
+    return Formula("+", (a, b))
 
 
-def _product(left: Any, right: Any) -> Any:
-    if _is(left, 0) or _is(right, 0):
+def _product(a: Any, b: Any) -> Any:
+    if _is(a, 0) or _is(b, 0):
         return 0.0
-    if _is(left, 1):
-        return right
-    if _is(right, 1):
-        return left
-    return Formula("*", (left, right))
+    if _is(a, 1):
+        return b
+    if _is(b, 1):
+        return a
+    return Formula("*", (a, b))
 
 
 _COMPARED: dict[str, Callable[[float, float], bool]] = {
@@ -356,10 +356,8 @@ _COMPARED: dict[str, Callable[[float, float], bool]] = {
 }
 
 
-def _compare(operator: str, left: Any, right: Any) -> Condition | bool:
-    one, other = (
-        side.value if isinstance(side, Formula) else float(side) for side in (left, right)
-    )
+def _compare(operator: str, a: Any, b: Any) -> Condition | bool:
+    one, other = (side.value if isinstance(side, Formula) else float(side) for side in (a, b))
     if one is None or other is None:
-        return Condition(operator, left, right)
+        return Condition(operator, a, b)
     return _COMPARED[operator](one, other)

@@ -32,7 +32,7 @@ STYLE: dict[Any, Any] = {
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> None:
     """Write a figure as ``stem``.png and ``stem``.pdf, or the one of them, and close it."""
-    # Measured once for both: bbox_inches="tight" would lay out and measure every text anew for
+    # Measured once for both: bbox_inches="tight" would lay out and measure every text again for
     # each.
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
     for kind in kinds:

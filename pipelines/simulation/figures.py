@@ -1,4 +1,4 @@
-"""The paper's Figures 3 to 6, and a recording beside its simulation."""
+"""The paper's Figures 3 to 6, and a recording with its simulation."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -72,8 +72,7 @@ def draw_replay(
     stem: Path,
     title: str,
 ) -> None:
-    """Draw a recording beside its simulation; both tables are ``simulation/1``, as ``recorded``
-    makes them."""
+    """Draw a recording with its simulation, from the ``simulation/1`` tables of ``recorded``."""
     with plt.rc_context(STYLE):
         columns = 1 if closed_loop is None else 2
         figure, axes = plt.subplots(
@@ -123,8 +122,7 @@ def _tracking(frame: pd.DataFrame, joints: tuple[Joint, ...]) -> Figure:
 
 
 def _error(frame: pd.DataFrame, joints: tuple[Joint, ...], settled_after_s: float) -> Figure:
-    """Draw the error from where it has settled on; how it began is told in words, or it would
-    flatten the rest."""
+    """Draw the error, scaled to its size once it has settled."""
     figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
         error = 1e3 * frame[joint.column("error")]

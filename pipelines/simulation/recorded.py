@@ -1,5 +1,4 @@
-"""The model beside a recording: under the recorded torque, and in its drives' loop under the
-recorded references."""
+"""Simulate a recording: under its torque, and in its drives' loop under its references."""
 
 from dataclasses import dataclass
 
@@ -26,13 +25,13 @@ NO_LIMIT_NM = 1e9
 
 @dataclass(frozen=True)
 class UnderReferences:
-    """Simulated beside measured, at the n samples of a motion; J joints."""
+    """The simulated motion, at the n samples of the measured one; J joints."""
 
     angle: NDArray
     """(n, J) simulated encoder angle, rad."""
     velocity: NDArray
     torque: NDArray
-    """(n, J) simulated torque as the drives tell it, N·m."""
+    """(n, J) simulated torque as the drives report it, N·m."""
     angle_rmse: NDArray
     """(J,) rad, over valid samples."""
     torque_rmse: NDArray
@@ -40,8 +39,7 @@ class UnderReferences:
 
 
 def why_no_closed_loop(motion: Motion) -> str:
-    """Say what a recording lacks for its drives' loop to be simulated; empty where it lacks
-    nothing."""
+    """Return what a recording lacks for simulating its drives' loop; empty if nothing."""
     controller = motion.metadata.get("controller") or {}
     for joint in motion.joints:
         about = controller.get(joint)
@@ -172,8 +170,7 @@ def _without_overlap(first: NDArray, length: int) -> NDArray:
 def closed_loop_frame(
     simulated: UnderReferences, motion: Motion, joints: tuple[Joint, ...]
 ) -> pd.DataFrame:
-    """Return a closed loop under recorded references as a ``simulation/1`` table, the measured
-    beside it."""
+    """Return simulated and measured motion as a ``simulation/1`` table."""
     assert motion.reference is not None
     columns: dict[str, object] = {"time_s": motion.time}
     for j, joint in enumerate(joints):

@@ -66,7 +66,7 @@ PARTS = {
     "repeats": "repeats with the motion",
     "wanders": "wanders from period to period",
     "between_runs": "differs from run to run",
-    "unsplit": "more than noise, without periods to tell whether it repeats",
+    "unsplit": "more than noise, and no periods to compare",
 }
 """The router's parts in words, as they are shown."""
 VARIABLES = ("angle", "speed", "load", "time", "tone")

@@ -1,5 +1,4 @@
-"""A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say
-it."""
+"""A cause's label, ``effect@joint`` (see ``Effect.label``), its effect, and its wording."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -65,7 +64,7 @@ def effect_at(
 
 
 def effect_of_cause(cause: Mapping[str, Any]) -> Effect:
-    """Return the effect of a cause, or of a rival, as a verdict tells it."""
+    """Return the effect of a cause, or of a rival, of a verdict."""
     effect = effect_named(cause["effect"])
     differs = cause.get("each_run") or cause.get("per_run")
     return effect(joint=cause["joint"], each_run=bool(effect.may_differ and differs))
@@ -95,8 +94,7 @@ def in_words(effect: Effect) -> str:
 
 
 def label_in_words(label: str, machine: Machine | None = None) -> str:
-    """Return a cause, or an unlisted law, as a sentence says it; the machine tells which of its
-    joints slide."""
+    """Return the wording of a cause or an unlisted law; a machine's sliding joints have forces."""
     return (
         law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))
     )

@@ -1,16 +1,14 @@
-"""An unlisted law's label, ``law:angle@hip``: the family that it belongs to, and how sentences say
-it."""
+"""An unlisted law's label, ``law:angle@hip``, its family, and its wording."""
 
 from pipelines.contracts.joints import the
 from pipelines.mechanics.machine import Machine
 
 LAW = "law:"
-"""What the label of an unlisted law begins with."""
+"""Prefix of the label of an unlisted law."""
 UNLISTED = "unlisted_"
-"""What the kind begins with of an unlisted effect that resembles a listed cause; the cause's family
-follows."""
+"""Prefix of the kind of an unlisted effect that resembles a listed cause, before its family."""
 OTHER = "other"
-"""In the kind of a law of what the other joint does."""
+"""Word in the kind of a law of the other joint's motion."""
 FAMILIES = {
     "angle": "angle",
     "other_angle": "angle",
@@ -58,7 +56,7 @@ FAMILIES_IN_WORDS = {
     "sensor": "something in {joint}'s sensors",
     "person": "something of the person at {joint}",
 }
-"""What is missing, known by its family alone."""
+"""Wording of a missing effect of which only the family is known."""
 OF_OTHER_JOINT = {
     "angle": "a torque at {joint} that depends on the other joint's angle",
     "speed": "a torque at {joint} that depends on the other joint's speed",
@@ -70,7 +68,7 @@ WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
 
 
 def law_label(kind: str, joint: str | None, wearer: str = "all") -> str:
-    """Return what a law is called, ``law:angle@hip``; with ``/human`` if it is the person's."""
+    """Return a law's label, ``law:angle@hip``; it ends in ``/human`` if it is the wearer's."""
     return LAW + kind + (f"@{joint}" if joint else "") + ("" if wearer == "all" else f"/{wearer}")
 
 
@@ -86,7 +84,7 @@ def family_of_kind(kind: str) -> str:
 
 
 def law_in_words(label: str, machine: Machine | None = None) -> str:
-    """Return a law as a sentence says it; the machine tells which of its joints slide."""
+    """Return a law's wording; a machine's sliding joints have positions and forces."""
     kind, joint = kind_and_joint(label)
     if kind.startswith(UNLISTED):
         return f"{family_in_words(family_of_kind(kind), joint, machine)}, similar to a listed cause"
@@ -94,21 +92,20 @@ def law_in_words(label: str, machine: Machine | None = None) -> str:
 
 
 def is_of_other_joint(label: str) -> bool:
-    """Tell whether a law is of what the other joint does."""
+    """Return whether a law depends on the other joint's motion."""
     return OTHER in kind_and_joint(label)[0].split("_")
 
 
 def family_in_words(
     family: str, joint: str | None, machine: Machine | None = None, *, of_other_joint: bool = False
 ) -> str:
-    """Return what is missing, of which the family is known and the joint, if it is of one."""
+    """Return the wording of a missing effect, by its family and its joint, if it has one."""
     special = WITHOUT_JOINT if not joint else OF_OTHER_JOINT if of_other_joint else {}
     return _said_of(special.get(family, FAMILIES_IN_WORDS[family]), joint, machine)
 
 
 def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:
-    """Return words about a joint, or about the machine; a joint that slides has a position and a
-    force."""
+    """Return a wording for a joint or the machine; a sliding joint has a position and a force."""
     if joint and machine is not None:
         own = machine.joint(joint)
         words = words.replace("angle", own.place).replace("torque", own.effort)

@@ -75,7 +75,7 @@ def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monke
     with pytest.raises(DeviceError) as caught:
         record(served_as=served, control_s=0.5)
     assert str(caught.value).startswith(
-        "drive hip: was told to enable, but its status word does not say that it is after 0.5 s;"
+        "drive hip: not enabled 0.5 s after the command, by its status word;"
         " see the drive's manual"
     )
     assert set(moved) == {0.0}

@@ -4,8 +4,7 @@ from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
 
 SETTLED_CYCLES = 50
-"""Cycles after which a clock's rate is checked; a step of it can then be told from a wrong
-unit."""
+"""Cycles after which a clock's rate is checked; by then a step differs from a wrong unit."""
 
 
 class ClockCheck:

@@ -87,8 +87,8 @@ class Enabling:
         idle = self._enable_states.idle
         if idle and waited_s > self._rig.safety.control_s:
             raise DeviceError(
-                f"drive {idle[0]}: was told to enable, but its status word does not say that"
-                f" it is after {self._rig.safety.control_s:g} s; see the drive's manual, correct"
+                f"drive {idle[0]}: not enabled {self._rig.safety.control_s:g} s after the command,"
+                " by its status word; see the drive's manual, correct"
                 " enabled_mask and enabled_value in the rig file, or raise safety.control_s there"
             )
         self._checks.check_at(answers, self._start)

@@ -58,7 +58,8 @@ class RecordAgreement:
                     "angle", exchanged.angle, recorded.angle, "rad", recorded.sequence
                 )
             )
-        if not isfinite(exchanged.torque * recorded.torque):  # one of them does not tell it
+        # Without a current in both, there is nothing to compare.
+        if not isfinite(exchanged.torque * recorded.torque):
             return
         self._compared += 1
         self._xx += exchanged.torque**2
@@ -75,7 +76,7 @@ class RecordAgreement:
     ) -> str:
         name = "current" if what == "torque" else what
         return (
-            f"{self._label}: tells {what} {exchanged:.4g} {unit} of sample {sequence}, while its"
-            f" own record holds {recorded:.4g} {unit}; correct scale, sign and offset of"
+            f"{self._label}: reports {what} {exchanged:.4g} {unit} of sample {sequence},"
+            f" while its own record holds {recorded:.4g} {unit}; correct scale, sign and offset of"
             f" {self._where}.read.{name} or {self._where}.ring.record.{name}"
         )

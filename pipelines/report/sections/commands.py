@@ -30,7 +30,7 @@ def commands(
     session: Session, output: Path | None = None, title: str | None = None
 ) -> list[Command]:
     """Return the command lines that make the session's files again, in order, then the page."""
-    made = [_COMMANDS[kind](session, one) for kind in _COMMANDS for one in session.of_kind(kind)]
+    stages = [_COMMANDS[kind](session, one) for kind in _COMMANDS for one in session.of_kind(kind)]
     page = ["report", *map(str, session.folders)]
     if session.config and session.config.parent not in session.folders:
         page += ["--config", str(session.config)]
@@ -38,7 +38,7 @@ def commands(
         page += ["--title", title]
     if output:
         page += ["-o", str(output)]
-    results = [command for command in made if command] + [(page, False)]
+    results = [command for command in stages if command] + [(page, False)]
     lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in results)
     return [Command(line, needs) for line, needs in lines]
 

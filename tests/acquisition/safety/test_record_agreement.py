@@ -32,7 +32,7 @@ def test_a_record_of_currents_of_another_sign_or_scale_ends_the_run(factor):
     with pytest.raises(
         DeviceError,
         match=(
-            r"drive hip.*: tells torque .* N·m of sample 49, while its own record holds"
+            r"drive hip.*: reports torque .* N·m of sample 49, while its own record holds"
             r" .*record\.current"
         ),
     ):
@@ -56,7 +56,7 @@ def test_an_angle_of_another_zero_ends_the_run_and_one_that_was_latched_a_sample
     agreement.check(reading(1, angle=0.302))
     agreement.add(reading(2, angle=0.3))
     with pytest.raises(
-        DeviceError, match=r"tells angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"
+        DeviceError, match=r"reports angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"
     ):
         agreement.check(reading(2, angle=0.35))
     agreement.check(reading(3, angle=1.0))  # of which no exchange told
