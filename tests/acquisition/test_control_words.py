@@ -75,8 +75,7 @@ def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monke
     with pytest.raises(DeviceError) as caught:
         record(served_as=served, control_s=0.5)
     assert str(caught.value).startswith(
-        "drive hip: not enabled 0.5 s after the command, by its status word;"
-        " see the drive's manual"
+        "drive hip: not enabled 0.5 s after the command, by its status word; see the drive's manual"
     )
     assert set(moved) == {0.0}
     assert served[0].enabled == [False, False]

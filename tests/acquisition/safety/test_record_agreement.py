@@ -56,7 +56,11 @@ def test_an_angle_of_another_zero_ends_the_run_and_one_that_was_latched_a_sample
     agreement.check(reading(1, angle=0.302))
     agreement.add(reading(2, angle=0.3))
     with pytest.raises(
-        DeviceError, match=r"reports angle 0\.3 rad of sample 2, while its own record holds 0\.35 rad"
+        DeviceError,
+        match=(
+            r"reports angle 0\.3 rad of sample 2,"
+            r" while its own record holds 0\.35 rad"
+        ),
     ):
         agreement.check(reading(2, angle=0.35))
     agreement.check(reading(3, angle=1.0))  # of which no exchange told
