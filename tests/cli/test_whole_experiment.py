@@ -17,11 +17,12 @@ from pipelines.settings.rig import load_rig
 
 CHANGES = {
     # Not seconds: a busy machine would find another motion.
-    "iterations = 800 ": "iterations = 100 ",
+    "iterations = 800 ": "iterations = 50 ",
     "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
     "harmonics = 5\n": "harmonics = 3\n",
     'rig = "rigs/default.toml"': 'rig = "rigs/plain.toml"',
     "duration_s = 40.0\n": "duration_s = 15.0\n",
+    "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
     "figures = true": "figures = false",
 }
 OTHER_GAIN = ("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 200.0")

@@ -44,6 +44,7 @@ def test_its_amplitudes_are_fitted_to_the_training_runs_alone(diagnosis):
     np.testing.assert_allclose(diagnosis.after.fit.values, by_training.values, rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_missing_all_runs_show_nothing_either():
     """Values fitted to slow runs leave an error above the noise on fast ones: all runs are
     searched."""
@@ -54,6 +55,7 @@ def test_where_nothing_is_missing_all_runs_show_nothing_either():
     assert not any("sought on all runs" in caveat for caveat in outcome["caveats"])
 
 
+@pytest.mark.slow
 def test_a_payload_that_only_a_validation_run_carries_is_missing_and_not_named():
     """No training run shows its mass: fitted to these it explains nothing."""
     runs = session(seed=7)

@@ -47,6 +47,7 @@ def true_loop():
     return track(make_plant(Model(terms), Geometry(), HIP_AND_KNEE, "with_human"), CASE, gait())
 
 
+@pytest.mark.slow
 def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
     loop, true = control(sprung), true_loop()
     settled = true.time >= CASE.settled_after_s

@@ -40,11 +40,12 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
 @pytest.mark.parametrize(
     ("effect", "joint", "values", "parameter"),
     [
-        (
+        pytest.param(
             "stribeck_friction",
             "knee",
             {"stribeck_torque": 2.0, "stribeck_velocity": 0.15},
             "stribeck_torque",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             "load_dependent_friction",
@@ -87,6 +88,7 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     )
 
 
+@pytest.mark.slow
 def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joints_speed():
     diagnosis = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
     assert diagnosis.after.fit.rms[0] > 0.95 * diagnosis.before.fit.rms[0], (

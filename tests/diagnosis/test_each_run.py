@@ -79,6 +79,7 @@ def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others
     assert intervals["run_1.parquet"] is intervals["run_3.parquet"] is None
 
 
+@pytest.mark.slow
 def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
     hidden = {
         "run_0.parquet": 0.06,
@@ -106,6 +107,7 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     assert cause["parameters"][0]["value"] == pytest.approx(0.06, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_leg_that_is_zeroed_once_needs_no_zero_of_its_own_in_any_run():
     outcome = verdict(diagnose(session(seconds=30.0)))
     assert outcome["status"] == "nothing_missing"

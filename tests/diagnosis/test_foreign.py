@@ -74,6 +74,7 @@ def test_what_a_cause_of_another_form_leaves_is_reported_with_its_variable(kind)
     )
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     strict=True, reason="a wide Stribeck peak is named where friction falls away from zero"
 )

@@ -68,6 +68,7 @@ def test_ripple_of_several_lines_and_friction_that_builds_up_are_both_named(seed
     assert cogging.shapes[0][0] == pytest.approx(88.3, abs=0.3)
 
 
+@pytest.mark.slow
 def test_without_ripple_none_is_named():
     diagnosis = diagnose(level_joint(1, lines=()))
     assert "presliding_hysteresis@joint" in diagnosis.causes

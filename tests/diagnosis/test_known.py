@@ -35,6 +35,7 @@ def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
     assert label in [term.effect.label for term in terms]
 
 
+@pytest.mark.slow
 def test_something_else_is_found_in_addition_to_what_is_known():
     outcome = verdict(
         diagnose(session("torque_gain", "hip", seed=3, gain=1.08), known=["rotor_inertia@knee"])

@@ -142,6 +142,7 @@ def test_what_is_rejected_is_listed_with_its_probability_and_its_odds_against_no
     assert named > rejected["probability"].max()
 
 
+@pytest.mark.slow
 def test_a_springs_load_at_position_zero_is_part_of_the_force_that_holds_a_lift():
     diagnosis = diagnose(motions(lift, spring=220.0))
     (cause,) = verdict(diagnosis)["causes"]

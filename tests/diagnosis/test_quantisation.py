@@ -61,6 +61,7 @@ def test_the_step_of_a_torque_that_never_comes_near_zero_is_found():
     assert coarse_step([torque], [rounding(torque, 3.0)], 3.5) == pytest.approx(3.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_samples_that_do_not_count_have_no_say():
     """Spikes in a tenth of a session's samples, all of them marked as invalid."""
     spoilt = []

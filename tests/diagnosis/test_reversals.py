@@ -83,7 +83,11 @@ def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
 # to validate on.
 @pytest.mark.parametrize(
     ("seed", "travel", "joints"),
-    [(900_001, 0.001, JOINTS), (900_002, 0.002, JOINTS), (900_003, 0.004, ("hip",))],
+    [
+        pytest.param(900_001, 0.001, JOINTS, marks=pytest.mark.slow),
+        pytest.param(900_002, 0.002, JOINTS, marks=pytest.mark.slow),
+        (900_003, 0.004, ("hip",)),
+    ],
 )
 def test_bristles_of_milliradians_are_reported_with_their_travel(tmp_path, seed, travel, joints):
     diagnosis = diagnosed(tmp_path, seed, travel)
@@ -100,7 +104,10 @@ def test_bristles_of_milliradians_are_reported_with_their_travel(tmp_path, seed,
     assert sum("changes sign over about" in caveat for caveat in outcome["caveats"]) == len(joints)
 
 
-@pytest.fixture(scope="module", params=range(900_001, 900_005))
+@pytest.fixture(
+    scope="module",
+    params=[900_004, *(pytest.param(s, marks=pytest.mark.slow) for s in range(900_001, 900_004))],
+)
 def faultless(request, tmp_path_factory):
     return diagnosed(tmp_path_factory.mktemp("faultless"), request.param, None)
 
@@ -132,6 +139,7 @@ def bristles(tmp_path_factory):
     return diagnosed(tmp_path_factory.mktemp("bristles"), 900_001, 0.001)
 
 
+@pytest.mark.slow
 def test_of_a_joint_whose_play_is_named_nothing_more_is_reported(bristles):
     runs, baseline = bristles.train, bristles.baseline
     play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
@@ -162,6 +170,6 @@ def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_
     assert diagnosed(tmp_path, 900_001, 0.002, counts=2**13).reversals == ()
 
 
-@pytest.mark.parametrize("late", [0.01, 0.055])
+@pytest.mark.parametrize("late", [0.01, pytest.param(0.055, marks=pytest.mark.slow)])
 def test_friction_that_turns_round_at_once_and_is_read_late_is_given_no_travel(tmp_path, late):
     assert diagnosed(tmp_path, 900_002, None, late=late).reversals == ()

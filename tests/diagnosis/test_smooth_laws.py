@@ -51,6 +51,7 @@ def test_a_part_is_of_order_one_at_the_joint_where_it_is_larger(prepared):
     np.testing.assert_allclose(rms.max(axis=0), 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
     """A band from the pelvis to the shank that is slack in a part of its range: no spring of either
     joint."""

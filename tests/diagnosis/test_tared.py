@@ -65,6 +65,7 @@ def test_each_run_s_own_offset_is_recovered_and_its_interval_holds_it(tared):
             assert low <= HIDDEN[one["file"]] <= high and high - low < 0.3
 
 
+@pytest.mark.slow
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     outcome = verdict_of(EVERY)
     (cause,) = outcome["causes"]
@@ -74,6 +75,7 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     assert cause["each_run"] == [] and "per-run" not in outcome["summary"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "levels",
     [HIDDEN, pytest.param(dict.fromkeys(HIDDEN, 0.0), marks=pytest.mark.slow)],
@@ -114,7 +116,7 @@ def set_at_each_start(outcome):
         pytest.param(
             misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow
         ),
-        (zeroed, (0.07, -0.06), {"encoder_offset"}),
+        pytest.param(zeroed, (0.07, -0.06), {"encoder_offset"}, marks=pytest.mark.slow),
     ],
     ids=["tared", "validation run only", "zeroed"],
 )
@@ -132,6 +134,7 @@ def test_of_two_runs_whose_zeros_differ_each_has_its_own_though_one_training_run
     assert any(caveat.startswith("causes were sought on all runs") for caveat in outcome["caveats"])
 
 
+@pytest.mark.slow
 def test_of_two_runs_one_offset_in_both_is_one():
     outcome = two_runs(misread, (1.0, 1.0))
     (cause,) = outcome["causes"]
@@ -141,6 +144,7 @@ def test_of_two_runs_one_offset_in_both_is_one():
     assert cause["each_run"] == [] and set_at_each_start(outcome) == []
 
 
+@pytest.mark.slow
 def test_where_one_training_run_shows_something_unlisted_it_is_said_what_it_cannot_show():
     outcome = verdict(diagnose(banded(session(seed=5)[2:])))
     assert (outcome["status"], outcome["causes"]) == ("unknown_cause", [])

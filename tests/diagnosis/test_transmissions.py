@@ -68,7 +68,7 @@ def test_a_spring_that_hardens_is_found_within_a_tenth(hardening):
     assert hardening[0] == pytest.approx(SOFT, rel=0.1)
 
 
-@pytest.mark.parametrize("joint", ["hip", "knee"])
+@pytest.mark.parametrize("joint", [pytest.param("hip", marks=pytest.mark.slow), "knee"])
 def test_the_play_of_teeth_is_found(joint):
     look = Screening.of(session("backlash", joint, play=PLAY, contact_stiffness=4000.0))
     best, _ = best_transmission(look.fits(Backlash(joint)), look.alone)

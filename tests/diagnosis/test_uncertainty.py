@@ -30,6 +30,7 @@ def error_of_stiffness(seconds: float, imperfect: float) -> float:
     return float(np.sqrt(known.covariance[place, place]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imperfect", "ratio"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 1.0)]
 )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from pipelines.contracts.table import Table
@@ -38,6 +39,7 @@ def recorded(trajectory, purpose):
     return motion_from_table(motion_table(Table(frame, metadata), FilterSettings()))
 
 
+@pytest.mark.slow
 def test_foretold_standard_errors_are_the_scatter_of_identifications():
     trajectory = design(DesignSettings(seed=1)).trajectory
     train, validate = recorded(trajectory, "train"), recorded(trajectory, "validate")
