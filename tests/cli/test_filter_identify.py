@@ -403,7 +403,7 @@ def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordi
     [
         (
             lambda f: pd.concat([f, f.tail(1)], ignore_index=True),
-            "row 17 tells stiffness of joint_elasticity again",
+            "row 17 repeats stiffness of joint_elasticity",
         ),
         (
             lambda f: f.assign(std_error=-0.1),

@@ -279,7 +279,7 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case(
             "exception reply 6, device busy",
             From(refuse(6)),
-            "it is busy (server device busy); end what",
+            "it is busy (server device busy); stop other programs",
         ),
         Case("a bit of the counter is flipped", From(flip(1, 1)), "counter"),
         Case("a high bit of the counter is flipped", From(flip(0, 4)), "counter"),
