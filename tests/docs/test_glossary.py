@@ -1,13 +1,9 @@
-"""The words to avoid of docs/glossary.md are in no name, docstring, comment, message or page.
-
-Packages that still hold some are listed with their number, which may only fall.
-"""
+"""The words to avoid of docs/glossary.md are in no name, docstring, comment, message or page."""
 
 import ast
 import io
 import re
 import tokenize
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,12 +14,6 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 WHOLE_NAMES = {"found", "made", "said", "left"}
 """Words that are plain English in a sentence, and no name for a value."""
 SIDES = {"left", "right"}
-
-NOT_YET: dict[str, int] = {
-    "docs/real-data.md": 25,
-}
-"""Words to avoid in packages and pages that hold some still; a new one fails, and so does a
-package that is clean and still listed."""
 
 
 def words_to_avoid() -> set[str]:
@@ -40,7 +30,7 @@ IN_TEXTS = AVOIDED - WHOLE_NAMES
 
 
 def in_name(name: str) -> bool:
-    """Tell whether a name is, or has as a part, a word to avoid."""
+    """Return whether a name is, or has as a part, a word to avoid."""
     lower = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().strip("_")
     return lower in IN_NAMES or any(part in IN_NAMES - WHOLE_NAMES for part in lower.split("_"))
 
@@ -89,24 +79,17 @@ def avoided_in(source: str) -> list[str]:
     return names + [word for text in texts(source) for word in in_text(text)]
 
 
-def package_of(path: Path) -> str:
-    parts = path.relative_to(ROOT).parts
-    return "/".join(parts[: 2 if parts[0] == "pipelines" else 1])
-
-
-def counted() -> Counter[str]:
-    """Count the words to avoid by package and page."""
-    counts: Counter[str] = Counter()
+def avoided_by_file() -> Iterator[tuple[str, list[str]]]:
+    """Yield each module and page with its words to avoid."""
     for root in ("pipelines", "exoid_cli", "docs"):
         for path in (ROOT / root).rglob("*.py"):
-            found = avoided_in(path.read_text(encoding="utf-8"))
-            found += [path.stem] * in_name(path.stem)
-            counts[package_of(path)] += len(found)
+            words = avoided_in(path.read_text(encoding="utf-8"))
+            words += [path.stem] * in_name(path.stem)
+            yield path.relative_to(ROOT).as_posix(), words
     for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
         if path != GLOSSARY:
             text = re.sub(r"```.*?```", " ", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-            counts[path.relative_to(ROOT).as_posix()] += len(in_text(text))
-    return counts
+            yield path.relative_to(ROOT).as_posix(), in_text(text)
 
 
 @pytest.mark.parametrize(
@@ -134,13 +117,5 @@ def test_other_words_and_keys_of_files_are_not(source):
     assert not avoided_in(source)
 
 
-def test_no_package_or_page_holds_a_new_word_to_avoid():
-    counts = counted()
-    more = {
-        place: (count, NOT_YET.get(place, 0))
-        for place, count in counts.items()
-        if count > NOT_YET.get(place, 0)
-    }
-    assert not more, f"words to avoid (now, allowed): {more}"
-    clean = [place for place in NOT_YET if not counts[place]]
-    assert not clean, f"clean, and to be removed from NOT_YET: {clean}"
+def test_no_module_or_page_holds_a_word_to_avoid():
+    assert {file: words for file, words in avoided_by_file() if words} == {}

@@ -1,5 +1,4 @@
-"""``make real``: what docs/real-data.md says of other people's machines, measured on
-../shared/data.
+"""Measure the tables and figures of docs/real-data.md (``make real``).
 
 python -m tests.campaigns.real docs/real-data.md --machines emps A0-fourier
 """
@@ -20,11 +19,11 @@ from tests.campaigns.real.machines import LOGS, Diagnosed, diagnosed
 
 END = "<!-- until here -->"
 IMAGES = {"emps": "verdict", "A0-fourier": "dependence", "xl330": "verdict"}
-"""Which figure of a machine's diagnosis the page shows."""
+"""Figure of each machine's diagnosis that the page shows."""
 
 
 def written(page: str, name: str, measured: str) -> str:
-    """Return the page with what was measured between the marks of that name."""
+    """Return the page with a measured table between the marks of a name."""
     between = re.compile(
         f"(?<=<!-- measured: {re.escape(name)} -->\n).*?(?={re.escape(END)})", re.DOTALL
     )

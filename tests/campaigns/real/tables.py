@@ -22,8 +22,7 @@ from tests.campaigns.real.relative_error import (
 )
 
 SHIFTS_S = np.linspace(-0.012, 0.012, 13)
-"""By which a prediction is moved along the stamps; positive where the angles are older than their
-stamps."""
+"""Shifts of a prediction along the stamps; positive if the angles are older than their stamps."""
 
 RUNS = ("without pulses", "with pulses")
 
@@ -35,7 +34,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def verdicts(diagnoses: Mapping[str, Diagnosed]) -> str:
-    """Return what the diagnosis says of each machine."""
+    """Return the verdict on each machine."""
     headings = (
         "machine",
         "verdict",
@@ -88,10 +87,10 @@ def emps(diagnoses: Mapping[str, Diagnosed]) -> str:
     ]
     lines = [
         ("symmetric friction", plain, "symmetric"),
-        ("the same, fitted behind this filter", fitted(plain, train), "symmetric"),
-        ("what diagnose names, its own values", d.model, "asymmetric"),
-        ("what diagnose names, refitted by identify", named, "asymmetric"),
-        ("the same, refitted behind this filter", fitted(d.model, train), "asymmetric"),
+        ("symmetric friction, fitted behind this filter", fitted(plain, train), "symmetric"),
+        ("named cause, values of the diagnosis", d.model, "asymmetric"),
+        ("named cause, refitted by identify", named, "asymmetric"),
+        ("named cause, refitted behind this filter", fitted(d.model, train), "asymmetric"),
     ]
     where = [
         (
@@ -127,8 +126,7 @@ def emps(diagnoses: Mapping[str, Diagnosed]) -> str:
 
 
 def pendulum(diagnoses: Sequence[Diagnosed], published: Path) -> str:
-    """Return the torque error of every run of a double pendulum, next to that of its makers'
-    parameters."""
+    """Return the torque error of every run of a double pendulum, with that of its makers."""
     theirs = double_pendulum(published)
     rows = []
     for d in diagnoses:
@@ -151,7 +149,7 @@ def pendulum(diagnoses: Sequence[Diagnosed], published: Path) -> str:
 
 
 def sizes(d: Diagnosed, of: str) -> str:
-    """Return how large the ``known`` effects, or the named ``causes``, were found to be."""
+    """Return the parameters of the ``known`` effects or the named ``causes``."""
     rows = [
         (
             cause_label(one),
@@ -170,8 +168,7 @@ def _sized(parameter: Mapping[str, Any], digits: str) -> str:
 
 
 def by_order(d: Diagnosed) -> str:
-    """Return the error on the held-out run for each steepness that the low-pass of 5 Hz may
-    have."""
+    """Return the error on the held-out run by the order of the 5 Hz low-pass."""
     trained, (held_out,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for order in (1, 2, 3, 4):
@@ -194,7 +191,7 @@ def by_order(d: Diagnosed) -> str:
 
 
 def turning(d: Diagnosed) -> str:
-    """Return what the verdict says of friction at reversals."""
+    """Return the verdict's caveats on friction at reversals."""
     return (
         "\n>\n".join(f"> But {caveat}." for caveat in d.verdict["caveats"] if "reversals" in caveat)
         or "> Nothing."
@@ -206,7 +203,7 @@ def _both(error: TorqueError) -> tuple[str, str]:
 
 
 def of_each_run(d: Diagnosed) -> str:
-    """Return what each run has for itself of the named causes."""
+    """Return each run's own values of the named causes."""
     own = [cause for cause in d.verdict["causes"] if cause["each_run"]]
     headings = [
         f"{name} of {cause_label(cause)}, {unit}"
@@ -226,8 +223,7 @@ def of_each_run(d: Diagnosed) -> str:
 
 
 def with_zeros(d: Diagnosed, file: Path) -> str:
-    """Return the makers' error on each run without and with the zeros of the diagnosis,
-    next to its own."""
+    """Return the makers' error on each run without and with the zeros of the diagnosis."""
     theirs, rows = double_pendulum(file), []
     for motion in d.motions:
         model = d.model_of(motion)
@@ -245,8 +241,7 @@ def with_zeros(d: Diagnosed, file: Path) -> str:
 
 
 def timing(diagnoses: Mapping[str, Diagnosed]) -> str:
-    """Return at which shift of the predicted torque each run's error is least, and how much less
-    than as stamped."""
+    """Return the shift of the predicted torque at which each run's error is least."""
     rows = []
     for d in diagnoses.values():
         for motion in d.motions if len(d.motions[0].joints) == 2 else []:
@@ -264,7 +259,7 @@ def timing(diagnoses: Mapping[str, Diagnosed]) -> str:
                     " / ".join(f"{100 * g:.1f} %" for g in gain),
                 )
             )
-    return table(("run", "least error at a shift of", "which is less by"), rows)
+    return table(("run", "shift of the least error", "error reduction"), rows)
 
 
 def _shifted(torque: NDArray, motion: Motion, by_s: float) -> NDArray:
@@ -286,8 +281,7 @@ def depends(d: Diagnosed, most: int = 4) -> str:
 
 
 def flexibility(d: Diagnosed) -> str:
-    """Return where on the pulses run the force error is in frequency, and how large the
-    acceleration's is."""
+    """Return force error, acceleration error and simulation error of both runs."""
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for title, motion in zip(RUNS, (train, pulses), strict=True):
