@@ -137,7 +137,7 @@ def _at_a_terminal() -> bool:
 
 
 def _discard_typed_input() -> None:
-    """Discard what was typed before the question, which is no answer to it."""
+    """Discard text typed before the question, which is no answer to it."""
     if sys.platform == "win32":
         import msvcrt
 

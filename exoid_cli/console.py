@@ -1,4 +1,4 @@
-"""What the user sees: text and tables, progress, or, with ``--json``, one JSON document on stdout.
+"""Terminal output: text and tables, progress, or, with ``--json``, one JSON document on stdout.
 
 A command calls ``say`` and ``table`` for people and ``emit`` for programs, whoever reads: ``say``
 prints nothing under ``--json``, and ``emit`` nothing without it. rich is imported when something
@@ -137,7 +137,7 @@ class Console:
 
     @contextmanager
     def gathering(self) -> Iterator[list[Any]]:
-        """Collect what the block emits, so that several commands can print one document."""
+        """Collect the block's output, so that several commands can print one document."""
         before, self._gathered = self._gathered, []
         try:
             yield self._gathered
@@ -201,7 +201,7 @@ class Console:
 
     @contextmanager
     def starting(self, what: str) -> Iterator[None]:
-        """Show what is being started; without a terminal, print it once it takes long."""
+        """Show the task that is being started; without a terminal, print it once it takes long."""
         late = threading.Timer(LATE_S, lambda: self.err.print(_as_text(what), soft_wrap=True))
         late.daemon = True
         if self.speaks and not self._may_move:

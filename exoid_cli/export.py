@@ -96,7 +96,7 @@ def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
 
 
 def _texts(exported: "Exported", chosen: "Format[Exported]", path: Path) -> dict[Path, str]:
-    """Return what goes into each file; the main one is ``path``, whatever its suffix."""
+    """Return the content of each file; the main one is ``path``, whatever its suffix."""
     files = {
         path.with_suffix(suffix): text for suffix, text in chosen.write(exported, path.stem).items()
     }

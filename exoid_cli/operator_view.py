@@ -1,4 +1,4 @@
-"""The operator's view of a run: state, what to do at once, and every value between its limits."""
+"""The operator's view of a run: state, urgent action, and every value between its limits."""
 
 import time
 from collections.abc import Iterator

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
 
 REMEDY = "import it again, or remove it"
-"""What to do about a recording that cannot be read."""
+"""Advice on a recording that cannot be read."""
 
 
 def status(config: ConfigOption = None, out: OutOption = None) -> None:

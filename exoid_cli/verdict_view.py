@@ -1,4 +1,4 @@
-"""A verdict as text: what is missing, its probability, the torque errors, and each cause."""
+"""A verdict as text: missing physics, its probability, the torque errors, and each cause."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
@@ -65,7 +65,7 @@ def _show_faults(verdict: Mapping[str, Any]) -> None:
 
 
 def _show_findings(verdict: Mapping[str, Any]) -> None:
-    """Print the probability that something is missing, and the path to what it is."""
+    """Print the probability that something is missing, and the path to its cause."""
     from pipelines.wording.findings import outcomes, rows
 
     cases, tree = outcomes(verdict), rows(verdict)

@@ -1,6 +1,6 @@
 """Every error a user can cause or meet, grouped by who has to act.
 
-Each text says what is wrong and where, what was expected, and what to do.
+Each text states the fault and its place, the expectation, and a remedy.
 Only ``exoid_cli.app`` turns them into a line on the terminal and an exit code.
 """
 

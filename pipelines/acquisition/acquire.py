@@ -216,7 +216,7 @@ def _metadata(
     sample_rate_hz: float,
     mechanism: MechanismSettings,
 ) -> dict[str, Any]:
-    """Return the recording's metadata; of a virtual rig's plant only what a user measures."""
+    """Return the recording's metadata; of a virtual rig's plant only measurable values."""
     metadata: dict[str, Any] = {
         "run": run.run,
         "purpose": run.purpose,

@@ -1,5 +1,4 @@
-"""Exchanges with the drives while a run goes on: what is decided is sent, and what comes is passed
-to the supervisor."""
+"""Exchanges with the drives during a run: set-points go out, answers go to the supervisor."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ Decide = Callable[[int, float], float]
 
 
 class Exchange:
-    """Carries out what the supervisor decides."""
+    """Carries out the supervisor's decisions."""
 
     def __init__(self, machine: Machine, supervisor: Supervisor, stopped_by: Sequence[str]) -> None:
         """Exchange with a machine's drives; ``stopped_by`` names the signals that have come."""
@@ -43,8 +42,7 @@ class Exchange:
         return answers
 
     async def _in_turn(self, decide: Decide, drive: Drive) -> Reading:
-        """Send a drive its set-point, decided when its turn has come: by then it may have gone on
-        by itself."""
+        """Send a drive its set-point, decided when its turn comes: it may move on meanwhile."""
         joint = self.machine.drives.index(drive)
         async with drive.device.turn():
             now = time.monotonic()
@@ -58,8 +56,7 @@ class Exchange:
         return self._supervisor.trackers[joint].is_stale(now)
 
     async def find(self, joint: int) -> tuple[Reading, float]:
-        """Ask a drive where it is, to go on from there; return the answer and its time, host's
-        clock, s."""
+        """Ask a drive where it is, to go on from there; return its answer and the host's time."""
         tracker = self._supervisor.trackers[joint]
         sent_at = tracker.sent_at
         reading, now = await self.machine.drives[joint].look(in_motion=True), time.monotonic()
@@ -77,7 +74,7 @@ class Exchange:
         return first.sequence // self.machine.samples_per_cycle, now
 
     def update(self, joint: int) -> None:
-        """Pass on a drive's reports that came next to what was awaited, or were asked again."""
+        """Pass on a drive's reports that came with other answers, or were asked again."""
         statuses = self.machine.drives[joint].statuses
         while statuses:
             self._supervisor.enable_states.update(joint, statuses.pop(0))

@@ -77,10 +77,10 @@ class PhaseLock:
         than that."""
 
     async def wait(self, last: int) -> int:
-        """Wait until a sample after ``last`` is latched that was not waited for yet; return it, or
-        ``last`` if none is.
+        """Wait for a sample after ``last`` that was not awaited yet; return its number.
 
-        What was waited for and not brought by an exchange has had its time all the same.
+        Return ``last`` if none is latched in time. A sample that was awaited and that no exchange
+        read is not awaited again: its time has passed.
         """
         began = time.perf_counter()
         looked = last if self._count is None else self._count

@@ -1,4 +1,4 @@
-"""How far a run is: what an operator wants to see of it."""
+"""How far a run is, as an operator's view shows it."""
 
 import time
 from collections.abc import Callable
@@ -16,7 +16,7 @@ REPORT_S = 0.1
 
 @dataclass(frozen=True)
 class Progress:
-    """What an operator wants to see."""
+    """State, time, sample and reason to stop, for the operator."""
 
     state: State = State.IDLE
     time_s: float = 0.0
@@ -44,7 +44,7 @@ class ProgressReport:
     def __init__(
         self, supervisor: Supervisor, plan: Plan, writer: SampleWriter, report: Report
     ) -> None:
-        """Report to ``report`` what supervisor and writer of a run know."""
+        """Report the state of a run's supervisor and writer to ``report``."""
         self._supervisor, self._plan = supervisor, plan
         self._writer, self._report = writer, report
         self._began_at = self._reported_at = 0.0

@@ -1,4 +1,4 @@
-"""The states of a run, which may follow which, and on what condition; docs/safety.md draws them."""
+"""The states of a run, their transitions and the conditions; docs/safety.md draws them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -90,7 +90,7 @@ class Stopping:
     async def _slow_down(self, joint: int, answered_at: float) -> None:
         """Send a drive set-point after set-point until it is at rest.
 
-        On the host's clock: the device's counter may be what has failed. Each is sent a sample
+        On the host's clock: the device's counter may have failed. Each is sent a sample
         after the last was due, not after it was answered: a drive that samples before a set-point
         comes goes on by itself, and is led back with a jerk. A delay of more than half a sample is
         not caught up with. The drive answered last at ``answered_at``, host's clock, s.

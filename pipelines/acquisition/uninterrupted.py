@@ -1,5 +1,4 @@
-"""Work that goes on to its end, whatever asks the program to end meanwhile: there are drives to
-disable."""
+"""Work that goes on to its end even if the program is asked to end: drives must be disabled."""
 
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable
@@ -14,7 +13,7 @@ Note = Callable[[BaseException], None]
 
 
 def run_to_its_end(run: Coroutine, note: Note) -> None:
-    """Run a coroutine to its end in an event loop of its own, and raise what it raises.
+    """Run a coroutine to its end in an event loop of its own, and raise its error.
 
     An exception that ends the loop itself, as KeyboardInterrupt does, is noted, and the loop goes
     on.
@@ -33,7 +32,7 @@ def run_to_its_end(run: Coroutine, note: Note) -> None:
 
 
 async def outlive(tasks: Iterable[asyncio.Future], note: Note) -> None:
-    """Wait until all tasks have ended; what asks this one to end meanwhile is noted."""
+    """Wait until all tasks have ended; note each request to end this one meanwhile."""
     pending = set(tasks)
     while pending:
         try:

@@ -70,12 +70,12 @@ class Joint:
 
     @property
     def place(self) -> str:
-        """The word for what its encoder measures."""
+        """The word for the measured quantity of its encoder."""
         return "angle" if self.kind == "revolute" else "position"
 
     @property
     def effort(self) -> str:
-        """The word for what its drive exerts."""
+        """The word for the action of its drive."""
         return "torque" if self.kind == "revolute" else "force"
 
 

@@ -28,8 +28,8 @@ def describe(
     Parameters
     ----------
     inputs : iterable of Path
-        The files this result was computed from. Never pass what a rig keeps sealed: the name and
-        the hash can be read by everyone in the result.
+        The files this result was computed from. Never pass a sealed file of a rig: everyone can
+        read its name and hash in the result.
     config : mapping, optional
         The stage's resolved settings, such as ``settings.model_dump(mode="json")``.
 
@@ -92,7 +92,7 @@ def provenance_of(path: Path) -> dict[str, Any]:
 
 
 def metadata_of(path: Path) -> dict[str, Any]:
-    """Return what ``provenance_of`` returns; empty for a missing or unreadable file.
+    """Return the same as ``provenance_of``; empty for a missing or unreadable file.
 
     For a caller that only needs to know which program made a file.
     """

@@ -160,7 +160,7 @@ class Contract:
         return tuple(column for group in expanded for column in group)
 
     def read(self, path: Path | str) -> Table:
-        """Return the table in a file, or raise a ContractError that says what is wrong with it."""
+        """Return the table in a file; raise ContractError where it breaks the contract."""
         rows, metadata = self.load(path)
         return Table(rows.to_pandas(), metadata, Path(path))
 

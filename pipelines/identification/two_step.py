@@ -351,7 +351,7 @@ def _covariance(
 ) -> NDArray:
     """Return the covariance of some rows, with the uncertainty of step 1 and of shapes.
 
-    A shape and its amplitudes are estimated from what each explains beyond the others: given the
+    A shape and its amplitudes are estimated from the share that each explains alone: given the
     shape, an amplitude's error hardly correlates with the shape's, and not at all in white noise.
     """
     to_shapes, of_shapes = _sensitivities(training, extension.covariance)

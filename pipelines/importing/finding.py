@@ -13,7 +13,7 @@ class Finding:
     """Time, a joint's quantity, or the rows."""
     observation: str
     action: str
-    """What the import did about it, or what to do; empty where nothing has to be done."""
+    """The import's correction, or the user's next step; empty where nothing has to be done."""
 
     def __str__(self) -> str:
         return f"{self.where}: {self.observation}" + (f"; {self.action}" if self.action else "")

@@ -14,10 +14,9 @@ from matplotlib.figure import Figure
 from pipelines.contracts.atomic import whole_file
 
 GREY, ORANGE, BLUE = "#7a869a", "#c2410c", "#1d4ed8"
-"""What is wanted or measured; what a model gives; what is left between the two."""
+"""Reference or measurement; model; residual."""
 NOISE, WANDERS, CAUSES = "#d5dae1", "#93b4f5", (ORANGE, "#f59e0b", "#7c2d12")
-"""Of an error budget: the noise floor, what does not repeat, and each cause; what is left else is
-blue."""
+"""Parts of an error budget: noise floor, non-repeating part, each cause; the rest is blue."""
 
 STYLE: dict[Any, Any] = {
     "font.size": 9,

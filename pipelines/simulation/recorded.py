@@ -39,7 +39,7 @@ class UnderReferences:
 
 
 def why_no_closed_loop(motion: Motion) -> str:
-    """Return what a recording lacks for simulating its drives' loop; empty if nothing."""
+    """Return why a recording's drives cannot be simulated in closed loop; empty if they can."""
     controller = motion.metadata.get("controller") or {}
     for joint in motion.joints:
         about = controller.get(joint)
@@ -127,8 +127,7 @@ def open_loop_frame(
 ) -> pd.DataFrame:
     """Return the windows that follow each other without overlap as a ``simulation/1`` table.
 
-    What the model should have done, the recorded angle, stands as its reference; ``window`` numbers
-    the windows.
+    The recorded angle stands as the reference; ``window`` numbers the windows.
     """
     apart = round(WINDOW_S / EVERY_S)
     chosen = (

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def explain(
     error: "ValidationError", data: Any, known_keys: Callable[[str], list[str]] = lambda path: []
 ) -> str:
-    """Return which key is wrong, its value, and what was expected.
+    """Return which key is wrong, its value, and the expectation.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a verdict finds, as rows to be shown: how sure it is that something is missing, and what.
+"""A verdict's findings as rows to be shown: the missing physics and its probability.
 
 For terminal and report alike, from the keys ``findings``, ``router`` and ``posterior`` of a
 verdict; files of older versions lack these, and then nothing is shown.
@@ -21,14 +21,14 @@ class Outcome:
 
     key: str
     words: str
-    """What is missing."""
+    """The case in words."""
     probability: float
     """Rounded to hundredths, so that the three add up to one as they are shown."""
 
 
 @dataclass
 class Node:
-    """What is missing at some depth: that something is, where, of which family, which cause."""
+    """Missing physics at some depth: that something is missing, where, which family or cause."""
 
     words: str
     probability: float
@@ -49,14 +49,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Shares:
-    """Of one joint: what its residual is made of, and what one variable alone predicts of it."""
+    """Parts of one joint's residual, and the share that one variable alone predicts."""
 
     joint: str
     rms: float
     parts: dict[str, float]
     """Shares of the mean square by the router's names; they add up to one."""
     with_person_only: float | None
-    """Part of what repeats."""
+    """Share that repeats only with the person."""
     predicted: dict[str, float]
     """Share of the variance that a curve of one variable predicts; these overlap."""
 
@@ -88,7 +88,7 @@ def outcomes(verdict: Mapping[str, Any]) -> tuple[Outcome, ...]:
 
 
 def rows(verdict: Mapping[str, Any]) -> list[Row]:
-    """Return the tree of findings, each node above what it holds; empty where nothing is found."""
+    """Return the tree of findings, each node above its branches; empty without findings."""
     root = Node("", 1.0)
     for finding in verdict.get("findings") or ():
         _grow(root, finding)
@@ -123,7 +123,7 @@ def shares(verdict: Mapping[str, Any]) -> list[Shares]:
 
 
 def _grow(root: Node, finding: Mapping[str, Any]) -> None:
-    """Add a finding's path to the tree, and what could be the answer at its end."""
+    """Add a finding's path to the tree, and the possible answers at its end."""
     node, is_cause = root, finding["level"] == "cause"
     path = finding["path"]
     # That something is missing is one of the outcomes; it is a line only where no more is known.

@@ -36,8 +36,9 @@ def effect_labelled(label: str) -> Effect:
 def effect_at(
     label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str, why: str = ""
 ) -> Effect:
-    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold;
-    ``why`` others do not.
+    """Return the effect of a label at a machine, if it ``fits`` a ``setting``.
+
+    ``why`` completes the message where it does not.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""The steps of an experiment: which file comes from which, what is up to date, rules for make."""
+"""The steps of an experiment: which file comes from which, which are up to date, make's rules."""

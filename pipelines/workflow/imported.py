@@ -30,7 +30,7 @@ class ImportedRuns:
 
 
 def damage(files: Sequence[Path]) -> str:
-    """Say which recordings cannot be read, and what to do."""
+    """Return a message on recordings that cannot be read, with a remedy."""
     names, several = ", ".join(file.as_posix() for file in files), len(files) > 1
     return (
         f"{names}: {DAMAGED}, and nothing is done without {'them' if several else 'it'};"

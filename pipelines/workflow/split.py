@@ -1,7 +1,7 @@
 """Write an experiment for make: a file for each section of its settings, and the graph's rules.
 
-A section's file that has not changed keeps its time, so that make re-runs only what a change
-affects. ``graph.mk`` is rewritten each time: its time says when the settings were last read.
+A section's file that has not changed keeps its time, so that make re-runs only the affected steps.
+``graph.mk`` is rewritten each time: its time says when the settings were last read.
 """
 
 import json

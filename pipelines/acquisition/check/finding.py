@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong, what was expected, and what to do."""
+    """The fault, the expected value, and a remedy."""
 
     device: str
     """Name of the device; ``rig`` for the whole rig."""

@@ -49,7 +49,7 @@ async def check_rings(
 async def _fault(
     machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float
 ) -> str | None:
-    """Return what is wrong with one drive's record; None for nothing."""
+    """Return the fault of one drive's record; None for a sound one."""
     history, begun = SetPointHistory(), False
     stream = SampleStream(machine.rig, j, cycle_hz, history)
     agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)

@@ -1,4 +1,4 @@
-"""What a drive is asked and sent before a run and at its end: checks, disabling, fault reset."""
+"""Exchanges with a drive before a run and at its end: checks, disabling, fault reset."""
 
 import asyncio
 import time

@@ -94,7 +94,7 @@ class Machine:
         Raises
         ------
         DeviceError
-            Names the drives that were enabled, since it is unknown what moved the leg.
+            Names the drives that were enabled, since an unknown program may have moved the leg.
         """
         enabled = [drive.device.label for drive in self.drives if await make_idle(drive)]
         if enabled:
@@ -122,11 +122,11 @@ class Machine:
         await all_answers(refuse_other_rate(drive, rate_hz, setting) for drive in self.drives)
 
     async def empty_records(self) -> None:
-        """Discard what the drives recorded before the run."""
+        """Discard the drives' samples from before the run."""
         await all_answers(empty_recorder(drive) for drive in self.drives)
 
     async def forget_records(self) -> None:
-        """Discard what the drives recorded, at most one drain each; the rest waits."""
+        """Discard recorded samples, at most one drain of each drive; the rest waits."""
         with suppress(Unanswered):
             await all_answers(drive.forget_records() for drive in self.drives)
 

@@ -1,8 +1,8 @@
 """Strict checks of replies: only a complete, well-formed frame that answers the request counts.
 
 pymodbus is lenient: it accepts transaction id 0 for any, a reply to another function, and a byte
-count that does not fit the frame. What it cannot decode it raises within asyncio, where no caller
-can catch it. Wrong numbers would move a leg, so every frame is checked here.
+count that does not fit the frame. A frame that it cannot decode raises within asyncio, where no
+caller can catch the error. Wrong numbers would move a leg, so every frame is checked here.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a rig must have before it moves a person: limits of their own, and watched cuff forces."""
+"""Conditions for moving a person: limits of their own, and watched cuff forces."""
 
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings

@@ -74,7 +74,7 @@ class JournalFile:
         self.metadata: dict[str, Any] = metadata
 
     def batches(self) -> Iterator[Batch]:
-        """Yield all undamaged batches; what follows damage or a cut is searched for the next one.
+        """Yield all undamaged batches; after damage or a cut, search for the next one.
 
         Raises
         ------
@@ -203,7 +203,7 @@ def refuse_leftover(path: Path) -> None:
     Raises
     ------
     InputError
-        Names the journal and what to do with it.
+        Names the journal and how to recover or remove it.
     """
     if not path.exists():
         return

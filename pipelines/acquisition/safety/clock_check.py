@@ -21,7 +21,7 @@ class ClockCheck:
         self._first = reading
 
     def check_rate(self, before: Reading, reading: Reading) -> str | None:
-        """Return what is wrong where the clock does not go on, or not at the rate of the run."""
+        """Return the fault where the clock does not go on, or not at the rate of the run."""
         if reading is not before and not reading.time > before.time:
             return (
                 f"{self._label}: its clock went from {before.time:.6f} to {reading.time:.6f} s"
@@ -41,7 +41,7 @@ class ClockCheck:
         )
 
     def check_step(self, before: Reading, reading: Reading) -> str | None:
-        """Return what is wrong where clock and counter differ from one sample to the next."""
+        """Return the fault where clock and counter differ from one sample to the next."""
         samples, seconds = reading.sequence - before.sequence, reading.time - before.time
         if not self._is_settled(reading) or keeps_time(samples, seconds, self._rate):
             return None

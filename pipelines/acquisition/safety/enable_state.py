@@ -1,4 +1,4 @@
-"""Whether the drives are enabled, by what each of them reports itself."""
+"""Whether the drives are enabled, by each drive's own report."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,7 +9,7 @@ from pipelines.settings.rig.devices import DriveSettings
 
 
 class EnableState:
-    """What one drive reported of being enabled."""
+    """The last report of one drive on whether it is enabled."""
 
     def __init__(self, joint: str) -> None:
         """Watch the drive of a joint."""

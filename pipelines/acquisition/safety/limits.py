@@ -1,4 +1,4 @@
-"""The limits of what may be measured and sent, and how set-points slow down."""
+"""The limits of measured values and set-points, and how set-points slow down."""
 
 from collections.abc import Sequence
 from math import copysign, isfinite, isnan

@@ -1,7 +1,7 @@
 """Where a run is on its plan: which set-points are due at a cycle of the machine.
 
-The path is the plan's set-points after the place where the leg stood. What is sent while a sample
-is latched is reached at the end of the next one.
+The path is the plan's set-points after the place where the leg stood. A set-point that is sent
+while a sample is latched is reached at the end of the next one.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class PlanProgress:
         self.followed_at = now
 
     def advance(self, cycle: int, now: float) -> None:
-        """Go on to what is due at a cycle."""
+        """Go on to the set-point that is due at a cycle."""
         self.has_advanced = cycle > self.cycle
         self.cycle, self.followed_at = cycle, now
 

@@ -21,8 +21,7 @@ RATIO = 0.25
 LITTLE_NM = 1.0
 """rms of the torque below which its noise may be all there is, on an exoskeleton."""
 NEAR_RAD = 1e-3
-"""How far the angles of one sample may be apart, besides what the joint travels in a sample and a
-half."""
+"""How far the angles of one sample may differ, on top of the joint's travel in 1.5 samples."""
 
 
 class RecordAgreement:

@@ -8,10 +8,10 @@ from pipelines.settings.rig.devices import DriveSettings
 from pipelines.settings.rig.safety import SafetySettings
 
 WALK = 0.8
-"""Share of its speed limit at which a joint is led back to the plan: at the whole of it a drive
-that follows well would break it by what it overshoots, and by a count."""
+"""Share of its speed limit at which a joint is led back to the plan: at the whole limit, overshoot
+or one encoder count would exceed it."""
 NO_LAG_RAD = 1e-9
-"""What rounding leaves between a set-point and the plan."""
+"""Rounding error between a set-point and the plan."""
 
 Path = tuple[float, float, float]
 """The plan's set-points due now, a cycle before, and two cycles before, rad."""

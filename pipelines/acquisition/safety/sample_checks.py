@@ -165,7 +165,7 @@ class SampleChecks:
         return self._limits.straying(answers, [tracker.in_force for tracker in trackers], late)
 
     def _with_jerk(self, reason: str) -> str:
-        """Return a reason with what may have jerked the leg: one drive moves the whole of it."""
+        """Return a reason with a possible jerk of any joint: one drive moves the whole leg."""
         extended = (stream.after_jerk(reason) for stream in self.streams)
         return next((text for text in extended if text != reason), reason)
 

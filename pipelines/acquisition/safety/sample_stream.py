@@ -19,7 +19,7 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import MOST_REGISTERS
 
 SPEED_SHARE = 0.25
-"""How far a drive's speed may be from what its angle does in one sample, as a share of the speed
+"""How far a drive's speed may differ from its angle's change in one sample, as a share of the speed
 limit."""
 ECHO_CYCLES = 8
 """Within how many cycles at the speed limit a drive's set-point must be of the one that was
@@ -159,7 +159,7 @@ class SampleStream:
         self._left_out = since, until
 
     def after_jerk(self, why: str, reading: Reading | None = None) -> str:
-        """Return a reason to stop, with what may have jerked the leg shortly before a sample."""
+        """Return a reason to stop, with a possible jerk of the leg shortly before a sample."""
         jerked = self._jerked(reading or self._last)
         return f"{why}; {jerked}" if jerked else why
 

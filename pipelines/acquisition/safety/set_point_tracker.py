@@ -25,7 +25,7 @@ DRIFT = 0.01
 
 
 class SetPointTracker:
-    """What one drive was sent last, and what it may be sent next."""
+    """The last set-point of one drive, and the range of the next one."""
 
     def __init__(self, rig: RigSettings, joint: int, sample_rate_hz: float) -> None:
         """Track the set-points of a joint's drive; angles are rad, instants the host's clock, s."""
@@ -58,7 +58,7 @@ class SetPointTracker:
         """In which of the machine's cycles a drive that goes on by itself was at ``base``; None
         where it holds, or was sent something since."""
         self._slack_used = 0.0
-        """By how much the set-points are ahead of what the speed limit allows, s."""
+        """By how much the set-points are ahead of the speed limit, s."""
 
     def start_at(self, angle: float) -> None:
         """Begin where the leg stands."""
@@ -70,12 +70,12 @@ class SetPointTracker:
         self._answered_at = now
 
     def mark_answered(self, at: float) -> None:
-        """Note an answer: what was sent before it has arrived."""
+        """Note an answer: set-points sent before it have arrived."""
         if at > self._answered_at:
             self._answered_at, self._unanswered = at, 0
 
     def is_stale(self, now: float) -> bool:
-        """Return whether the last answer is too old to know what the drive made of its set-points.
+        """Return whether the last answer is too old to know which set-points the drive follows.
 
         In lockstep a drive holds the last one that arrived, however long, and those that did not
         add up to a leap.

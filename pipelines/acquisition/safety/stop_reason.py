@@ -1,4 +1,4 @@
-"""Why a run is stopped: the first reason, and what went wrong after it."""
+"""Why a run is stopped: the first reason, and the faults after it."""
 
 from asyncio import CancelledError
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ class StopReason:
         self.text: str | None = None
         """The first reason to stop early; None while there is none."""
         self.further: list[str] = []
-        """What else went wrong after that, in its order."""
+        """Later reasons, in their order."""
         self.fault: BaseException | None = None
         """The first error that was exoid's own."""
 

@@ -1,7 +1,7 @@
-"""The supervisor: the one place that decides what the drives are sent, and when nothing more.
+"""The supervisor: the one place that decides every set-point, and when to stop.
 
-It neither waits nor reads nor sends. The control loop passes it what came and when, and sends what
-it returns. docs/safety.md draws its states and lists what holds in each.
+It neither waits nor reads nor sends. The control loop passes it each answer and its time, and sends
+the set-points that it returns. docs/safety.md draws its states and lists the conditions of each.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from pipelines.settings.rig.devices import SensorSettings
 
 
 class Supervisor:
-    """The state of one run: what each drive was sent, and why the run was stopped."""
+    """The state of one run: each drive's set-points, and why the run was stopped."""
 
     def __init__(
         self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()
@@ -89,7 +89,7 @@ class Supervisor:
     def has_missed(self, cycle: int, now: float) -> bool:
         """Return whether a drive may have been sent nothing for longer than a sample by a cycle.
 
-        What was sent and not answered may never have arrived, and a counter may have been set back.
+        A set-point without an answer may never have arrived, and a counter may have been set back.
         """
         self.reason.refuse()
         self.checks.refuse_silence(cycle, now)
@@ -180,7 +180,7 @@ class Supervisor:
     def finish(self, complaints: Sequence[str]) -> None:
         """End the run; ``complaints`` are of drives that may not have taken it to disable.
 
-        Disabled is only what is known to be: with a complaint a run ends in abort.
+        A run ends as disabled only if every drive is known to be; with a complaint, in abort.
         """
         self.reason.join(complaints)
         self.still_enabled = bool(complaints)

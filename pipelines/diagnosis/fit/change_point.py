@@ -1,4 +1,4 @@
-"""Find when an effect begins in a run, exactly, and with what uncertainty.
+"""Find when an effect begins in a run, exactly, with its uncertainty.
 
 After its onset an effect acts as if it had always been present. So the squared error of every
 instant is the sum of two running sums: the residual without the effect before, and with it after.

@@ -1,4 +1,4 @@
-"""Report what is missing as precisely as the data support, from its repeating to its cause.
+"""Report missing physics as precisely as the data support, from its repeating to its cause.
 
 Findings form a tree: whether it repeats with the motion, at which joint, which family of laws it
 belongs to, which cause it is. Each is reported at the deepest node whose probability reaches one
@@ -65,7 +65,7 @@ def _cause(label: str, probability: float) -> dict[str, Any]:
 
 
 def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
-    """Return what is missing, the most probable first; empty where nothing is."""
+    """Return the missing causes, the most probable first; empty where the model is complete."""
     if 1.0 - posterior.nothing < CRITERIA.likely:
         return []
     results = [_of_cause(posterior, named) for named in answer.named]

@@ -1,4 +1,4 @@
-"""Build ``findings`` of the verdict: what is missing, as precisely as the data support."""
+"""Build ``findings`` of the verdict: the missing physics, as precisely as the data support."""
 
 from collections.abc import Iterator
 from typing import Any

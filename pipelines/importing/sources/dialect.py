@@ -25,7 +25,7 @@ ENOUGH = 0.5
 """Least share of numbers among the fields of a row of data; others are dates and states."""
 
 UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
-"""What may be an unknown unit: in brackets, or short."""
+"""Pattern of a possible unknown unit: in brackets, or short."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ DIMENSION = {
 
 
 class Register(Settings):
-    """Where a value lies and what its bits mean: value = raw x scale + offset, in ``unit``."""
+    """Where a value lies and how its bits are read: value = raw x scale + offset, in ``unit``."""
 
     address: int = Field(
         ge=0, le=65535, description="Address of its first register, counted from 0."

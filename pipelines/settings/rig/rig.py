@@ -149,7 +149,7 @@ class RigSettings(Settings):
         return round(ratio)
 
     def known_geometry(self) -> dict[str, float]:
-        """Return the known lengths of the leg; a virtual rig's plant has what the file lacks."""
+        """Return the known lengths of the leg; a virtual rig's plant fills in the others."""
         plant = (
             {name: getattr(self.plant, name) for name in GeometrySettings.model_fields}
             if self.plant
@@ -158,7 +158,7 @@ class RigSettings(Settings):
         return plant | self.geometry.model_dump(exclude_none=True)
 
     def known_controllers(self) -> dict[str, dict]:
-        """Return the drives' known loops; a virtual rig's plant has what the file lacks."""
+        """Return the drives' known loops; a virtual rig's plant fills in the others."""
         plant = self.plant.controllers() if self.plant else {}
         return plant | {
             joint: loop.model_dump(exclude_none=True) for joint, loop in self.controller.items()

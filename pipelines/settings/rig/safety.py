@@ -1,4 +1,4 @@
-"""``[safety]`` of a rig file: what stops a run, and how."""
+"""``[safety]`` of a rig file: conditions that stop a run, and how it is stopped."""
 
 from typing import Self
 
@@ -23,7 +23,7 @@ class HumanSafetySettings(Settings):
 
 
 class SafetySettings(Settings):
-    """What stops a run, and how."""
+    """Conditions that stop a run, and how it is stopped."""
 
     angle_margin_rad: float = Field(
         0.02, ge=0.0, description="Set-points keep this far from each angle limit."
