@@ -96,7 +96,7 @@ class OperatorView:
         if self._progress is not None and progress.missed > self._progress.missed:
             self._lost_at = time.monotonic()
         self._progress = progress
-        if any(gauge.near for gauge in self.gauges() if not np.isnan(gauge.value)):
+        if any(gauge.near for gauge in self._gauges() if not np.isnan(gauge.value)):
             self._near_at = time.monotonic()
 
     def alert(self) -> str:
@@ -112,7 +112,7 @@ class OperatorView:
             return "LIMIT NEAR"
         return "SAMPLES LOST" if now - self._lost_at < SHOWN_S else ""
 
-    def gauges(self) -> list[Gauge]:
+    def _gauges(self) -> list[Gauge]:
         """Return every value that has limits, in the order shown."""
         if self._progress is None or self._progress.row is None:
             return []
@@ -152,7 +152,7 @@ class OperatorView:
             progress.abort or "", max(width - 1, 4), max_lines=ABORT_LINES, placeholder="..."
         )
         head = [self._head(progress, width), *[[(text, URGENT)] for text in reason], []]
-        gauges = [gauge.line() for gauge in self.gauges()]
+        gauges = [gauge.line() for gauge in self._gauges()]
         if not gauges:
             return [*head, [("nothing has been measured yet", FAINT)]]
         counts = f"{progress.samples} samples, {progress.missed} missed in {progress.gaps} gaps"

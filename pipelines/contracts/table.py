@@ -151,7 +151,7 @@ class Contract:
         """Name and version as written in a file: ``recording/1``."""
         return f"{self.name}/{self.version}"
 
-    def columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
+    def _columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
         """Return every column by its name in a file, one for each joint."""
         expanded = (
             [column.at(joint) for joint in joints] if column.per_joint else [column]
@@ -259,7 +259,7 @@ class Contract:
         Empty pieces are left out. If columns are ``named``, the others may be missing. A table that
         breaks the contract raises ContractError.
         """
-        known = self.columns_for(joints_of(metadata))
+        known = self._columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]
         rows, last_row = 0, None
         for piece in pieces:

@@ -31,7 +31,7 @@ def facts(effect: type[Effect]) -> dict[str, Any]:
         "resembles": list(effect.resembles),
         "equation": effect.equation,
         "meaning": inspect.cleandoc(effect.__doc__ or ""),
-        "typical": typical_size(effect),
+        "typical": _typical_size(effect),
         "forms_differ": effect.forms_differ,
         "looks_like": effect.looks_like,
         "confirm": effect.confirm,
@@ -65,7 +65,7 @@ def where(effect: type[Effect]) -> str:
     )
 
 
-def typical_size(effect: type[Effect]) -> str:
+def _typical_size(effect: type[Effect]) -> str:
     """Return the typical size of an effect on an exoskeleton: the range of its first parameter."""
     first = effect().parameters[0]
     return f"{first.name} {typical_range(first)}"
@@ -78,7 +78,7 @@ def typical_range(parameter: Parameter) -> str:
     return f"{low:.3g} to {high:.3g}{unit}"
 
 
-def laws_in_words(effect: type[Effect]) -> str:
+def _laws_in_words(effect: type[Effect]) -> str:
     """Return the names of the smooth laws that contain an effect approximately."""
     return ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
 
@@ -107,7 +107,7 @@ def page(effect: type[Effect]) -> str:
             f"**Looks like:** {stated['looks_like']}.",
             "",
             *_paragraph("How the real one may differ", stated["forms_differ"]),
-            f"**Family:** {stated['family']}; **resembles** the laws: {laws_in_words(effect)}.",
+            f"**Family:** {stated['family']}; **resembles** the laws: {_laws_in_words(effect)}.",
             "",
             f"**To confirm it on the rig:** {stated['confirm']}.",
             "",
@@ -139,7 +139,7 @@ def pages() -> dict[str, str]:
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (
         f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} |"
-        f" {typical_size(e)} |"
+        f" {_typical_size(e)} |"
         for e in ours
     )
     return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {

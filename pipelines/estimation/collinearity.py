@@ -15,7 +15,7 @@ SHARE = 0.5
 """Share of a parameter's variance above which a dependence involves it."""
 
 
-def scaled_gram(gram: NDArray) -> NDArray:
+def _scaled_gram(gram: NDArray) -> NDArray:
     """Return A'A, (p, p), with the columns of A scaled to unit norm."""
     size = np.sqrt(np.diag(gram))
     return gram / np.outer(size, size)
@@ -54,7 +54,7 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     names : sequence of str
         Names of the p parameters.
     """
-    eigenvalues, vectors = np.linalg.eigh(scaled_gram(gram))
+    eigenvalues, vectors = np.linalg.eigh(_scaled_gram(gram))
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
     index = np.sqrt(eigenvalues[-1] / eigenvalues)
     variance = vectors**2 / eigenvalues

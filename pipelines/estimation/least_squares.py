@@ -46,7 +46,7 @@ class WeightedLeastSquares(Estimator):
             sensitivity,
             carry_of(problem, sensitivity, slope),
             weights,
-            scores_of(problem, values, weights),
+            _scores_of(problem, values, weights),
             {"joint_weights_1_nm2": weights.tolist()},
         )
 
@@ -68,7 +68,7 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
     passes = 0
 
 
-def scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
+def _scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
     """Return the scores of least squares: each block's part of the normal equations' residual.
 
     Parameters

@@ -43,17 +43,17 @@ class Training:
         absent = [
             (term, number)
             for number, run in enumerate(self.runs)
-            for term, own in enumerate(self.terms_of(run))
+            for term, own in enumerate(self._terms_of(run))
             if own is None
         ]
         effects = [term.effect for term in self.model]
         return ParameterLayout.of(effects, [run.run for run in self.runs], absent)
 
-    def terms_of(self, run: Run) -> tuple[Term | None, ...]:
+    def _terms_of(self, run: Run) -> tuple[Term | None, ...]:
         """Return the model's terms in a run; None for a term that is absent."""
         return self.own.get(run.file, self.model.terms)
 
-    def number_of(self, run: Run) -> int | None:
+    def _number_of(self, run: Run) -> int | None:
         """Return the number of a training run by its file; None if it is no training run."""
         return next(
             (number for number, other in enumerate(self.runs) if other.file == run.file), None
@@ -66,15 +66,15 @@ class Training:
 
     def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
         """Return a term in a run with the values of all columns, (p,); None if it is absent."""
-        own = self.terms_of(run)[term]
+        own = self._terms_of(run)[term]
         if own is None:
             return None
-        linear = self.layout.terms[term].select(values, self.number_of(run), own.linear)
+        linear = self.layout.terms[term].select(values, self._number_of(run), own.linear)
         return Term(own.effect, np.append(linear, own.shape))
 
     def reshaped(self, term: int, shape: int, step: float, files: Sequence[str]) -> "Training":
         """Return the same with one shape value of a term larger by a step in some runs."""
-        own = {run.file: list(self.terms_of(run)) for run in self.runs}
+        own = {run.file: list(self._terms_of(run)) for run in self.runs}
         for file in files:
             before = own[file][term]
             if before is not None:
@@ -92,8 +92,8 @@ class Training:
 
     def regressions(self, run: Run) -> Iterator[Regression]:
         """Yield a run's regression on the p columns, piece by piece."""
-        number = self.number_of(run)
-        present = [i for i, term in enumerate(self.terms_of(run)) if term is not None]
+        number = self._number_of(run)
+        present = [i for i, term in enumerate(self._terms_of(run)) if term is not None]
         model = self.model_of(run, np.zeros(self.layout.size))
         for r in regressions(run, model, self.cutoff_hz):
             r = replace(r, regressor=self.layout.expand(r.regressor, number, present))

@@ -164,7 +164,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     joints = len(model.joints)
     of_memory = ", ".join(dict.fromkeys(model.memory_of))
     places = {
-        "comment": comment([*exported.heading(C), "", *order_of(model)]),
+        "comment": comment([*exported.heading(C), "", *_order_of(model)]),
         "name": name,
         "NAME": name.upper(),
         "GUARD": f"{name.upper()}_H",
@@ -193,7 +193,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
 
 
-def order_of(model: Equations) -> list[str]:
+def _order_of(model: Equations) -> list[str]:
     """Return the index, name and kind of each joint."""
     return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
 

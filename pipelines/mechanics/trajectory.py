@@ -69,7 +69,7 @@ def read_trajectory(path: Path | str) -> Trajectory:
     path = Path(path)
     if path.suffix == ".toml":
         return _from_toml(path)
-    return trajectory_from_table(TRAJECTORY.read(path))
+    return _trajectory_from_table(TRAJECTORY.read(path))
 
 
 def _from_toml(path: Path) -> FourierTrajectory:
@@ -88,7 +88,7 @@ def _from_toml(path: Path) -> FourierTrajectory:
     )
 
 
-def trajectory_from_table(table: Table) -> Trajectory:
+def _trajectory_from_table(table: Table) -> Trajectory:
     """Return the excitation in a ``trajectory/1`` table.
 
     Its coefficients are used if it has them, and its samples otherwise. Samples repeat if the

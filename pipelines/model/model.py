@@ -112,7 +112,7 @@ class Model:
         """Return a measured motion as motors, links and the wearer's limb perform it."""
         motor = self.sensed(motion)
         link = self.behind_motors(motor)
-        return Motions(motor, link, self.behind_cuffs(link))
+        return Motions(motor, link, self._behind_cuffs(link))
 
     def sensed(self, motion: Motion) -> Motion:
         """Undo the encoders' errors: return the motion of the motors."""
@@ -122,7 +122,7 @@ class Model:
         """Return the motion of the machine's links for a motion of its motors."""
         return self._corrected(motor, lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
 
-    def behind_cuffs(self, link: Motion) -> Motion:
+    def _behind_cuffs(self, link: Motion) -> Motion:
         """Return the motion of the wearer's limb for a motion of the machine's links."""
         return self._corrected(link, lambda effect: effect.side is Side.HUMAN)
 

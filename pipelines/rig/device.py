@@ -75,7 +75,7 @@ class Device:
         self.written |= written is not None
         if written is None:
             self.show(self.latched())
-            self.show_records(address, count)
+            self._show_records(address, count)
             if function == READ_WRITE:
                 self.rig.exchanged(self)
         return None
@@ -92,7 +92,7 @@ class Device:
         """Put a sample into the registers."""
         raise NotImplementedError
 
-    def show_records(self, address: int, count: int) -> None:
+    def _show_records(self, address: int, count: int) -> None:
         """Put requested records of earlier samples into the registers; a device may have none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:
@@ -160,7 +160,7 @@ class Drive(Device):
         self.receive()
         self._put(self.read, self._values(sample))
 
-    def show_records(self, address: int, count: int) -> None:
+    def _show_records(self, address: int, count: int) -> None:
         """Put the requested records of the ring into the registers."""
         if self.ring:
             self.ring.show(self.registers, self.first, address, count)

@@ -48,11 +48,11 @@ def labels_in_words(text: str, labels: Iterable[str]) -> str:
 
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
     """Return a verdict's causes in words, most probable first, each with its ties."""
-    words = [tied_in_words(cause) for cause in causes]
+    words = [_tied_in_words(cause) for cause in causes]
     return (", and " if any(map(ties_of, causes)) else " and ").join(words)
 
 
-def tied_in_words(cause: dict[str, Any]) -> str:
+def _tied_in_words(cause: dict[str, Any]) -> str:
     """Return a cause in words, with its only tie, or with the number of its ties."""
     words, ties = cause_in_words(cause), ties_of(cause)
     if not ties:

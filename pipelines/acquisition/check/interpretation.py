@@ -28,7 +28,7 @@ class Interpretation:
     """Number of errors that it assumes in the rig file, weighted by how unlikely they are."""
 
 
-def interpretations(name: str, block: Block) -> Iterator[Interpretation]:
+def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     """Yield every other description of a register, the likeliest first."""
     results = [Interpretation(*key) for key in _all(name, block)]
     return iter(sorted((one for one in results if one.cost), key=lambda one: one.cost))
@@ -97,7 +97,7 @@ def remedy(
         Whether the register is a counter or clock, which wraps around.
     """
     best: list[tuple[Interpretation, float]] = []
-    for one in interpretations(name, series.block):
+    for one in _interpretations(name, series.block):
         if best and one.cost > best[0][0].cost:
             break
         values = (series.counted if counts else series.of)(

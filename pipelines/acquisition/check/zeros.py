@@ -29,7 +29,7 @@ def check_zeros(
     is_empty : bool
         Whether no person is in the machine; else the mean forces are not zeros.
     """
-    forces = fresh_forces(series)
+    forces = _fresh_forces(series)
     if not all(has_plausible_size(forces[:, i]).all() for i in range(len(AXES))):
         return  # the registers have to be corrected first
     where = f"{probe.map_path}.read"
@@ -59,6 +59,6 @@ def check_zeros(
         )
 
 
-def fresh_forces(series: Series) -> NDArray:
+def _fresh_forces(series: Series) -> NDArray:
     """Return the forces of each new sample, (n, 3) N."""
     return np.column_stack([series.of(axis) for axis in AXES])[series.fresh]

@@ -176,9 +176,9 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.cuff_forces(number)
-            answers = await answers_or_timeouts(map(send, self.drives))
+            answers = await _answers_or_timeouts(map(send, self.drives))
         else:
-            answers = await answers_or_timeouts(map(send, self.drives))
+            answers = await _answers_or_timeouts(map(send, self.drives))
             forces = await self.cuff_forces(number)
         readings = [answer for answer in answers if isinstance(answer, Reading)]
         is_whole = len(readings) == len(answers)
@@ -248,7 +248,7 @@ class Machine:
         )
 
 
-async def answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
+async def _answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
     """Wait for all requests; return each answer, or the error of one that came too late.
 
     All are awaited, so that no late answer is taken for that of a later request. Any other error
@@ -266,7 +266,7 @@ async def answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[Ans
 async def all_answers(requests: Iterable[Awaitable[Answer]]) -> list[Answer]:
     """Wait for all requests and return their answers; raise where one is missing."""
     answers: list[Answer] = []
-    for answer in await answers_or_timeouts(requests):
+    for answer in await _answers_or_timeouts(requests):
         if isinstance(answer, Unanswered):
             raise answer
         answers.append(answer)

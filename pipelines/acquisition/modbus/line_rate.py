@@ -39,12 +39,12 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
     """
     first = rig.drive[0]
     look = rig.line_of(first).exchange_s(
-        read_characters(rig.map.drive[first.map].read.sequence.registers)
+        _read_characters(rig.map.drive[first.map].read.sequence.registers)
     )
     drives, drains, records = (defaultdict[str | None, float](float) for _ in range(3))
     for drive in rig.drive:
         drives[drive.line] += rig.line_of(drive).exchange_s(
-            exchange_characters(rig.map.drive[drive.map])
+            _exchange_characters(rig.map.drive[drive.map])
         )
         if rig.sampling == "recorder":
             assert rig.record_rate_hz  # the rig file is checked: recorders have a rate
@@ -74,7 +74,9 @@ def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
     """
     turns = defaultdict[tuple[str | None, int], defaultdict[int, float]](lambda: defaultdict(float))
     for sensor in rig.sensor:
-        took_s = rig.line_of(sensor).exchange_s(read_characters(_count(rig.map.sensor[sensor.map])))
+        took_s = rig.line_of(sensor).exchange_s(
+            _read_characters(_count(rig.map.sensor[sensor.map]))
+        )
         turns[sensor.line, sensor.every][rig.turn_of(sensor)] += took_s
     longest = defaultdict[str | None, float](float)
     for (line, _), took in turns.items():
@@ -88,22 +90,22 @@ def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
     assert ring  # the rig file is checked: with recorders, every drive has one
     brings = ring.records_per_read
     if ring.newest is None:
-        return line.exchange_s(queue_characters(brings * ring.words)), brings
-    newest = line.exchange_s(read_characters(ring.newest.registers))
-    return line.exchange_s(read_characters(brings * ring.words)) + newest, brings
+        return line.exchange_s(_queue_characters(brings * ring.words)), brings
+    newest = line.exchange_s(_read_characters(ring.newest.registers))
+    return line.exchange_s(_read_characters(brings * ring.words)) + newest, brings
 
 
-def exchange_characters(registers: DriveMap) -> int:
+def _exchange_characters(registers: DriveMap) -> int:
     """Return the characters of an FC23 exchange, request and reply as RTU frames."""
     return 13 + 2 * Block(registers_of(registers.write)).count + 5 + 2 * _count(registers)
 
 
-def read_characters(registers: int) -> int:
+def _read_characters(registers: int) -> int:
     """Return the characters of an FC03 reading, request and reply as RTU frames."""
     return 8 + 5 + 2 * registers
 
 
-def queue_characters(registers: int) -> int:
+def _queue_characters(registers: int) -> int:
     """Return the characters of an FC24 reading, request and reply as RTU frames."""
     return 6 + 8 + 2 * registers
 

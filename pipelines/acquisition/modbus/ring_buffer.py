@@ -24,7 +24,7 @@ NoteNewest = Callable[[float, float | None], int]
 sample's, to the sample's number without wraparound."""
 
 
-def most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
+def _most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
     """Return the most reads of one drain; the rest waits for the next one, as set-points cannot.
 
     They are twice the reads for the samples of a cycle, so that a backlog is worked off.
@@ -52,7 +52,7 @@ class Ring:
         self._address, self._capacity = settings.address, settings.capacity
         self._words = settings.words
         self.block = settings.records_per_read
-        self._most = most_reads(settings, samples_per_cycle) * self.block
+        self._most = _most_reads(settings, samples_per_cycle) * self.block
         """Most records of one drain."""
         self._next: int | None = None
         self._read_again: int | None = None
@@ -126,7 +126,7 @@ class Queue:
         self._record = Block(registers_of(settings.record))
         self._span = self._record.span("sequence")
         self.block = settings.records_per_read
-        self._reads = most_reads(settings, samples_per_cycle)
+        self._reads = _most_reads(settings, samples_per_cycle)
         self._began: int | None = None
         self._fetched: list[tuple[int, Record]] = []
         """Records that were removed from the queue, but not returned by a drain yet."""

@@ -52,9 +52,9 @@ class SampleChecks:
         """Begin with the first sample of enabled drives."""
         for joint, reading in enumerate(row.drives):
             self.streams[joint].begin(reading, now)
-            self.note_sent(joint, reading, trackers[joint])
+            self._note_sent(joint, reading, trackers[joint])
 
-    def note_sent(self, joint: int, reading: Reading, tracker: SetPointTracker) -> None:
+    def _note_sent(self, joint: int, reading: Reading, tracker: SetPointTracker) -> None:
         """Note that a set-point was sent while a sample was the newest."""
         self._histories[joint].add(reading.sequence, tracker.sent)
 
@@ -95,7 +95,7 @@ class SampleChecks:
         reason = self._limits.violation(answers) or self._limits.straying(answers, base, late=1)
         if reason:
             raise DeviceError(self._with_jerk(reason))
-        self.note_sent(joint, reading, trackers[joint])
+        self._note_sent(joint, reading, trackers[joint])
 
     def check(
         self, answers: Answers, trackers: Sequence[SetPointTracker], cycle: int, now: float
@@ -150,7 +150,7 @@ class SampleChecks:
             if is_new := stream.check(answer, now):
                 tracker.meet(answer, cycle)
             # The set-point sent with the question takes effect after the sample of the answer.
-            self.note_sent(joint, answer, tracker)
+            self._note_sent(joint, answer, tracker)
         stream.refuse_silence(now)
         return is_new
 

@@ -32,7 +32,7 @@ that."""
 def timing_faults(motion: Motion) -> Iterator[Fault]:
     """Yield the faults of the time stamps of one run."""
     late = motion.time * motion.sample_rate_hz - np.arange(len(motion))
-    missing = missing_samples(motion, late)
+    missing = _missing_samples(motion, late)
     yield from _missing(motion, missing)
     yield from _counter(motion)
     on_grid = late - np.concatenate([[0.0], np.cumsum(missing)])
@@ -42,7 +42,7 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
     yield from _rate(motion, on_grid)
 
 
-def missing_samples(motion: Motion, late: NDArray) -> NDArray:
+def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
     The counter shows them. Without one: a missing sample makes all later samples late, a late stamp

@@ -120,7 +120,7 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
 
 def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
     """Return the joints whose torque contradicts their position loops; None if one is unknown."""
-    laws = [drive_law(run.motion, j) for j in range(2)]
+    laws = [_drive_law(run.motion, j) for j in range(2)]
     wrong = {
         j: (law, f"{the(name)}'s position loop")
         for j, (name, law) in enumerate(zip(run.motion.joints, laws, strict=True))
@@ -129,7 +129,7 @@ def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
     return None if None in laws and not wrong else wrong
 
 
-def drive_law(motion: Motion, joint: int) -> float | None:
+def _drive_law(motion: Motion, joint: int) -> float | None:
     """Return recorded torque over that of the position loop in the metadata.
 
     The torque is fitted by the angle's error and both speeds; the multiple of the error is the

@@ -231,7 +231,7 @@ def _words(joint: str, machine: Machine, words: str) -> str:
     )
 
 
-def by_kind(
+def _by_kind(
     runs: Sequence[Run], residuals: Sequence[NDArray]
 ) -> Iterable[tuple[list[Run], list[NDArray]]]:
     """Yield the runs of each kind with their residuals (m, O).
@@ -258,7 +258,7 @@ def variable_share(
         Number of the joint.
     """
     total = error = 0.0
-    for some, of_kind in by_kind(runs, residuals):
+    for some, of_kind in _by_kind(runs, residuals):
         y = pooled(some, [r[:, j] for r in of_kind], j)
         if not len(y):
             continue

@@ -124,14 +124,14 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     # Splitting damps the transform by the square of a sinc.
     power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
     some = orders[:: max(1, len(orders) // 256)]
-    information = np.sum([information_at(channel, some) for channel in channels], axis=0)
+    information = np.sum([_information_at(channel, some) for channel in channels], axis=0)
     information = np.maximum(information, LEAST_INFORMED * np.max(information))
     ratio = power / np.interp(orders, some, information)
     level = _level(ratio, OVERSAMPLED * AROUND_IN_ANGLE, 1)
     return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1)
 
 
-def information_at(channel: Channel, orders: NDArray) -> NDArray:
+def _information_at(channel: Channel, orders: NDArray) -> NDArray:
     """Return D of the equation above at some orders (m,), from representative speeds."""
     hz = orders[:, np.newaxis] * channel.grid.usual_hz_per_order
     weight = channel.weight(hz).mean(axis=1)
@@ -199,4 +199,4 @@ def information(channel: Channel, kind: Kind, cycles: float) -> float:
     """Return D of the equation above for one line, in samples times 1/(N·m)²."""
     if kind is Kind.TIME:
         return len(channel.score) * float(channel.weight(np.array(cycles))) + TINY
-    return float(information_at(channel, np.array([cycles]))[0])
+    return float(_information_at(channel, np.array([cycles]))[0])

@@ -20,10 +20,10 @@ explain."""
 def imperfection(runs: Sequence[Run]) -> NDArray:
     """Return the error that every model of a real machine has, (O,) N·m."""
     torque = varying_torque(runs)
-    return torque * imperfect_share(len(torque))
+    return torque * _imperfect_share(len(torque))
 
 
-def imperfect_share(outputs: int) -> NDArray:
+def _imperfect_share(outputs: int) -> NDArray:
     """Return the share of each output's torque that is wrong on a good rig, (O,).
 
     Drives come first, then cuffs.

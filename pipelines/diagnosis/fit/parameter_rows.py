@@ -133,7 +133,7 @@ def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[N
     return values, ends
 
 
-def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
+def _residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
     """Return a run's rows of ``residuals/1`` for a model's residual, (m, O) N·m."""
     joints = joints_of(run.motion.metadata)
     J = len(joints)
@@ -163,7 +163,7 @@ def residual_table(runs: Sequence[Run], by_model: Mapping[str, Sequence[NDArray]
     """Return ``residuals/1`` of several runs under several models, each residual (m, O) N·m."""
     return pd.concat(
         [
-            residual_rows(run, residual, model)
+            _residual_rows(run, residual, model)
             for model, residuals in by_model.items()
             for run, residual in zip(runs, residuals, strict=True)
         ],

@@ -110,9 +110,9 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compari
         If their machines or the units of their parameters differ.
     """
     pair = (first, second)
-    refuse_different_machines(pair, titles)
+    _refuse_different_machines(pair, titles)
     models = list(_models(pair))
-    refuse_different_units(models)
+    _refuse_different_units(models)
     rows = _errors_and_floors(pair)
     context: dict[str, Any] = {
         "titles": titles,
@@ -215,7 +215,7 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
     ]
 
 
-def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
+def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
     """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism.
 
     Raises
@@ -242,7 +242,7 @@ def _mechanism(session: Session) -> str | None:
     return next((name for name in names if isinstance(name, str)), None)
 
 
-def refuse_different_units(models: Iterable[ModelChanges]) -> None:
+def _refuse_different_units(models: Iterable[ModelChanges]) -> None:
     """Refuse parameters whose unit differs between the sessions.
 
     Raises

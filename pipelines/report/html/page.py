@@ -40,8 +40,8 @@ def render(
     artifacts: Iterable[Artifact],
 ) -> str:
     """Return a page as text; every text of ``context`` is escaped."""
-    style = asset("uPlot.min.css") + asset("page.css")
-    scripts = [asset("sharp.js"), asset("uPlot.iife.min.js"), asset("page.js")]
+    style = _asset("uPlot.min.css") + _asset("page.css")
+    scripts = [_asset("sharp.js"), _asset("uPlot.iife.min.js"), _asset("page.js")]
     data = {
         "charts": {chart.key: _chart(chart) for chart in charts},
         "animations": [_animation(one) for one in animations],
@@ -57,8 +57,8 @@ def render(
             script_hashes=[_digest(script) for script in scripts],
             data=Markup(_in_a_script(data)),
             provenance=Markup(_in_a_script(_provenance(artifacts))),
-            uplot_version=_uplot_version(asset("uPlot.iife.min.js")),
-            uplot_license=Markup(asset("uPlot.LICENSE")),
+            uplot_version=_uplot_version(_asset("uPlot.iife.min.js")),
+            uplot_license=Markup(_asset("uPlot.LICENSE")),
             version=__version__,
             made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         )
@@ -78,7 +78,7 @@ def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
 
 
 @cache
-def asset(name: str) -> str:
+def _asset(name: str) -> str:
     """Return a file of the page."""
     return ASSETS.joinpath(name).read_text(encoding="utf-8")
 
@@ -86,7 +86,7 @@ def asset(name: str) -> str:
 @cache
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(asset),
+        loader=jinja2.FunctionLoader(_asset),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -116,7 +116,7 @@ def _in_a_script(data: Any) -> str:
 def _chart(chart: Chart) -> dict[str, Any]:
     return {
         "x_label": chart.x_label,
-        "x": coded(chart.x, np.float64),
+        "x": _coded(chart.x, np.float64),
         "group": chart.group,
         "panels": [
             {
@@ -128,7 +128,7 @@ def _chart(chart: Chart) -> dict[str, Any]:
                         "label": s.label,
                         "role": s.role,
                         "mark": s.mark,
-                        "values": coded(s.values, np.float32),
+                        "values": _coded(s.values, np.float32),
                     }
                     for s in panel.series
                 ],
@@ -142,12 +142,12 @@ def _animation(one: Animation) -> dict[str, Any]:
     return {
         "kind": one.kind,
         "lengths": one.lengths,
-        "time": coded(one.time, np.float64),
-        "angles": {role: coded(values, np.float32) for role, values in one.angles.items()},
+        "time": _coded(one.time, np.float64),
+        "angles": {role: _coded(values, np.float32) for role, values in one.angles.items()},
     }
 
 
-def coded(values: NDArray, dtype: type[np.floating]) -> str:
+def _coded(values: NDArray, dtype: type[np.floating]) -> str:
     """Return numbers, (n,) or (n, k), as base64 of their little-endian bytes, row by row."""
     return base64.b64encode(
         np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()

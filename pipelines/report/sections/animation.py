@@ -44,14 +44,14 @@ class Animation:
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's animations."""
     return {
-        "is_leg": drawn_as(content.session) == "leg",
+        "is_leg": _drawn_as(content.session) == "leg",
         "animations": animations(content.session),
     }
 
 
 def animations(session: Session) -> list[Animation]:
     """Return an animation of each replayed run, if the machine can be drawn."""
-    if not drawn_as(session):
+    if not _drawn_as(session):
         return []
     results = []
     for run, replays in replayed(session).items():
@@ -60,7 +60,7 @@ def animations(session: Session) -> list[Animation]:
     return results
 
 
-def drawn_as(session: Session) -> str:
+def _drawn_as(session: Session) -> str:
     """Return the drawing's name for a session's machine; empty if there is none."""
     return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
 
@@ -94,7 +94,7 @@ def _frames(time: NDArray, error: NDArray) -> NDArray:
 
 
 def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
-    drawn = drawn_as(session)
+    drawn = _drawn_as(session)
     if drawn == "slider":
         return drawn, (float(np.abs(measured).max()) or 1.0,)
     if drawn == "pendulum":

@@ -30,7 +30,7 @@ def context(content: Content) -> dict[str, Any]:
         "headline": headline(session),
         "verdict": verdict,
         "lead": lead(verdict) if verdict else "",
-        "faults": first_fault(verdict) if verdict else ("", 0),
+        "faults": _first_fault(verdict) if verdict else ("", 0),
         "damaged_verdict": session.has_damaged_verdict,
         "unreadable": list(session.unreadable.values()),
         "quantity": either(joint.effort for joint in session.joints) or "torque",
@@ -76,7 +76,7 @@ def lead(verdict: dict[str, Any]) -> str:
     return str(verdict.get("finding") or verdict["summary"])
 
 
-def first_fault(verdict: dict[str, Any]) -> tuple[str, int]:
+def _first_fault(verdict: dict[str, Any]) -> tuple[str, int]:
     """Return the first data fault next to a finding, and the number of others; empty if none."""
     faults = verdict["data_faults"]
     if not faults or not verdict.get("finding"):

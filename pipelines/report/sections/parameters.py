@@ -79,7 +79,7 @@ def context(content: Content) -> dict[str, Any]:
     return {
         "has_baseline": bool(content.session.baselines),
         "models": shown,
-        "parameters": side_by_side(shown),
+        "parameters": _side_by_side(shown),
     }
 
 
@@ -117,7 +117,7 @@ class Row:
         return min(ends), max(ends)
 
 
-def side_by_side(shown: Sequence[Model]) -> list[Row]:
+def _side_by_side(shown: Sequence[Model]) -> list[Row]:
     """Return each parameter of some models with its estimates."""
     by_key: dict[tuple[str, str, str, str], dict[int, Estimate]] = {}
     for number, model in enumerate(shown):

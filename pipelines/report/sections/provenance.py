@@ -21,7 +21,7 @@ def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's list of files, and its warnings."""
     session = content.session
     return {
-        "warnings": [*stale(session), *changed_settings(session)],
+        "warnings": [*stale(session), *_changed_settings(session)],
         "settings": json.dumps(settings(session), indent=1, ensure_ascii=False),
         "software": software(session),
         "origins": origins(session),
@@ -172,7 +172,7 @@ def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
     return {name: config[name] for name in SECTIONS if isinstance(config.get(name), dict)}
 
 
-def changed_settings(session: Session) -> list[str]:
+def _changed_settings(session: Session) -> list[str]:
     """Return a sentence for each section of exoid.toml that has changed since files were made."""
     if session.config is None:
         return []

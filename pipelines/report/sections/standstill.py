@@ -45,10 +45,10 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's sentences on increased errors."""
-    return {"worse": increased_errors(content.session)}
+    return {"worse": _increased_errors(content.session)}
 
 
-def increased_errors(session: Session) -> list[str]:
+def _increased_errors(session: Session) -> list[str]:
     """Return a sentence for each error that the causes increase, with the reason if known."""
     verdict = session.verdict
     if not verdict or not verdict["causes"]:

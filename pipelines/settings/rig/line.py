@@ -155,7 +155,7 @@ class RtuLine(Line):
         return self.model_copy(update={"serial_port": place, "parity": "none"})
 
     @property
-    def character_s(self) -> float:
+    def _character_s(self) -> float:
         """Time of a character, s: a start bit, 8 data bits, parity and stop bits."""
         return (9 + (self.parity != "none") + self.stop_bits) / self.baud_rate
 
@@ -164,11 +164,11 @@ class RtuLine(Line):
         """Quiet time before each frame, s."""
         if self.silence_s is not None:
             return self.silence_s
-        return 3.5 * self.character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
+        return 3.5 * self._character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
 
     def exchange_s(self, characters: int) -> float:
         """Return the least time of a request and its reply of so many characters together, s."""
-        return characters * self.character_s + 2 * self.quiet_s
+        return characters * self._character_s + 2 * self.quiet_s
 
 
 LineSettings = Annotated[
