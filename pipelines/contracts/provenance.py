@@ -42,14 +42,14 @@ def describe(
     return {
         "created_by": f"exoid {__version__}",
         "created_at": datetime.now(UTC).isoformat(timespec="seconds"),
-        "software": dict(software()),
+        "software": dict(_software()),
         "inputs": [{"name": Path(path).name, "sha256": sha256(path)} for path in inputs],
         "config": dict(config or {}),
     }
 
 
 @cache
-def software() -> dict[str, str]:
+def _software() -> dict[str, str]:
     """Return the versions of Python and of the libraries that results depend on."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 

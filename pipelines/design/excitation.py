@@ -25,7 +25,10 @@ class Design:
     def frame(self) -> pd.DataFrame:
         """Return one period as rows of a ``trajectory/1`` table.
 
-        The next period begins where the table ends.
+        Returns
+        -------
+        DataFrame
+            Samples at ``sample_rate_hz``; the next period begins where the table ends.
         """
         rows = round(self.trajectory.period_s * self.settings.sample_rate_hz)
         time = np.arange(rows) / self.settings.sample_rate_hz
@@ -62,6 +65,20 @@ def design(
     """Design an excitation.
 
     Equal settings give an equal excitation, unless ``seconds`` ended the search.
+
+    Parameters
+    ----------
+    settings : DesignSettings
+        Bounds, harmonics, criterion and effort of the search.
+    geometry : Geometry, optional
+        Lengths of the leg, m; the paper's by default.
+    report : callable, optional
+        Called with the share that is done, 0 to 1, and a note.
+
+    Returns
+    -------
+    Design
+        The best excitation and its quality.
     """
     geometry = geometry or Geometry()
     result = search(settings, geometry, report)

@@ -108,7 +108,18 @@ def problem(
 
 @njit(cache=True)
 def workspace(problem):
-    """Allocate the scratch arrays for one problem."""
+    """Allocate the scratch arrays for one problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        n harmonics, N samples.
+
+    Returns
+    -------
+    Workspace
+        Motion (6, N), sines (4, N), columns (10, N) and coefficients (2, 2, n).
+    """
     n, samples = problem.sine.shape
     return Workspace(
         np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n))
@@ -117,25 +128,53 @@ def workspace(problem):
 
 @njit(cache=True)
 def cost(candidate, problem, work):
-    """Repair a candidate in place so that it keeps every bound, and return its cost."""
+    """Repair a candidate so that it keeps every bound, and return its cost.
+
+    Parameters
+    ----------
+    candidate : (D,) array
+        Free coordinates; changed in place.
+    problem : Problem
+        Bounds and criterion.
+    work : Workspace
+        Scratch arrays.
+
+    Returns
+    -------
+    float
+        The criterion, to be minimized; infinite for a singular regressor.
+    """
     expand(candidate, problem, work.coefficients)
     move(problem, work)
     repair(candidate, problem, work)
     fill_columns(problem, work)
     gram = gram_matrix(work.columns)
     if problem.criterion == LOG_DET:
-        return -log_determinant(gram)
+        return -_log_determinant(gram)
     if problem.criterion == SCALED_CONDITION:
         size = np.sqrt(np.diag(gram))
         if size.min() <= 0.0:
             return np.inf
         gram /= np.outer(size, size)
-    return condition_number(gram)
+    return _condition_number(gram)
 
 
 @njit(cache=True)
 def costs(candidates, problem):
-    """Repair candidates (P, D) in place and return their costs (P,)."""
+    """Repair candidates and return their costs.
+
+    Parameters
+    ----------
+    candidates : (P, D) array
+        Changed in place.
+    problem : Problem
+        Bounds and criterion.
+
+    Returns
+    -------
+    (P,) array
+        The criterion, to be minimized.
+    """
     work = workspace(problem)
     result = np.empty(len(candidates))
     for i in range(len(candidates)):
@@ -145,7 +184,17 @@ def costs(candidates, problem):
 
 @njit(cache=True)
 def expand(candidate, problem, coefficients):
-    """Write the Fourier coefficients (2, 2, n) of a candidate's coordinates."""
+    """Write the Fourier coefficients of a candidate's coordinates.
+
+    Parameters
+    ----------
+    candidate : (D,) array
+        Free coordinates.
+    problem : Problem
+        With the basis (2, n, free).
+    coefficients : (2, 2, n) array
+        Written: sine and cosine, joint, harmonic; rad.
+    """
     _, n, free = problem.basis.shape
     for part in range(2):
         for joint in range(2):
@@ -159,7 +208,15 @@ def expand(candidate, problem, coefficients):
 
 @njit(**FAST)
 def move(problem, work):
-    """Compute angle less mean angle, velocity and acceleration over one period."""
+    """Compute angle less mean angle, velocity and acceleration over one period.
+
+    Parameters
+    ----------
+    problem : Problem
+        n harmonics, N samples.
+    work : Workspace
+        ``work.coefficients`` is read, ``work.motion`` (6, N) written.
+    """
     work.motion[:] = 0.0
     for joint in range(2):
         q, dq, ddq = work.motion[joint], work.motion[2 + joint], work.motion[4 + joint]
@@ -178,6 +235,15 @@ def repair(candidate, problem, work):
     """Shrink each joint's motion about its mean angle until it keeps the bounds.
 
     Every quantity is linear in that scale.
+
+    Parameters
+    ----------
+    candidate : (D,) array
+        Changed in place.
+    problem : Problem
+        Bounds (3, 2, 2): rad, rad/s and rad/s².
+    work : Workspace
+        ``work.motion`` (6, N) is changed in place.
     """
     _, n, free = problem.basis.shape
     samples = problem.sine.shape[1]
@@ -189,7 +255,7 @@ def repair(candidate, problem, work):
             candidate[4 * free + joint] = theta0
         scale = 1.0
         for quantity in range(3):
-            low, high = extent(work.motion[2 * quantity + joint], n)
+            low, high = _extent(work.motion[2 * quantity + joint], n)
             mean = theta0 if quantity == 0 else 0.0
             scale = min(scale, room(problem.bounds[quantity, joint, 1] - mean, high))
             scale = min(scale, room(mean - problem.bounds[quantity, joint, 0], -low))
@@ -210,7 +276,7 @@ def room(allowed, reached):
 
 
 @njit(**FAST)
-def extent(x, harmonics):
+def _extent(x, harmonics):
     """Bound a trigonometric polynomial by N uniform samples over a period.
 
     Between samples, its size exceeds the largest of them by at most a factor of 1 / cos(pi n / N)
@@ -228,7 +294,15 @@ def extent(x, harmonics):
 
 @njit(**FAST)
 def fill_columns(problem, work):
-    """Compute the regressor's columns that are not zero everywhere."""
+    """Compute the regressor's columns that are not zero everywhere.
+
+    Parameters
+    ----------
+    problem : Problem
+        N samples.
+    work : Workspace
+        ``work.motion`` is read, ``work.columns`` (10, N) written: six of the hip, four of the knee.
+    """
     q, sine, columns = work.motion, work.sines, work.columns
     length, gravity = problem.geometry
     sines(q[0], sine[0], sine[1])
@@ -257,14 +331,25 @@ def sign(x):
 
 @njit(**FAST)
 def gram_matrix(columns):
-    """Return A'A / N, (8, 8), from the columns of hip and knee."""
+    """Return A'A / N.
+
+    Parameters
+    ----------
+    columns : (10, N) array
+        Columns of hip and knee, as `fill_columns` writes them.
+
+    Returns
+    -------
+    (8, 8) array
+        Of the eight parameters.
+    """
     gram = np.zeros((PARAMETERS, PARAMETERS))
     for i in range(6):
         for j in range(i + 1):
-            gram[HIP_PARAMETERS[i], HIP_PARAMETERS[j]] += dot(columns[i], columns[j])
+            gram[HIP_PARAMETERS[i], HIP_PARAMETERS[j]] += _dot(columns[i], columns[j])
     for i in range(4):
         for j in range(i + 1):
-            gram[KNEE_PARAMETERS[i], KNEE_PARAMETERS[j]] += dot(columns[6 + i], columns[6 + j])
+            gram[KNEE_PARAMETERS[i], KNEE_PARAMETERS[j]] += _dot(columns[6 + i], columns[6 + j])
     for i in range(PARAMETERS):
         for j in range(i + 1):
             gram[i, j] /= columns.shape[1]
@@ -273,7 +358,7 @@ def gram_matrix(columns):
 
 
 @njit(**FAST)
-def dot(x, y):
+def _dot(x, y):
     """Return the sum of products; a BLAS call would cost more than 1000 products."""
     total = 0.0
     for i in range(x.size):
@@ -282,7 +367,7 @@ def dot(x, y):
 
 
 @njit(cache=True)
-def log_determinant(gram):
+def _log_determinant(gram):
     """Return the log of a Gram matrix's determinant by Cholesky factors; -inf if it is singular."""
     factor = gram.copy()
     total = 0.0
@@ -301,7 +386,7 @@ def log_determinant(gram):
 
 
 @njit(cache=True)
-def condition_number(gram):
+def _condition_number(gram):
     """Return the condition number of A from the eigenvalues of A'A, accurate to about eps cond²."""
     eigenvalues = np.linalg.eigvalsh(gram)
     if eigenvalues[0] <= 0.0:

@@ -120,10 +120,22 @@ def _problem(
 
 
 def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
-    """Return the basis of the coefficients of sine (0) and cosine (1), (2, n, free).
+    """Return the basis of the coefficients.
 
     At t = 0 and after each period, the velocity is w sum k a_k and the acceleration is -w² sum k²
     b_k. Both vanish at rest, so that the coefficients lie in the null spaces of (k) and (k²).
+
+    Parameters
+    ----------
+    harmonics : int
+        Number of harmonics, n.
+    rest_to_rest : bool
+        Whether each period begins and ends at rest.
+
+    Returns
+    -------
+    (2, n, free) array
+        Of sine (0) and cosine (1).
     """
     if not rest_to_rest:
         return np.array([np.eye(harmonics)] * 2)
@@ -132,7 +144,18 @@ def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
 
 
 def spread_of(problem: Problem) -> NDArray:
-    """Return the greatest value of each single coordinate within the bounds, (D,)."""
+    """Return the greatest value of each single coordinate within the bounds.
+
+    Parameters
+    ----------
+    problem : Problem
+        Bounds, rad, rad/s and rad/s².
+
+    Returns
+    -------
+    (D,) array
+        rad.
+    """
     half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
     powers = problem.speeds ** np.arange(3)[:, np.newaxis]
     reach = (half[:, :, np.newaxis] / powers[:, np.newaxis, :]).min(axis=0)

@@ -18,7 +18,15 @@ C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11 = _COSINE
 
 @njit(cache=True, fastmath=VECTORIZED, error_model="numpy")
 def sines(x, sine, cosine):
-    """Write sin x and cos x, (n,) each; exact to 1e-14 for any joint angle."""
+    """Write sin x and cos x; exact to 1e-14 for any joint angle.
+
+    Parameters
+    ----------
+    x : (n,) array
+        rad.
+    sine, cosine : (n,) array
+        Written.
+    """
     for i in range(x.size):
         half_turns = np.floor(x[i] * (1.0 / math.pi) + 0.5)
         r = x[i] - math.pi * half_turns

@@ -27,14 +27,36 @@ class Swarm(NamedTuple):
 
 @njit(cache=True)
 def assess(swarm, problem):
-    """Repair and evaluate every particle at its position."""
+    """Repair and evaluate every particle at its position.
+
+    Parameters
+    ----------
+    swarm : Swarm
+        P particles; best costs and positions are written.
+    problem : Problem
+        Bounds and criterion.
+    """
     swarm.best_cost[:] = costs(swarm.position, problem)
     swarm.best_position[:] = swarm.position
 
 
 @njit(cache=True)
 def fly(swarm, problem, ring, iterations, rng):
-    """Move the swarm a number of times, in place."""
+    """Move the swarm a number of times, in place.
+
+    Parameters
+    ----------
+    swarm : Swarm
+        P particles.
+    problem : Problem
+        Bounds and criterion.
+    ring : bool
+        Whether a particle follows the best of its two neighbours instead of the swarm's best.
+    iterations : int
+        Number of moves.
+    rng : numpy.random.Generator
+        Source of random numbers.
+    """
     work = workspace(problem)
     particles, dimensions = swarm.position.shape
     leader = int(np.argmin(swarm.best_cost))

@@ -174,7 +174,18 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
 
 
 def in_order(model: Model) -> list[Term]:
-    """Return a model's terms in the order of an assembly."""
+    """Return a model's terms in the order of an assembly.
+
+    Parameters
+    ----------
+    model : Model
+        Terms in any order.
+
+    Returns
+    -------
+    list of Term
+        Group by group.
+    """
     has_cuffs = cuffed([term.effect for term in model])
     return sorted(model, key=lambda term: _group(term.effect, has_cuffs))
 

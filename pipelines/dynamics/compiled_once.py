@@ -18,7 +18,15 @@ from pipelines.effects.kernel import ALLOCATING_NOTHING, address
 def compiled_once(signature):
     """Return a decorator that compiles a function of one signature, which allocates nothing.
 
-    It may be called from Python and from compiled code.
+    Parameters
+    ----------
+    signature : numba signature
+        Types of the arguments and of the result.
+
+    Returns
+    -------
+    callable
+        The decorated function may be called from Python and from compiled code.
     """
 
     def decorate(function):

@@ -42,7 +42,18 @@ Q, DQ, THETA, DTHETA = range(4)
 
 
 def resting_state(q: NDArray) -> NDArray:
-    """Return the state (4, J) of a leg at rest at angles ``q`` (J,), with relaxed springs."""
+    """Return the state of a machine at rest with relaxed springs.
+
+    Parameters
+    ----------
+    q : (J,) array
+        Angles, rad.
+
+    Returns
+    -------
+    (4, J) array
+        Motor and link angles, rad, and their speeds, rad/s.
+    """
     still = np.zeros_like(q, dtype=float)
     return np.array([q, still, q, still], dtype=float)
 
@@ -67,7 +78,18 @@ class Workspace(NamedTuple):
 
 
 def workspace(joints: int) -> Workspace:
-    """Return the scratch arrays for a number of joints."""
+    """Return the scratch arrays of the equations of motion.
+
+    Parameters
+    ----------
+    joints : int
+        Number of joints, J.
+
+    Returns
+    -------
+    Workspace
+        Vectors (J,), matrices (J, J), and a system of 2 J equations.
+    """
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
@@ -305,7 +327,27 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, float64, states, vector, vector, vector, vector))
 def memory_rates(a, w, t, state, memory, direction, load, rates):
-    """Write the rates of all memories into ``rates`` (m,)."""
+    """Write the rates of all memories.
+
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints with m memories.
+    w : Workspace
+        Scratch arrays.
+    t : float
+        Time, s.
+    state : (4, J) array
+        Angles and speeds.
+    memory : (m,) array
+        Memories.
+    direction : (J,) array
+        Sign of each motor's speed, or the value that stops it.
+    load : (J,) array
+        Transmitted torque, N·m.
+    rates : (m,) array
+        Written: d(memory)/dt.
+    """
     if rates.shape[0] > 0:
         motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load, a.temperature)
         link = Instant(t, state[Q], state[DQ], w.zero, direction, load, a.temperature)
@@ -343,10 +385,26 @@ def _grip(a, w, t, state, memory, load, drive, rates, j):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, float64, float64, states, vector, vector, vector, states))
 def find_direction(a, w, t, h, state, memory, load, drive, rates):
-    """Write the sign of each motor's speed over the next ``h`` seconds into ``w.direction`` (J,).
+    """Write the sign of each motor's speed over the next step.
 
     If neither sign is consistent with the resulting speed, it is the value that stops the joint.
-    ``rates`` (4, J) then holds d(state)/dt with that direction.
+
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints with m memories.
+    w : Workspace
+        ``w.direction`` (J,) is written.
+    t, h : float
+        Time and step, s.
+    state : (4, J) array
+        Angles and speeds.
+    memory : (m,) array
+        Memories.
+    load, drive : (J,) array
+        Transmitted torque and drive torque, N·m.
+    rates : (4, J) array
+        Written: d(state)/dt with that direction.
     """
     for j in range(a.joints):
         w.direction[j] = np.sign(state[DTHETA, j])
@@ -385,7 +443,18 @@ class Stages(NamedTuple):
 
 
 def stages(joints: int, memories: int) -> Stages:
-    """Return the scratch arrays of the Runge-Kutta step."""
+    """Return the scratch arrays of the Runge-Kutta step.
+
+    Parameters
+    ----------
+    joints, memories : int
+        Numbers of joints, J, and of memories, m.
+
+    Returns
+    -------
+    Stages
+        Rates (4, 4, J) and (4, m), state (4, J) and memory (m,).
+    """
     return Stages(
         np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories)
     )
@@ -396,9 +465,24 @@ STAGES = typeof(stages(1, 1))
 
 @njit(cache=True, inline="always")
 def begin_stages(a, w, s, t, state, memory, load):
-    """Complete the first stage: write the memories' rates and the transmitted ``load`` (J,).
+    """Complete the first stage of a step.
 
-    ``s.rates[0]`` must be known.
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints with m memories.
+    w : Workspace
+        ``w.direction`` must be known.
+    s : Stages
+        ``s.rates[0]`` must be known; ``s.memory_rates[0]`` is written.
+    t : float
+        Time, s.
+    state : (4, J) array
+        Angles and speeds.
+    memory : (m,) array
+        Memories.
+    load : (J,) array
+        Written: transmitted torque, N·m.
     """
     memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
     load[:] = 0.0
@@ -408,7 +492,21 @@ def begin_stages(a, w, s, t, state, memory, load):
 
 @njit(cache=True, inline="always")
 def reach_stage(s, i, reach, state, memory):
-    """Write state and memory of stage ``i`` into ``s``, ``reach`` seconds after the step begins."""
+    """Write state and memory of a stage.
+
+    Parameters
+    ----------
+    s : Stages
+        ``s.state`` and ``s.memory`` are written.
+    i : int
+        Number of the stage, 1 to 3.
+    reach : float
+        Time since the step's beginning, s.
+    state : (4, J) array
+        At the beginning.
+    memory : (m,) array
+        At the beginning.
+    """
     for row in range(4):
         for j in range(state.shape[1]):
             s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
@@ -424,7 +522,19 @@ def weighted(k):
 
 @njit(cache=True, inline="always")
 def end_stages(s, h, state, memory):
-    """Advance state and memory by the weighted mean of the four stages."""
+    """Advance state and memory by the weighted mean of the four stages.
+
+    Parameters
+    ----------
+    s : Stages
+        All four stages.
+    h : float
+        Step, s.
+    state : (4, J) array
+        Changed in place.
+    memory : (m,) array
+        Changed in place.
+    """
     for row in range(4):
         for j in range(state.shape[1]):
             state[row, j] += h / 6.0 * weighted(s.rates[:, row, j])
@@ -434,10 +544,29 @@ def end_stages(s, h, state, memory):
 
 @compiled_once(void(ASSEMBLY, WORKSPACE, STAGES, float64, float64, states, vector, vector, vector))
 def step(a, w, s, t, h, state, memory, load, drive):
-    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds.
+    """Advance state, memory and load by one step.
 
     Classical Runge-Kutta under constant drive torque; the direction of dry friction is held over
     the step.
+
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints with m memories.
+    w : Workspace
+        Scratch arrays.
+    s : Stages
+        Scratch arrays.
+    t, h : float
+        Time and step, s.
+    state : (4, J) array
+        Angles and speeds; changed in place.
+    memory : (m,) array
+        Memories; changed in place.
+    load : (J,) array
+        Transmitted torque, N·m; changed in place.
+    drive : (J,) array
+        Drive torque, N·m.
     """
     find_direction(a, w, t, h, state, memory, load, drive, s.rates[0])
     begin_stages(a, w, s, t, state, memory, load)

@@ -108,7 +108,20 @@ class LoopState(NamedTuple):
 
 
 def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
-    """Return the loop with the leg at rest at link angles ``q`` (J,) and the set-point there."""
+    """Return the loop with the leg at rest and the set-point there.
+
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints.
+    q : (J,) array
+        Link angles, rad.
+
+    Returns
+    -------
+    LoopState
+        Speeds, torques and memories are zero.
+    """
     q = np.asarray(q, float)
     angle = q.copy()
     read_encoders(a, angle)
@@ -127,13 +140,21 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
 
 @njit(**HOT)
 def read_encoders(a, angle):
-    """Turn true motor angles into the encoders' readings, in place."""
+    """Turn true motor angles into the encoders' readings.
+
+    Parameters
+    ----------
+    a : Assembly
+        Effects of J joints.
+    angle : (J,) array
+        rad; changed in place.
+    """
     for i in range(a.bounds[4]):
         reading_at(a.readings[i])(angle, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
 
 
 @njit(cache=True)
-def read_torque(a, t, torque, sensed):
+def _read_torque(a, t, torque, sensed):
     """Turn delivered torques into the sensors' readings, in place; once per sample, in order."""
     for i in range(a.bounds[4]):
         values = a.values[a.value_at[i] : a.value_at[i + 1]]
@@ -215,7 +236,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             done += 1
         for j in range(j_count):
             torque[j] += loop.torque[j] / d.periods
-    read_torque(a, t + middle * d.step_s, torque, loop.sensed)
+    _read_torque(a, t + middle * d.step_s, torque, loop.sensed)
     _copy(reference, loop.reference)
 
 

@@ -132,7 +132,18 @@ def replay(
 
 
 def known_temperature(motion: Motion) -> NDArray:
-    """Return the motors' temperature, (n, J) °C, and the reference where it was not measured."""
+    """Return the motors' temperature, and the reference where it was not measured.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (n, J) array
+        °C.
+    """
     return np.nan_to_num(motion.motor_temperature, nan=REFERENCE_C)
 
 

@@ -37,9 +37,17 @@ class ClosedLoop:
         return self.reference - self.run.angle
 
     def worst_error(self, after_s: float) -> NDArray:
-        """Return the largest error of each joint after a time, (J,) rad.
+        """Return the largest error of each joint after a time.
 
-        NaN if a joint ran away.
+        Parameters
+        ----------
+        after_s : float
+            Samples before are left out, s.
+
+        Returns
+        -------
+        (J,) array
+            rad; NaN if a joint ran away.
         """
         if self.ran_away:
             return np.full(len(self.joints), np.nan)
@@ -54,7 +62,13 @@ class ClosedLoop:
         return f"the simulated {joint} ran past one full turn at t = {self.time[-1]:.3f} s"
 
     def frame(self) -> pd.DataFrame:
-        """Return the columns of a ``simulation/1`` table."""
+        """Return the columns of a ``simulation/1`` table.
+
+        Returns
+        -------
+        DataFrame
+            n rows; rad, rad/s and N·m.
+        """
         columns = {"time_s": self.time}
         for j, joint in enumerate(self.joints):
             columns[joint.column("reference")] = self.reference[:, j]

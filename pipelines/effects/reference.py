@@ -25,7 +25,7 @@ def facts(effect: type[Effect]) -> dict[str, Any]:
         "effect": effect.name,
         "title": effect.title,
         "side": effect.side.value,
-        "joints": where(effect),
+        "joints": _where(effect),
         "runs": list(effect.acts_in),
         "family": effect.family.value,
         "resembles": list(effect.resembles),
@@ -51,7 +51,7 @@ def facts(effect: type[Effect]) -> dict[str, Any]:
     }
 
 
-def where(effect: type[Effect]) -> str:
+def _where(effect: type[Effect]) -> str:
     """Return the joints at which an effect can act, in words."""
     if effect.whole_leg:
         return "whole leg"
@@ -83,7 +83,7 @@ def _laws_in_words(effect: type[Effect]) -> str:
     return ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
 
 
-def page(effect: type[Effect]) -> str:
+def _page(effect: type[Effect]) -> str:
     """Return an effect's page as Markdown."""
     stated = facts(effect)
     rows = [_row(parameter) for parameter in effect().parameters]
@@ -138,12 +138,12 @@ def pages() -> dict[str, str]:
     ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (
-        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} |"
+        f"| [{e.name}]({e.name}.md) | {e.side.value} | {_where(e)} | {e.equation} |"
         f" {_typical_size(e)} |"
         for e in ours
     )
     return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {
-        f"{e.name}.md": page(e) for e in ours
+        f"{e.name}.md": _page(e) for e in ours
     }
 
 

@@ -33,7 +33,16 @@ IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles are mostly noise"
 def is_loud(runs: Sequence[Run]) -> bool:
     """Return whether noise of the angles exceeds the residual of the slow motion's fit.
 
-    One joint suffices.
+    Parameters
+    ----------
+    runs : sequence of Run
+        Training runs. Only the beginning of each is read.
+
+    Returns
+    -------
+    bool
+        True if it does at one joint or more; False where a run was filtered at ``CUTOFF_HZ`` or
+        below.
     """
     effects = baseline(runs[0].machine, kinds_of(runs))
     model, layout = Model.of(effects), ParameterLayout.of(effects)

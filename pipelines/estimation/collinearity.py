@@ -72,7 +72,20 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
 
 
 def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
-    """Return the parameters in the least determined combination of a scaled A'A, (p, p)."""
+    """Return the parameters in the least determined combination.
+
+    Parameters
+    ----------
+    scaled : (p, p) array
+        A'A of columns scaled to unit norm.
+    names : sequence of str
+        Name of each column.
+
+    Returns
+    -------
+    list of str
+        Those with at least 0.3 of the largest weight, that one first.
+    """
     _, vectors = np.linalg.eigh(scaled)
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]

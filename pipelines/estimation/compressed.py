@@ -28,7 +28,18 @@ class Compressed:
     """(J,) number of rows before compression."""
 
     def select(self, columns: NDArray) -> "Compressed":
-        """Return the regression on some of the parameters, (k,) columns."""
+        """Return the regression on some of the parameters.
+
+        Parameters
+        ----------
+        columns : (k,) array
+            Numbers of the columns to keep.
+
+        Returns
+        -------
+        Compressed
+            With a regressor of shape (J, r, k).
+        """
         return replace(self, regressor=self.regressor[:, :, columns])
 
     def with_held(self, columns: NDArray, values: NDArray) -> "Compressed":
@@ -45,7 +56,18 @@ class Compressed:
 
 
 def compress(regressions: Iterable[Regression]) -> Compressed:
-    """Compress the usable rows of all pieces of some runs."""
+    """Compress the usable rows of all pieces of some runs.
+
+    Parameters
+    ----------
+    regressions : iterable of Regression
+        Pieces with the same J joints and p columns, at least one.
+
+    Returns
+    -------
+    Compressed
+        At most p + 1 rows per joint, zeros where a joint has fewer.
+    """
     triangles: list[NDArray] = []
     count: NDArray | int = 0
     for r in regressions:
@@ -63,7 +85,18 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
 
 
 def together(parts: Sequence[Compressed]) -> Compressed:
-    """Return the rows of several as one."""
+    """Return the rows of several regressions as one.
+
+    Parameters
+    ----------
+    parts : sequence of Compressed
+        Of the same J joints and p columns.
+
+    Returns
+    -------
+    Compressed
+        With all rows of ``parts``; counts are added.
+    """
     return Compressed(
         np.concatenate([part.regressor for part in parts], axis=1),
         np.concatenate([part.torque for part in parts], axis=1),

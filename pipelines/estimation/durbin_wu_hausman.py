@@ -47,7 +47,14 @@ class DurbinWuHausman:
         return self.p_value < LEVEL
 
     def as_json(self) -> dict[str, Any]:
-        """Return the test for a file's metadata."""
+        """Return the test for a file's metadata.
+
+        Returns
+        -------
+        dict
+            Lists and numbers under ``statistic``, ``degrees_of_freedom``, ``p_value``,
+            ``difference`` and ``std_error``.
+        """
         return {
             "statistic": self.statistic,
             "degrees_of_freedom": list(self.freedom),
@@ -58,7 +65,19 @@ class DurbinWuHausman:
 
 
 def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
-    """Compare two fits of the same k parameters to the same rows."""
+    """Test whether two fits of the same rows differ by more than chance.
+
+    Parameters
+    ----------
+    one, other : Fit
+        Fits of the same k parameters, with scores of the same runs in the same order.
+
+    Returns
+    -------
+    DurbinWuHausman
+        Differences (k,), ``one`` less ``other``, in the parameters' units, and an F statistic with
+        its p-value.
+    """
 
     def influences() -> Iterator[tuple[Hashable, NDArray]]:
         for (name, ours), (_, theirs) in zip(one.scores(), other.scores(), strict=True):

@@ -74,7 +74,19 @@ class Estimator(ABC):
 
 
 def estimated(fit: Fit) -> Estimate:
-    """Return a fit with the covariance of its values."""
+    """Return a fit with the covariance of its values.
+
+    Parameters
+    ----------
+    fit : Fit
+        Values (k,), with the scores of each run.
+
+    Returns
+    -------
+    Estimate
+        With a covariance (k, k) that allows for serial correlation, in products of the parameters'
+        units.
+    """
     S = long_run_covariance(fit.scores, len(fit.values))
     covariance = fit.sensitivity @ S.covariance @ fit.sensitivity.T
     return Estimate(**vars(fit), covariance=covariance, critical=S.critical)

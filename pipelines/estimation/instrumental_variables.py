@@ -46,7 +46,18 @@ class InstrumentalVariables(Estimator):
     title = "instrumental variables (IDIM-IV)"
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once, beginning with least squares."""
+        """Fit all runs at once, beginning with least squares.
+
+        Parameters
+        ----------
+        problem : Problem
+            Its runs need a reference and controller gains, by which they are simulated.
+
+        Returns
+        -------
+        Fit
+            ``about`` holds ``iterations``, ``settled`` and ``durbin_wu_hausman``.
+        """
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
         measured = [r for _, r in problem.regressions()]

@@ -80,7 +80,19 @@ class IterativelyReweighted(Estimator):
     title = "iteratively reweighted least squares"
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once."""
+        """Fit all runs at once.
+
+        Parameters
+        ----------
+        problem : Problem
+            Runs of J joints.
+
+        Returns
+        -------
+        Fit
+            ``about`` holds ``iterations``, ``settled``, ``scale_nm`` (J values, N·m) and
+            ``rejected_share`` by joint.
+        """
         start = WeightedLeastSquares().fit(problem)
         scale = _sums(problem, start.values, start.weights**-0.5, Huber).scale
         first = _iterated(problem, start.values, scale, Huber)

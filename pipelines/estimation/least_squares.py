@@ -32,7 +32,18 @@ class WeightedLeastSquares(Estimator):
     passes = PASSES
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once."""
+        """Fit all runs at once.
+
+        Parameters
+        ----------
+        problem : Problem
+            Runs of J joints.
+
+        Returns
+        -------
+        Fit
+            ``about`` holds ``joint_weights_1_nm2``: J inverse variances, 1/(N·m)².
+        """
         rows = problem.rows
         free = rows.with_held(problem.of_held, problem.held[problem.of_held]).select(problem.fitted)
         weights = self._weights(free, problem.names)

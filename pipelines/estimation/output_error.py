@@ -49,7 +49,18 @@ class OutputError(Estimator):
     masks = False
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once, beginning with the realizable least-squares model."""
+        """Fit all runs at once, beginning with the realizable least-squares model.
+
+        Parameters
+        ----------
+        problem : Problem
+            Runs whose recorded torque drives the simulation.
+
+        Returns
+        -------
+        Fit
+            ``about`` adds ``simulations``, a number, and ``settled``, a bool.
+        """
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
         # Step of each value: a standard error if it is fitted, a fiftieth of itself if it is held.

@@ -60,12 +60,40 @@ class Training:
         )
 
     def model_of(self, run: Run, values: NDArray) -> Model:
-        """Return the model of one run with the values of all columns, (p,)."""
+        """Return the model of one run.
+
+        Parameters
+        ----------
+        run : Run
+            A training run, or another one.
+        values : (p,) array
+            Values of all columns, in their parameters' units.
+
+        Returns
+        -------
+        Model
+            Without the terms that are absent in the run.
+        """
         terms = (self.term_of(run, i, values) for i in range(len(self.model.terms)))
         return Model(tuple(term for term in terms if term is not None))
 
     def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
-        """Return a term in a run with the values of all columns, (p,); None if it is absent."""
+        """Return a term in a run.
+
+        Parameters
+        ----------
+        run : Run
+            A training run, or another one.
+        term : int
+            Number of the term in the model.
+        values : (p,) array
+            Values of all columns, in their parameters' units.
+
+        Returns
+        -------
+        Term or None
+            None if the term is absent in the run.
+        """
         own = self._terms_of(run)[term]
         if own is None:
             return None
@@ -73,7 +101,17 @@ class Training:
         return Term(own.effect, np.append(linear, own.shape))
 
     def reshaped(self, term: int, shape: int, step: float, files: Sequence[str]) -> "Training":
-        """Return the same with one shape value of a term larger by a step in some runs."""
+        """Return the same training with another shape value of a term in some runs.
+
+        Parameters
+        ----------
+        term, shape : int
+            Numbers of the term, and of its shape parameter.
+        step : float
+            Added to the shape value, in its unit.
+        files : sequence of str
+            Files of the runs that change.
+        """
         own = {run.file: list(self._terms_of(run)) for run in self.runs}
         for file in files:
             before = own[file][term]
@@ -86,12 +124,30 @@ class Training:
         return run.whole().loaded(*self.bodies[run.run]) if self.bodies else run
 
     def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
-        """Return the same with the loads of other rigid bodies, (k,) each."""
+        """Return the same training with the loads of other rigid bodies.
+
+        Parameters
+        ----------
+        bodies : mapping
+            By kind of run: two arrays (k,) of body values, as `Run.loaded` takes them.
+        """
         training = replace(self, bodies=bodies)
         return replace(training, runs=tuple(training.loaded(run) for run in self.runs))
 
     def regressions(self, run: Run) -> Iterator[Regression]:
-        """Yield a run's regression on the p columns, piece by piece."""
+        """Yield a run's regression on the p columns, piece by piece.
+
+        Parameters
+        ----------
+        run : Run
+            A training run, or another one.
+
+        Yields
+        ------
+        Regression
+            Regressor (m, J, p), N·m per unit. Samples near reversals are usable if ``reversals`` is
+            set.
+        """
         number = self._number_of(run)
         present = [i for i, term in enumerate(self._terms_of(run)) if term is not None]
         model = self.model_of(run, np.zeros(self.layout.size))
@@ -164,7 +220,13 @@ class Problem:
         return np.setdiff1d(np.arange(len(self.held)), self.fitted)
 
     def regressions(self) -> Iterator[tuple[int, Regression]]:
-        """Yield each run's number and its regression on all columns, piece by piece."""
+        """Yield the regression of each run on all p columns, piece by piece.
+
+        Yields
+        ------
+        tuple
+            Number of the run, and a Regression whose regressor is (m, J, p), N·m per unit.
+        """
         for number, run in self.runs:
             for regression in self.training.regressions(run):
                 yield number, regression
@@ -174,7 +236,18 @@ class Problem:
         return replace(self, training=self.training.whole)
 
     def completed(self, values: NDArray) -> NDArray:
-        """Return the values of all columns, (p,), with the fitted ones (k,) in their places."""
+        """Return the values of all columns.
+
+        Parameters
+        ----------
+        values : (k,) array
+            Values of the fitted columns.
+
+        Returns
+        -------
+        (p,) array
+            With the held values in the other places.
+        """
         every = self.held.copy()
         every[self.fitted] = values
         return every

@@ -38,7 +38,18 @@ class Realizable(Estimator):
     title = "physically realizable least squares"
 
     def fit(self, problem: Problem) -> Fit:
-        """Fit all runs at once, then find the nearest model that can exist."""
+        """Fit all runs at once, then find the nearest model that can exist.
+
+        Parameters
+        ----------
+        problem : Problem
+            Runs of J joints.
+
+        Returns
+        -------
+        Fit
+            ``about`` holds ``constrained`` and, where that is true, ``least_squares_values``.
+        """
         free = WeightedLeastSquares().fit(problem)
         values = nearest(problem, free.values, free.normal)
         moved = np.abs(values - free.values) > MOVED * np.sqrt(np.diag(free.sensitivity))

@@ -50,7 +50,20 @@ class Regression:
 
 
 def residual_of(r: Regression, values: NDArray) -> NDArray:
-    """Return measured less predicted torque, (m, J) N·m, for parameters (p,)."""
+    """Return measured less predicted torque.
+
+    Parameters
+    ----------
+    r : Regression
+        m block means of J joints, regressor (m, J, p).
+    values : (p,) array
+        Parameters.
+
+    Returns
+    -------
+    (m, J) array
+        Residual, N·m.
+    """
     return r.torque - r.regressor @ values
 
 
@@ -116,7 +129,18 @@ def mask_in_words(machine: Machine) -> str:
 
 
 def away_from_reversals(motion: Motion) -> NDArray:
-    """Return whether each joint moves at each sample, and has moved for a while: (n, J) bool."""
+    """Return whether each joint moves at each sample, and has moved for a while.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (n, J) bool array
+        False within ``REVERSAL_PADDING_S`` of a speed below the joint's ``reversal_speeds``.
+    """
     slow = np.abs(motion.dq) < reversal_speeds(motion.machine)
     return ~np.column_stack([dilate(column, padding(motion)) for column in slow.T])
 
@@ -127,23 +151,59 @@ def padding(run: Run) -> int:
 
 
 def away_from_turns(motion: Motion) -> NDArray:
-    """Return whether no joint turns within ``TURN_S`` of each sample, (n,) bool.
+    """Return whether no joint turns within ``TURN_S`` of each sample.
 
     Where a joint turns, its friction jumps, and so does the acceleration of every link. After
     filtering, neither is at its time.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (n,) bool array
+        False near a turn of any joint.
     """
     return np.asarray(~dilate(np.any(turns(motion), axis=1), round(TURN_S * motion.sample_rate_hz)))
 
 
 def turns(motion: Motion) -> NDArray:
-    """Return whether each joint has turned since the sample before, (n, J) bool."""
+    """Return whether each joint has turned since the sample before.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (n, J) bool array
+        False at the first sample.
+    """
     turned = np.zeros(motion.dq.shape, dtype=bool)
     turned[1:] = np.diff(motion.dq > 0, axis=0)
     return turned
 
 
 def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Iterator[Regression]:
-    """Yield a run as one linear regression, piece by piece, below a cut-off if there is one."""
+    """Yield a run as one linear regression, piece by piece.
+
+    Parameters
+    ----------
+    run : Run
+        A motion in memory or on disk.
+    model : Model
+        Its linear parameters are the p columns.
+    cutoff_hz : float, optional
+        Cut-off of a low-pass of regressor and torque, Hz; none by default.
+
+    Yields
+    ------
+    Regression
+        Block means of one piece.
+    """
     reach = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
     for piece in run.pieces(block_average(run).decimation + padding(run) + reach):
         yield regress(piece, model, cutoff_hz)
@@ -152,8 +212,21 @@ def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Itera
 def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regression:
     """Compute the regressor at full rate, then average it and the torque over the same blocks.
 
-    If there is a cut-off, both pass the same low-pass before. A block belongs to the piece in whose
-    core it begins; its remaining samples are in the margin.
+    A block belongs to the piece in whose core it begins; its remaining samples are in the margin.
+
+    Parameters
+    ----------
+    piece : Piece
+        n samples of J joints with their margins.
+    model : Model
+        Its linear parameters are the p columns.
+    cutoff_hz : float, optional
+        Cut-off of a low-pass that regressor and torque pass before, Hz.
+
+    Returns
+    -------
+    Regression
+        m block means: regressor (m, J, p), N·m per unit; torque (m, J), N·m.
     """
     motion, core = piece.motion, piece.core
     block = block_average(motion)

@@ -164,13 +164,13 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     joints = len(model.joints)
     of_memory = ", ".join(dict.fromkeys(model.memory_of))
     places = {
-        "comment": comment([*exported.heading(C), "", *_order_of(model)]),
+        "comment": _comment([*exported.heading(C), "", *_order_of(model)]),
         "name": name,
         "NAME": name.upper(),
         "GUARD": f"{name.upper()}_H",
         "joints": joints,
         "room": max(1, model.memories),
-        "memory_comment": comment(
+        "memory_comment": _comment(
             [f"memory of {of_memory}" if of_memory else "no effect has memory; pass any number"]
         ),
         "constants": "\n".join(
@@ -198,14 +198,14 @@ def _order_of(model: Equations) -> list[str]:
     return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
 
 
-def comment(lines: Iterable[str]) -> str:
+def _comment(lines: Iterable[str]) -> str:
     """Return a comment that no text in it can end."""
     safe = [one_line(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "/* " + "\n".join(safe).replace("\n", "\n * ").replace(" \n", "\n") + " */"
 
 
 def _constant(name: str, value: float, meaning: str) -> str:
-    return f"static const double {name} = {value!r}; {comment([meaning])}"
+    return f"static const double {name} = {value!r}; {_comment([meaning])}"
 
 
 def _array(values: Iterable[float]) -> str:
@@ -221,7 +221,7 @@ def _group(name: str, group: list[Equation]) -> str:
 
 
 def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return _indented([comment([f"{equation.label}: {equation.text}"]), *statements])
+    return _indented([_comment([f"{equation.label}: {equation.text}"]), *statements])
 
 
 def _indented(lines: Iterable[str]) -> list[str]:

@@ -126,7 +126,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     return {
         ".m": FILE.format(
             name=function_name(stem, ".m", KEYWORDS),
-            comment=comment([*exported.heading(MATLAB), "", *order]),
+            comment=_comment([*exported.heading(MATLAB), "", *order]),
             joints=joints,
             memories=model.memories,
             memory_of=one_line(", ".join(dict.fromkeys(model.memory_of)) or "no effect has memory"),
@@ -137,7 +137,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     }
 
 
-def comment(lines: Iterable[str]) -> str:
+def _comment(lines: Iterable[str]) -> str:
     """Return a comment that no text in it can end."""
     return "\n".join(f"% {one_line(line)}".rstrip() for line in lines)
 
@@ -170,7 +170,7 @@ def _function(head: str, lines: list[str], model: Equations) -> str:
     """Return a function with the constants that it uses."""
     known = set(re.findall(r"\w+", "\n".join(lines)))
     used = [
-        f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}"
+        f"{c.name} = {c.value!r}; {_comment([f'{c.unit}, {c.meaning}'])}"
         for c in model.used
         if c.name in known
     ]
@@ -178,7 +178,7 @@ def _function(head: str, lines: list[str], model: Equations) -> str:
 
 
 def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return [comment([f"{equation.label}: {equation.text}"]), *statements]
+    return [_comment([f"{equation.label}: {equation.text}"]), *statements]
 
 
 def _indented(lines: Iterable[str]) -> list[str]:

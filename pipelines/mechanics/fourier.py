@@ -54,7 +54,13 @@ class FourierTrajectory:
         return self.theta0 + q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Return the least and greatest angle, velocity and acceleration, (3, J, 2)."""
+        """Return the least and greatest angle, velocity and acceleration.
+
+        Returns
+        -------
+        (3, J, 2) array
+            Quantity, joint, least and greatest; rad, rad/s and rad/s².
+        """
         ranges = np.array(
             [[_range(joint) for joint in amplitude] for amplitude in self._amplitudes]
         )

@@ -19,6 +19,11 @@ def gait() -> FourierTrajectory:
     """Return the reference case of docs/simulation.md.
 
     q = mean + sum over k of amplitude_k cos(k w t + phase_k).
+
+    Returns
+    -------
+    FourierTrajectory
+        Of hip and knee, rad and s.
     """
     return FourierTrajectory(
         theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA

@@ -29,5 +29,11 @@ class Geometry:
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def array(self) -> NDArray:
-        """Return the argument ``geometry`` of kernels, (2,): thigh length (m), gravity (m/s²)."""
+        """Return the argument ``geometry`` of kernels.
+
+        Returns
+        -------
+        (2,) array
+            Thigh length, m, and gravity, m/s².
+        """
         return np.array([self.thigh_length_m, self.gravity_m_s2])

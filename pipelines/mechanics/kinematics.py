@@ -52,10 +52,20 @@ class FilteredRecording:
         return self.recording.joints
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the motion in order, with all columns or the named ones.
+        """Yield the motion in order.
 
         The margin of each window is long enough that the result equals filtering everything at
         once.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Names of columns; all by default.
+
+        Yields
+        ------
+        pyarrow.Table
+            Rows of ``motion/1``.
         """
         rate_hz, order = self.metadata["sample_rate_hz"], self.metadata["filter"]["order"]
         margin = reach(rate_hz, self.cutoff.hz, order) + SPLINE_REACH
@@ -94,6 +104,23 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
 
     Angles are filtered and differentiated. Torque, forces and the rest stay as measured, and no
     sample is dropped.
+
+    Parameters
+    ----------
+    recording : Rows
+        Rows of ``recording/1``, in memory or on disk.
+    settings : FilterSettings
+        Cut-off, Hz, or how to choose it; order; length of a block, s.
+
+    Returns
+    -------
+    FilteredRecording
+        Computed each time its rows are read.
+
+    Raises
+    ------
+    InputError
+        The times do not fit the sample rate, or every stretch is too short for the filter.
     """
     rate_hz = float(recording.metadata["sample_rate_hz"])
     with about(recording.path):
@@ -132,7 +159,15 @@ def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
 
 
 def motion_table(recording: Table, settings: FilterSettings) -> Table:
-    """Return the ``motion/1`` table of a recording in memory."""
+    """Return the ``motion/1`` table of a recording in memory.
+
+    Parameters
+    ----------
+    recording : Table
+        A ``recording/1`` table.
+    settings : FilterSettings
+        As for `filtered`.
+    """
     motion = filtered(recording, settings)
     return Table(pa.concat_tables(motion.pieces()).to_pandas(), motion.metadata, recording.path)
 
@@ -244,7 +279,24 @@ class _Grid:
     def filtered(
         self, time: NDArray, angle: NDArray, cutoff_hz: float, order: int
     ) -> list[NDArray]:
-        """Return angle, velocity and acceleration at the samples' own times (n,)."""
+        """Return angle, velocity and acceleration at the samples' own times.
+
+        Parameters
+        ----------
+        time : (n,) array
+            s.
+        angle : (n, J) array
+            rad.
+        cutoff_hz : float
+            Cut-off of the low-pass, Hz.
+        order : int
+            Order of the low-pass, one way.
+
+        Returns
+        -------
+        list
+            Three (n, J) arrays: rad, rad/s, rad/s².
+        """
         grid, uniform = self._sampled(time, angle)
         smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
         states = [
@@ -255,7 +307,22 @@ class _Grid:
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
-        """Return the angles at uniform times from ``begin_s`` to before ``end_s``."""
+        """Return the angles at uniform times.
+
+        Parameters
+        ----------
+        time : (n,) array
+            s.
+        angle : (n, J) array
+            rad.
+        begin_s, end_s : float
+            First time, and the time before which to end, s.
+
+        Returns
+        -------
+        (m, J) array
+            rad.
+        """
         grid, uniform = self._sampled(time, angle)
         return uniform[(grid >= begin_s) & (grid < end_s)]
 

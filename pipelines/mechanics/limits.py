@@ -47,7 +47,18 @@ class Margin:
 
 
 def bounds_array(bounds: JointBounds) -> NDArray:
-    """Return the bounds as (3, 2, 2): angle, velocity, acceleration; hip, knee; low, high."""
+    """Return the bounds of a leg's motion.
+
+    Parameters
+    ----------
+    bounds : JointBounds
+        Limits of hip and knee.
+
+    Returns
+    -------
+    (3, 2, 2) array
+        Angle, velocity, acceleration (rad, rad/s, rad/s²); hip, knee; low, high.
+    """
     table = [
         [j.angle_rad for j in (bounds.hip, bounds.knee)],
         [(-j.velocity_rad_s, j.velocity_rad_s) for j in (bounds.hip, bounds.knee)],
@@ -57,7 +68,20 @@ def bounds_array(bounds: JointBounds) -> NDArray:
 
 
 def margins(trajectory: Trajectory, bounds: JointBounds) -> list[Margin]:
-    """Return each joint's margin in angle, velocity and acceleration, between samples too."""
+    """Return each joint's margin in angle, velocity and acceleration, between samples too.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Motion of hip and knee.
+    bounds : JointBounds
+        Limits of hip and knee.
+
+    Returns
+    -------
+    list of Margin
+        Six margins, in rad, rad/s and rad/s².
+    """
     allowed, reached = bounds_array(bounds), trajectory.extrema()
     return [
         Margin(

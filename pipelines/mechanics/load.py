@@ -46,7 +46,18 @@ class LoadColumns:
         return self._torque(self.q, self.dq, self.ddq)
 
     def torque_of(self, X: NDArray) -> NDArray:
-        """Return the torque of a body with inertial parameters ``X`` (p,), (n, J) N·m."""
+        """Return the torque of a body.
+
+        Parameters
+        ----------
+        X : (p,) array
+            Its inertial parameters, SI units.
+
+        Returns
+        -------
+        (n, J) array
+            N·m.
+        """
         # numpy multiplies one matrix twenty times as fast as a stack of matrices.
         flat = self.torque.reshape(-1, len(X))
         return (flat @ X).reshape(self.q.shape)
@@ -96,5 +107,11 @@ class Load:
     """(p,) inertial parameters."""
 
     def on_coordinate(self, direction: NDArray) -> CoordinateLoad:
-        """Return the load on one coordinate that turns the joints by ``direction`` (n, J)."""
+        """Return the load on one coordinate.
+
+        Parameters
+        ----------
+        direction : (n, J) array
+            Angle of each joint per unit of the coordinate.
+        """
         return CoordinateLoad(*(self.columns.projected(direction) @ self.X))

@@ -82,10 +82,20 @@ class Machine:
         return self.scales[self.names.index(name)] if self.scales else Scale()
 
     def lasting(self, seconds: float) -> float:
-        """Return the time in which this machine moves as much as an exoskeleton in ``seconds``, s.
+        """Return the time in which this machine moves as much as an exoskeleton in ``seconds``.
 
         It is never longer. A pendulum that swings up moves five times as fast, so that one second
         of it holds as much information as five.
+
+        Parameters
+        ----------
+        seconds : float
+            For an exoskeleton, s.
+
+        Returns
+        -------
+        float
+            s.
         """
         slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
         return seconds * min(1.0, slowest)

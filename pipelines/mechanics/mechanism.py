@@ -135,7 +135,22 @@ class Mechanism:
         )
 
     def gravity_torque(self, q, X, geometry: Geometry) -> NDArray:
-        """Return the torque G(q), (J,) N·m, that holds the machine at rest."""
+        """Return the torque G(q) that holds the machine at rest.
+
+        Parameters
+        ----------
+        q : (J,) array
+            Angles, rad.
+        X : (p,) array
+            Inertial parameters, SI units.
+        geometry : Geometry
+            Lengths, m, and gravity, m/s².
+
+        Returns
+        -------
+        (J,) array
+            N·m.
+        """
         still = np.zeros(len(self.kinds))
         return self._torque(q, still, still, X, geometry)
 
@@ -160,5 +175,18 @@ class Mechanism:
         )
 
     def unrealizable(self, X, geometry: Geometry) -> list[str]:
-        """List the conditions of a real machine that the parameters X (p,) violate."""
+        """List the conditions of a real machine that inertial parameters violate.
+
+        Parameters
+        ----------
+        X : (p,) array
+            Inertial parameters, SI units.
+        geometry : Geometry
+            Lengths, m, and gravity, m/s².
+
+        Returns
+        -------
+        list of str
+            A sentence for each condition; empty if all hold.
+        """
         return self.broken(np.asarray(X, dtype=float), geometry)

@@ -101,7 +101,18 @@ class Motion:
         return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
 
     def pieces(self, margin: int) -> Iterator["Piece"]:
-        """Yield the run as a single piece, because all of it is in memory."""
+        """Yield the run as a single piece, because all of it is in memory.
+
+        Parameters
+        ----------
+        margin : int
+            Ignored: a whole run has no neighbours.
+
+        Yields
+        ------
+        Piece
+            With all n samples.
+        """
         yield Piece(self, slice(0, len(self)), 0)
 
     def whole(self) -> "Motion":
@@ -113,7 +124,13 @@ class Motion:
         return self.joints.index(joint)
 
     def segments(self) -> Iterator[slice]:
-        """Yield each stretch of samples without a gap."""
+        """Yield each stretch of samples without a gap.
+
+        Yields
+        ------
+        slice
+            Into the n samples.
+        """
         starts = np.flatnonzero(np.diff(self.segment, prepend=self.segment[0] - 1))
         for start, stop in zip(starts, [*starts[1:], len(self)], strict=True):
             yield slice(int(start), int(stop))
@@ -155,9 +172,17 @@ class Motion:
         )
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
-        """Return the torque of the cuffs on a limb at angles ``q`` (n, 2), (n, 2) N·m.
+        """Return the torque of the cuffs on a limb.
 
-        NaN where it is unknown; None if it was not measured.
+        Parameters
+        ----------
+        q : (n, 2) array
+            Angles of the limb's hip and knee, rad.
+
+        Returns
+        -------
+        (n, 2) array or None
+            N·m, NaN where it is unknown; None if it was not measured.
         """
         forces = self.on_segments
         if forces is None or self.machine.mechanism is not LEG or not self.geometry.has_cuffs:
@@ -274,7 +299,12 @@ class Piece(NamedTuple):
 def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:
     """Return the recording's geometry, completed by ``default``.
 
-    Without a default, gravity acts on revolute joints, and prismatic joints are level.
+    Parameters
+    ----------
+    metadata : dict
+        Metadata of a recording or motion.
+    default : Geometry, optional
+        Without it, gravity acts on revolute joints, and prismatic joints are level.
     """
     known = {
         k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__
@@ -308,8 +338,17 @@ def _period(table: Table) -> float | None:
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:
     """Return the motion in a ``motion/1`` table.
 
-    The recording's own geometry takes precedence over ``default_geometry``, which comes from
-    exoid.toml, and that over the paper's.
+    Parameters
+    ----------
+    table : Table
+        n rows.
+    default_geometry : Geometry, optional
+        For lengths that the recording's metadata lack, from exoid.toml; the paper's by default.
+
+    Returns
+    -------
+    Motion
+        n samples of J joints.
     """
     frame, metadata = table.frame, table.metadata
     joints = joints_of(metadata)

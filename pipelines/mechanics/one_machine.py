@@ -7,7 +7,18 @@ from pipelines.mechanics.run import Run
 
 
 def refuse_several_machines(motions: Sequence[Run]) -> None:
-    """Refuse motions whose joints or geometry differ from the first one's."""
+    """Refuse motions whose joints or geometry differ from the first one's.
+
+    Parameters
+    ----------
+    motions : sequence of Run
+        At least one.
+
+    Raises
+    ------
+    InputError
+        Names both files and their joints or lengths.
+    """
     first = motions[0]
     for other in motions[1:]:
         if other.machine.joints != first.machine.joints:

@@ -58,7 +58,20 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
 
 
 def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -> None:
-    """Refuse runs of another mechanism than that of exoid.toml, if it names one."""
+    """Refuse runs of another mechanism than that of exoid.toml, if it names one.
+
+    Parameters
+    ----------
+    settings : MechanismSettings
+        Table ``[mechanism]`` of exoid.toml.
+    runs : sequence of Run
+        Runs of any machine.
+
+    Raises
+    ------
+    InputError
+        Names the first file with other kinds of joints.
+    """
     for run in runs if settings.model_fields_set else ():
         if run.machine.mechanism.kinds != settings.kinds:
             raise InputError(
@@ -71,7 +84,27 @@ def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -
 def read_motion(
     path: Path, settings: FilterSettings | None = None, default_geometry: Geometry | None = None
 ) -> Motion:
-    """Return the motion in a ``motion/1`` or ``recording/1`` file."""
+    """Return the motion in a ``motion/1`` or ``recording/1`` file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    settings : FilterSettings, optional
+        How a recording is filtered; a motion is filtered already.
+    default_geometry : Geometry, optional
+        For lengths that the file lacks.
+
+    Returns
+    -------
+    Motion
+        n samples of J joints.
+
+    Raises
+    ------
+    InputError
+        A recording cannot be filtered.
+    """
     if contract_of(path) is RECORDING:
         table = motion_table(RECORDING.read(path), settings or FilterSettings())
     else:
@@ -106,7 +139,27 @@ def read_motions(
 def read_runs(
     paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry | None
 ) -> list[StoredRun]:
-    """Return the runs in several files like ``read_motions``, but piece by piece."""
+    """Return the runs in several files like ``read_motions``, but piece by piece.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of ``motion/1`` or ``recording/1``.
+    settings : FilterSettings
+        How recordings are filtered.
+    default_geometry : Geometry or None
+        For lengths that the files lack.
+
+    Returns
+    -------
+    list of StoredRun
+        In the order of ``paths``.
+
+    Raises
+    ------
+    InputError
+        Two files hold the same recording, or the runs are of different machines.
+    """
     _refuse_twins(paths)
     runs = [
         StoredRun(_motion_rows(path, settings), default_geometry, name)

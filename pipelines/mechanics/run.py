@@ -48,7 +48,18 @@ class Run(Protocol):
     def joint_metadata(self) -> list[dict[str, str]]: ...  # noqa: D102
 
     def pieces(self, margin: int) -> Iterator[Piece]:
-        """Yield the run in order, each piece with ``margin`` samples on both sides."""
+        """Yield the run in order, piece by piece.
+
+        Parameters
+        ----------
+        margin : int
+            Samples to add on both sides of each piece, as far as there are any.
+
+        Yields
+        ------
+        Piece
+            Its core belongs to no other piece.
+        """
         ...
 
     def whole(self) -> Motion:
@@ -135,7 +146,18 @@ class StoredRun:
         return replace(motion_from_table(table, self.default_geometry), scales=self.scales)
 
     def pieces(self, margin: int) -> Iterator[Piece]:
-        """Yield the run in order, each piece with ``margin`` samples on both sides."""
+        """Yield the run in order, piece by piece.
+
+        Parameters
+        ----------
+        margin : int
+            Samples to add on both sides of each piece, as far as there are any.
+
+        Yields
+        ------
+        Piece
+            Of at most ``WINDOW`` rows and the margins.
+        """
         begun = 0
         for window in windows(self.rows.pieces(self._columns), WINDOW, margin):
             motion = self._motion(window.rows)

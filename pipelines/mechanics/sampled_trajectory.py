@@ -54,7 +54,13 @@ class SampledTrajectory:
         return q, dq, ddq
 
     def extrema(self) -> NDArray:
-        """Return the least and greatest angle, velocity and acceleration, (3, J, 2)."""
+        """Return the least and greatest angle, velocity and acceleration.
+
+        Returns
+        -------
+        (3, J, 2) array
+            Quantity, joint, least and greatest; rad, rad/s and rad/s².
+        """
         return np.array(
             [
                 [_range(spline, joint) for joint in range(len(self.joints))]

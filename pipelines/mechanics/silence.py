@@ -9,7 +9,22 @@ from pipelines.mechanics.run import Run
 
 
 def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
-    """Return the error for runs in which a joint's torque is always ``value`` (N·m or N)."""
+    """Return the error for runs in which a joint's torque never changes.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The runs to name.
+    joint : Joint
+        The joint.
+    value : float
+        Its torque, N·m, or force, N.
+
+    Returns
+    -------
+    InputError
+        To be raised.
+    """
     return InputError(
         f"{', '.join(run.file for run in runs)}: the"
         f" {'torque' if joint.kind == 'revolute' else 'force'} of {the(joint.name)} is {value:.4g}"

@@ -14,14 +14,37 @@ EDGE_PERIODS = 1.5
 
 
 def edge(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the number of samples at each end of a stretch where the filter lacks one side."""
+    """Return the length of a stretch's ends, where the filter lacks one side.
+
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : float
+        Sample rate and cut-off, Hz.
+
+    Returns
+    -------
+    int
+        Samples at each end.
+    """
     return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
 
 
 def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
-    """Return which samples lack one side of the filter, or are near invalid samples, (n,) bool.
+    """Return which samples lack one side of the filter, or are near invalid samples.
 
     A stretch that is too short for the filter is marked as a whole.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples.
+    cutoff_hz : float
+        Cut-off of the filter, Hz.
+
+    Returns
+    -------
+    (n,) bool array
+        True for samples to leave out.
     """
     rate = motion.sample_rate_hz
     reach, near = edge(rate, cutoff_hz), np.zeros(len(motion), dtype=bool)
@@ -38,7 +61,22 @@ def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
 
 
 def filtered(motion: Motion, x: NDArray, cutoff_hz: float) -> NDArray:
-    """Return the part of a signal (n, ...) along a motion below a cut-off."""
+    """Return the part of a signal below a cut-off.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples, whose stretches are filtered one by one.
+    x : (n, ...) array
+        A signal along the motion.
+    cutoff_hz : float
+        Hz.
+
+    Returns
+    -------
+    (n, ...) array
+        In the unit of ``x``; stretches too short for the filter stay as they are.
+    """
     slow = np.array(x, dtype=float)
     for stretch in motion.segments():
         if stretch.stop - stretch.start >= shortest(motion.sample_rate_hz, cutoff_hz):
@@ -47,7 +85,20 @@ def filtered(motion: Motion, x: NDArray, cutoff_hz: float) -> NDArray:
 
 
 def below(motion: Motion, cutoff_hz: float) -> Motion:
-    """Return the part of a motion below a cut-off, which must be lower than the motion's own."""
+    """Return the part of a motion below a cut-off.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples.
+    cutoff_hz : float
+        Hz, lower than the motion's own.
+
+    Returns
+    -------
+    Motion
+        n samples, without loads; samples near ends and gaps are invalid.
+    """
     rate = motion.sample_rate_hz
     q, dq, ddq = filtered(motion, motion.q, cutoff_hz), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():

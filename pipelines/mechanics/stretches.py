@@ -46,7 +46,18 @@ class Stretches:
         return int(np.argmax(self.samples))
 
     def overlapping(self, first: int, last: int) -> range:
-        """Return the indices of stretches with a row from ``first`` to before ``last``."""
+        """Return the indices of stretches that overlap some rows.
+
+        Parameters
+        ----------
+        first, last : int
+            First row, and the row before which to end.
+
+        Returns
+        -------
+        range
+            Into the s stretches.
+        """
         return range(
             int(np.searchsorted(self.stop, first, "right")),
             int(np.searchsorted(self.start, last, "left")),

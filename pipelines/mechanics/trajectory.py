@@ -65,7 +65,18 @@ class CoefficientFile(Settings):
 
 
 def read_trajectory(path: Path | str) -> Trajectory:
-    """Return the excitation in a TOML file of coefficients or in a ``trajectory/1`` table."""
+    """Return the excitation in a TOML file of coefficients or in a ``trajectory/1`` table.
+
+    Parameters
+    ----------
+    path : Path or str
+        ``.toml``, or a table.
+
+    Returns
+    -------
+    Trajectory
+        Angles in rad over time in s.
+    """
     path = Path(path)
     if path.suffix == ".toml":
         return _from_toml(path)

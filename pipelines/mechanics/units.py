@@ -51,7 +51,18 @@ class Scale(NamedTuple):
     travel: float = 1.0
 
     def of(self, unit: str) -> float:
-        """Return the ratio of a quantity to an exoskeleton's, by its unit at a revolute joint."""
+        """Return the ratio of a quantity to an exoskeleton's.
+
+        Parameters
+        ----------
+        unit : str
+            The quantity's unit at a revolute joint.
+
+        Returns
+        -------
+        float
+            1 for a unit that does not depend on the machine's size.
+        """
         if unit not in UNITS:
             return 1.0
         power = UNITS[unit]

@@ -30,7 +30,15 @@ class Term:
 
     @classmethod
     def of(cls, effect: Effect, shape: Iterable[float] = ()) -> "Term":
-        """Return an effect with some shape values and linear parameters of zero."""
+        """Return an effect with linear parameters of zero.
+
+        Parameters
+        ----------
+        effect : Effect
+            The effect.
+        shape : iterable of float, optional
+            Its shape values, in their units.
+        """
         return cls(effect, np.append(np.zeros(len(effect.linear)), list(shape)))
 
     @property
@@ -44,7 +52,15 @@ class Term:
         return self.values[len(self.effect.linear) :]
 
     def with_shape(self, i: int, value: float) -> "Term":
-        """Return the term with another value of shape parameter ``i``."""
+        """Return the term with another value of one shape parameter.
+
+        Parameters
+        ----------
+        i : int
+            Number of the shape parameter.
+        value : float
+            In the parameter's unit.
+        """
         values = self.values.copy()
         values[len(self.effect.linear) + i] = value
         return Term(self.effect, values)
@@ -109,7 +125,18 @@ class Model:
         return Model(tuple(term for term in self.terms if term.effect.acts(run)))
 
     def motions(self, motion: Motion) -> Motions:
-        """Return a measured motion as motors, links and the wearer's limb perform it."""
+        """Return a measured motion as motors, links and the wearer's limb perform it.
+
+        Parameters
+        ----------
+        motion : Motion
+            n samples as the sensors measured them.
+
+        Returns
+        -------
+        Motions
+            Three motions of n samples.
+        """
         motor = self.sensed(motion)
         link = self.behind_motors(motor)
         return Motions(motor, link, self._behind_cuffs(link))
@@ -200,14 +227,36 @@ class Model:
         return columns
 
     def delivered(self, motion: Motion) -> NDArray:
-        """Return the drives' true torque where sensors measured ``motion.torque``, (n, J) N·m."""
+        """Return the drives' true torque.
+
+        Parameters
+        ----------
+        motion : Motion
+            n samples of J joints; ``motion.torque`` is the sensors' torque.
+
+        Returns
+        -------
+        (n, J) array
+            N·m.
+        """
         torque = motion.torque
         for term in reversed(self.terms):
             torque = term.effect.delivered(torque, motion, term.values)
         return torque
 
     def torque(self, motion: Motion) -> NDArray:
-        """Return the torque that the sensors should measure along a motion, (n, J) N·m."""
+        """Return the torque that the sensors should measure along a motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            n samples of J joints.
+
+        Returns
+        -------
+        (n, J) array
+            N·m.
+        """
         return self.regressor(motion) @ self.linear_values
 
 

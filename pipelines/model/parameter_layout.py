@@ -40,7 +40,16 @@ class TermColumns:
     ) -> "TermColumns":
         """Return the columns of an effect in runs of some kinds.
 
-        They are those of its linear parameters, unless ``per_run`` is given.
+        Parameters
+        ----------
+        effect : Effect
+            The term's effect.
+        kinds : sequence of str
+            Kind of each run, ``exo_alone`` or ``with_human``.
+        per_run : iterable of bool, optional
+            Whether each column differs from run to run; those of the linear parameters by default.
+        start : int, optional
+            Number of its first column in the layout.
         """
         if per_run is None:
             per_run = (parameter.per_run for parameter in effect.linear)
@@ -196,16 +205,53 @@ class ParameterLayout:
         return np.array([t.places(None) for t in self.terms if isinstance(t.effect, RigidBody)])
 
     def bodies_in(self, kind: str) -> NDArray:
-        """Return the columns of each body that moves in a kind of run, (bodies, parameters)."""
+        """Return the columns of each body that moves in a kind of run.
+
+        Parameters
+        ----------
+        kind : str
+            ``exo_alone`` or ``with_human``.
+
+        Returns
+        -------
+        (bodies, parameters) int array
+            One body alone, two with a person.
+        """
         return self.bodies if kind == "with_human" else self.bodies[:1]
 
     def column_of(self, effect: str, joint: str | None, parameter: str) -> int:
-        """Return the first column of a parameter, by its name and its effect's."""
+        """Return the first column of a parameter.
+
+        Parameters
+        ----------
+        effect : str
+            Name of its effect.
+        joint : str or None
+            Joint of the effect.
+        parameter : str
+            Name of the parameter.
+
+        Raises
+        ------
+        ValueError
+            No column has these names.
+        """
         names = [(c.effect.name, c.effect.joint, c.parameter.name) for c in self.columns]
         return names.index((effect, joint, parameter))
 
     def acting_in(self, kind: str) -> NDArray:
-        """Return which columns act in a kind of run, (p,) bool."""
+        """Return which columns act in a kind of run.
+
+        Parameters
+        ----------
+        kind : str
+            ``exo_alone`` or ``with_human``.
+
+        Returns
+        -------
+        (p,) bool array
+            False for columns of effects or runs of the other kind.
+        """
         acts = (
             column.effect.acts(kind) if column.run is None else self.kinds[column.run] == kind
             for column in self.columns
@@ -213,7 +259,18 @@ class ParameterLayout:
         return np.array(list(acts), dtype=bool)
 
     def shapes(self, term: int) -> slice:
-        """Return the places of a term's shape values in a vector of p columns and all shapes."""
+        """Return the places of a term's shape values.
+
+        Parameters
+        ----------
+        term : int
+            Number of the term.
+
+        Returns
+        -------
+        slice
+            Into a vector of p columns followed by all shape values.
+        """
         counts = [len(one.effect.shape) for one in self.terms]
         start = self.size + sum(counts[:term])
         return slice(start, start + counts[term])

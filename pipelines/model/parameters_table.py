@@ -92,7 +92,19 @@ def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
 def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
     """Explain why no real machine has the rigid bodies of a ``parameters/1`` table.
 
-    Empty if they are realizable.
+    Parameters
+    ----------
+    parameters : DataFrame
+        Rows of the table.
+    machine : Machine
+        Its mechanism has the bodies.
+    geometry : Geometry
+        Lengths, m.
+
+    Returns
+    -------
+    list of str
+        A reason for each kind of run that is affected; empty if all bodies are realizable.
     """
     bodies = parameters[parameters["effect"] == RigidBody.name]
     return [
@@ -103,11 +115,22 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
 
 
 def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
-    """Report first moments of mass that lie above their axes, a sentence each.
+    """Report first moments of mass that lie above their axes.
 
     Angles count from hanging straight down. A link may be overbalanced, or stand up. Otherwise its
-    zero or a sign is wrong, or a spring is mistaken for gravity. Empty if gravity does not act on
-    the mechanism.
+    zero or a sign is wrong, or a spring is mistaken for gravity.
+
+    Parameters
+    ----------
+    parameters : DataFrame
+        Rows of a ``parameters/1`` table.
+    machine : Machine
+        Its mechanism has the moments.
+
+    Returns
+    -------
+    list of str
+        A sentence for each moment; empty if gravity does not act on the mechanism.
     """
     if not machine.mechanism.has_gravity:
         return []

@@ -61,7 +61,21 @@ def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
 def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) -> str | None:
     """Explain the fallback used when the table has no values for this recording.
 
-    None if no fallback was needed.
+    Parameters
+    ----------
+    term : Term
+        Term with values that may differ from run to run.
+    table : Table
+        A ``parameters/1`` table.
+    sha256 : str or None
+        Hash of the recording; None without one.
+    recording : Path or None
+        Its path, for the message.
+
+    Returns
+    -------
+    str or None
+        None if no fallback was needed.
     """
     own = [p.name for p in term.effect.parameters if p.per_run]
     if not own or _stated(term, table, sha256) is not None:

@@ -24,11 +24,30 @@ class BlockAverage:
 
     @classmethod
     def lasting(cls, seconds: float, rate_hz: float) -> "BlockAverage":
-        """Return the filter with blocks of about ``seconds``."""
+        """Return the filter with blocks of about some seconds.
+
+        Parameters
+        ----------
+        seconds : float
+            Length of a block, s.
+        rate_hz : float
+            Sample rate, Hz.
+        """
         return cls(max(1, round(seconds * rate_hz)))
 
     def cutoff_hz(self, rate_hz: float) -> float:
-        """Return the frequency at which the mean has lost half the power."""
+        """Return the frequency at which the mean has lost half the power.
+
+        Parameters
+        ----------
+        rate_hz : float
+            Sample rate, Hz.
+
+        Returns
+        -------
+        float
+            Hz.
+        """
         return HALF_POWER * rate_hz / self.decimation
 
     def as_metadata(self, rate_hz: float) -> dict[str, Any]:
@@ -107,5 +126,18 @@ class BlockAverage:
 
 
 def dilate(x: NDArray, samples: int) -> NDArray:
-    """Spread every true value of a (n,) bool array by ``samples`` to both sides."""
+    """Spread every true value to both sides.
+
+    Parameters
+    ----------
+    x : (n,) bool array
+        Samples.
+    samples : int
+        How far a true value spreads.
+
+    Returns
+    -------
+    (n,) bool array
+        True within ``samples`` of a true value.
+    """
     return maximum_filter1d(x.astype(np.uint8), 2 * samples + 1, mode="constant").astype(bool)

@@ -17,9 +17,21 @@ NEGLIGIBLE = 1e-18
 
 
 def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
-    """Return the samples over which a cut in the data influences the filter.
+    """Return the number of samples over which a cut in the data influences the filter.
 
     The influence decays with the slowest pole.
+
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : float
+        Sample rate and cut-off, Hz.
+    order : int, optional
+        Order of the Butterworth filter, one way.
+
+    Returns
+    -------
+    int
+        Samples on each side of the cut.
     """
     from scipy.signal import butter
 
@@ -35,9 +47,17 @@ def _padding(rate_hz: float, cutoff_hz: float) -> int:
 
 
 def shortest(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the least number of samples of a stretch that can be filtered.
+    """Return the least length of a stretch that can be filtered.
 
-    Each side needs padding of one time constant.
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : float
+        Sample rate and cut-off, Hz.
+
+    Returns
+    -------
+    int
+        Samples: each side needs padding of one time constant.
     """
     return max(DERIVATIVE_STENCIL, int(np.ceil(rate_hz / cutoff_hz))) + 1
 

@@ -32,7 +32,13 @@ class Welch:
         self.frequency_hz: NDArray = np.fft.rfftfreq(length, 1.0 / rate_hz)
 
     def add(self, x: NDArray) -> None:
-        """Add the next samples, (n, channels)."""
+        """Add the next samples of a piece.
+
+        Parameters
+        ----------
+        x : (n, channels) array
+            They follow those of the call before.
+        """
         x = x if self._rest is None else np.concatenate([self._rest, x])
         windows = max(0, (len(x) - self._length) // self._hop + 1)
         if windows:

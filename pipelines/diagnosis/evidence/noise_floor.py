@@ -43,7 +43,7 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     if not from_periods:
         lag = runs[0].motion.machine.lasting(LONGEST_LAG_S)
         averaged = min(_blocks(run, lag) for run in runs)
-        pairs = [faster(run, residual, lag) for run, residual in zip(runs, residuals, strict=True)]
+        pairs = [_faster(run, residual, lag) for run, residual in zip(runs, residuals, strict=True)]
     outputs = residuals[0].shape[1]
     rms, share = np.full(outputs, np.nan), np.ones(outputs)
     for o in range(outputs):
@@ -96,7 +96,7 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     return np.where(usable, (residual[later] - residual[now]) / np.sqrt(2), np.nan)
 
 
-def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
+def _faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
     """Return a residual (m, O) less its running average over ``than_s``.
 
     It is NaN where it is not usable. Next to a gap or a reversal the average is of usable samples

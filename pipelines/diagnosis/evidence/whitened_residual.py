@@ -112,7 +112,7 @@ class Grid:
             trace.residual[used],
             place[used],
             mask,
-            np.maximum(filtered(mask, smooth), 1e-3),
+            np.maximum(_filtered(mask, smooth), 1e-3),
             hz,
             smooth,
             np.clip(2.0 * hz / slow_hz - 1.0, 0.0, 1.0),
@@ -123,13 +123,13 @@ class Grid:
         fast = self.fast(residual)
         spectrum = np.interp(self.hz, *noise(fast, self.mask, self.rate_hz))
         gain = self.passed * (1.0 - self.smooth) / spectrum
-        return Channel(self, gain, filtered(fast, gain)[self.place])
+        return Channel(self, gain, _filtered(fast, gain)[self.place])
 
     def fast(self, torque: NDArray) -> NDArray:
         """Return a torque (u,) without slow content on the grid, (N,) N·m."""
         x = np.zeros_like(self.mask)
         x[self.place] = torque
-        return (x - filtered(x, self.smooth) / self.around) * self.mask
+        return (x - _filtered(x, self.smooth) / self.around) * self.mask
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Channel:
 
     def score_of(self, torque: NDArray) -> NDArray:
         """Return the score of another torque (u,) N·m under the same noise, (u,) 1/(N·m)."""
-        return filtered(self.grid.fast(torque), self.gain)[self.grid.place]
+        return _filtered(self.grid.fast(torque), self.gain)[self.grid.place]
 
     def weight(self, hz: NDArray) -> NDArray:
         """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)².
@@ -165,7 +165,7 @@ class Channel:
         return np.asarray((1.0 - share) * self.weights[below] + share * self.weights[below + 1])
 
 
-def filtered(x: NDArray, response: NDArray) -> NDArray:
+def _filtered(x: NDArray, response: NDArray) -> NDArray:
     """Return samples (N,) whose transform is multiplied by a response (k,)."""
     return np.asarray(fft.irfft(fft.rfft(x) * response, len(x)))
 

@@ -27,10 +27,23 @@ INERTIAL = ("X1", "X2", "X3", "X4")
 def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
     """Return the rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
 
-    Source: paper, appendix A, with row 2 corrected as in docs/errata.md. ``sin_leg`` is sin(q1 +
-    q2). The sines are arguments, because a caller that evaluates thousands of motions has a faster
-    way to compute them. The rows are tuples, because an array for every integration step would cost
-    more than the equations.
+    Source: paper, appendix A, with row 2 corrected as in docs/errata.md. The rows are tuples,
+    because an array for every integration step would cost more than the equations.
+
+    Parameters
+    ----------
+    sin_hip, sin_leg, sin_knee, cos_knee : float
+        Of q1, q1 + q2 and q2; arguments, because a caller that evaluates thousands of motions has a
+        faster way to compute them.
+    dq, ddq : sequence of float
+        Velocities and accelerations of hip and knee, rad/s and rad/s².
+    thigh_length, gravity : float
+        m and m/s².
+
+    Returns
+    -------
+    tuple
+        Two tuples of four floats, N·m per unit.
     """
     shank_gravity = gravity * sin_leg
     hip = (
@@ -52,7 +65,20 @@ def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, 
 
 @njit("UniTuple(UniTuple(f8, 4), 2)(f8[::1], f8[::1], f8[::1], f8, f8)", cache=True)
 def regressor_at(q, dq, ddq, thigh_length, gravity):
-    """Return the rows hip and knee of A(q, dq, ddq) at one instant."""
+    """Return the rows hip and knee of A(q, dq, ddq) at one instant.
+
+    Parameters
+    ----------
+    q, dq, ddq : (2,) array
+        Angles, velocities and accelerations, rad, rad/s and rad/s².
+    thigh_length, gravity : float
+        m and m/s².
+
+    Returns
+    -------
+    tuple
+        Two tuples of four floats, N·m per unit.
+    """
     return regressor_rows(
         sin(q[0]), sin(q[0] + q[1]), sin(q[1]), cos(q[1]), dq, ddq, thigh_length, gravity
     )
@@ -115,9 +141,23 @@ def _payload_change(at, state, values, geometry, joint, out):
 
 
 def potential_energy(q, X, geometry: Geometry) -> float:
-    """Return the potential energy in J, zero with both joint axes level.
+    """Return the potential energy of the leg.
 
     Source: paper, eq. 3 and 4, in terms of X.
+
+    Parameters
+    ----------
+    q : (2,) array
+        Angles of hip and knee, rad.
+    X : (4,) array
+        X1 to X4.
+    geometry : Geometry
+        Gravity, m/s².
+
+    Returns
+    -------
+    float
+        J, zero with both joint axes level.
     """
     q1, q2 = q
     return -geometry.gravity_m_s2 * float(X[3] * cos(q1) + X[2] * cos(q1 + q2))

@@ -24,7 +24,7 @@ def context(content: Content) -> dict[str, Any]:
     session, verdict = content.session, content.verdict
     return {
         "control": _comparison(verdict) if verdict else None,
-        "control_is_compared": "extended" in loops(session),
+        "control_is_compared": "extended" in _loops(session),
         "loops": content.charts.control,
     }
 
@@ -57,7 +57,7 @@ def _comparison(verdict: dict[str, Any]) -> dict[str, Any] | None:
     }
 
 
-def loops(session: Session) -> dict[str, Artifact]:
+def _loops(session: Session) -> dict[str, Artifact]:
     """Return one adaptive loop of each model, with a wearer if there are several."""
     results = {}
     for model, simulations in session.simulations_by_model("loop").items():
@@ -71,7 +71,7 @@ def loops(session: Session) -> dict[str, Artifact]:
 
 def control_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each joint, then the chart of the sweep."""
-    of_models = loops(session)
+    of_models = _loops(session)
     tables = {model: session.table(one).frame for model, one in of_models.items()}
     if not tables:
         return

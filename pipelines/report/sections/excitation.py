@@ -30,10 +30,10 @@ class Excitation:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's part on the excitation."""
-    return {"excitations": excitations(content.session)}
+    return {"excitations": _excitations(content.session)}
 
 
-def excitations(session: Session) -> list[Excitation]:
+def _excitations(session: Session) -> list[Excitation]:
     """Return every excitation of a session."""
     return [_excitation(session, one) for one in session.of_kind("trajectory")]
 

@@ -199,8 +199,8 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
         if len(frame) != len(first):
             continue
         role, words = MODELS[model]
-        angles.append(Series(words, broken(frame, joint.column("angle")), role))
-        errors.append(Series(words, 1e3 * broken(frame, joint.column("error")), role))
+        angles.append(Series(words, _broken(frame, joint.column("angle")), role))
+        errors.append(Series(words, 1e3 * _broken(frame, joint.column("error")), role))
     angles.append(Series("measured", first[joint.column("reference")].to_numpy(), Role.MEASURED))
     unit = joint.unit("angle")
     return Chart(
@@ -217,7 +217,7 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
     )
 
 
-def broken(frame: pd.DataFrame, column: str) -> NDArray:
+def _broken(frame: pd.DataFrame, column: str) -> NDArray:
     """Return a column (n,) with NaN where a window begins, so that no line joins two windows."""
     begins = frame["window"].diff().fillna(0) != 0
     return frame[column].where(~begins, np.nan).to_numpy()

@@ -21,10 +21,10 @@ def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's list of files, and its warnings."""
     session = content.session
     return {
-        "warnings": [*stale(session), *_changed_settings(session)],
+        "warnings": [*_stale(session), *_changed_settings(session)],
         "settings": json.dumps(settings(session), indent=1, ensure_ascii=False),
-        "software": software(session),
-        "origins": origins(session),
+        "software": _software(session),
+        "origins": _origins(session),
         "outside": outside(session),
     }
 
@@ -57,7 +57,7 @@ class Origin:
         return [one.name for one in self.inputs if one.state == "found"]
 
 
-def origins(session: Session) -> list[Origin]:
+def _origins(session: Session) -> list[Origin]:
     """Return every file of a session, oldest first."""
     rows = [
         Origin(
@@ -123,10 +123,10 @@ def _role(artifact: Artifact, name: str) -> tuple[str, str]:
     return name, ""
 
 
-def stale(session: Session) -> list[str]:
+def _stale(session: Session) -> list[str]:
     """Return a sentence for each file that changed after other files were made of it."""
     by_file: dict[str, list[str]] = {}
-    for origin in origins(session):
+    for origin in _origins(session):
         for one in origin.inputs:
             if one.state == "changed":
                 by_file.setdefault(one.name, []).append(origin.file)
@@ -144,7 +144,7 @@ def _few(files: Sequence[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def software(session: Session) -> list[tuple[str, list[str]]]:
+def _software(session: Session) -> list[tuple[str, list[str]]]:
     """Return each set of software versions in words, with the files that were made with it."""
     versions: dict[str, list[str]] = {}
     for one in session.artifacts:

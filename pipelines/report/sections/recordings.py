@@ -66,10 +66,10 @@ class Run:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's table of recordings."""
-    return {"recordings": runs(content.session)}
+    return {"recordings": _runs(content.session)}
 
 
-def runs(session: Session) -> list[Run]:
+def _runs(session: Session) -> list[Run]:
     """Return every run of a session, in the order of their files."""
     recordings = session.of_kind("recording")
     filters = {one.path.name: one for one in session.of_kind("motion")}

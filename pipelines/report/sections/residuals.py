@@ -72,7 +72,7 @@ def context(content: Content) -> dict[str, Any]:
 
 def _predicted(session: Session, joint: Joint) -> list[Predicted]:
     verdict = session.verdict or {}
-    words = {one.variable: one.title for one in against(session, joint)}
+    words = {one.variable: one.title for one in _against(session, joint)}
     named = bool(verdict.get("causes"))
     return [
         Predicted(
@@ -84,7 +84,7 @@ def _predicted(session: Session, joint: Joint) -> list[Predicted]:
     ]
 
 
-def against(session: Session, joint: Joint) -> list[Against]:
+def _against(session: Session, joint: Joint) -> list[Against]:
     """Return the columns against which a joint's residuals are drawn.
 
     With two joints, the other joint's columns are included.
@@ -115,7 +115,7 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
     for joint in session.joints:
         reach = _reach(judged, joint)
-        for one in against(session, joint):
+        for one in _against(session, joint):
             yield _chart(session, judged, joint, one, reach)
 
 
@@ -184,7 +184,7 @@ def most_explained_variable(session: Session, joint: Joint) -> str:
     model's residual variance, so they are weighted by its mean square.
     """
     verdict = session.verdict or {}
-    known = {one.variable for one in against(session, joint)}
+    known = {one.variable for one in _against(session, joint)}
     ranking = [
         one for one in verdict.get("depends_on", {}).get(joint.name, []) if one["variable"] in known
     ]

@@ -25,10 +25,10 @@ class Term:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's list of terms."""
-    return {"terms": terms(content.session)}
+    return {"terms": _terms(content.session)}
 
 
-def terms(session: Session) -> list[Term]:
+def _terms(session: Session) -> list[Term]:
     """Return each term of a session's models once, without unknown effects."""
     rows = [
         (row["effect"], row["joint"] if isinstance(row["joint"], str) else None)
@@ -37,7 +37,7 @@ def terms(session: Session) -> list[Term]:
     ]
     results: dict[str, Term] = {}
     for name, joint in rows:
-        effect = bound(session, name, joint)
+        effect = _bound(session, name, joint)
         if effect and name not in results:
             results[name] = Term(effect.title, effect.equation, parameters(effect))
     return list(results.values())
@@ -63,7 +63,7 @@ def unit(session: Session, key: str) -> str:
 def _parameters_of(
     session: Session, effect_name: str, joint: str | None, name: str
 ) -> list[Parameter]:
-    effect = bound(session, effect_name, joint)
+    effect = _bound(session, effect_name, joint)
     return [one for one in parameters(effect) if one.name == name] if effect else []
 
 
@@ -74,7 +74,7 @@ def parameters(effect: Effect) -> tuple[Parameter, ...]:
     )
 
 
-def bound(session: Session, name: str, joint: str | None) -> Effect | None:
+def _bound(session: Session, name: str, joint: str | None) -> Effect | None:
     """Return an effect at a joint of the session's machine; None for an unknown one."""
     try:
         return effect_named(name)(joint=joint, on=_machine(session.joints, session))
