@@ -16,10 +16,25 @@ TEMPORARY = ".tmp"
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary path next to ``path``, which replaces ``path`` once the block ends well.
+    """Yield a temporary path, which replaces ``path`` once the block ends well.
 
     The folder is created if need be. On any failure, Ctrl-C included, the temporary file is removed
     and ``path`` stays. It also stays, with a new time, if only ``created_at`` differs.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Yields
+    ------
+    Path
+        A new file in the same folder.
+
+    Raises
+    ------
+    InputError
+        ``path`` is a folder, a pipe or a device.
     """
     refuse_special(path)
     path = Path(os.path.realpath(path))  # a link keeps pointing at the file it names
@@ -40,7 +55,18 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse to replace a folder, a pipe or a device by a file."""
+    """Refuse to replace a folder, a pipe or a device by a file.
+
+    Parameters
+    ----------
+    path : Path
+        A file to write.
+
+    Raises
+    ------
+    InputError
+        Names the path and its kind.
+    """
     _refuse_dash(path)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"
@@ -56,8 +82,25 @@ def _refuse_dash(path: Path) -> None:
 def all_or_none(folder: Path, last: str | None = None) -> Iterator[Path]:
     """Yield a temporary folder whose files move to ``folder`` once the block ends well.
 
-    On any failure, Ctrl-C included, they are removed and ``folder`` stays as it was. The file named
-    ``last`` moves last, so that it is only ever seen with the files it was made with.
+    On any failure, Ctrl-C included, they are removed and ``folder`` stays as it was.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+    last : str, optional
+        Name of the file that moves last, so that it is only ever seen with the files of the same
+        block.
+
+    Yields
+    ------
+    Path
+        The temporary folder.
+
+    Raises
+    ------
+    InputError
+        A target is a folder, a pipe or a device.
     """
     with tempfile.TemporaryDirectory(prefix=".", suffix=TEMPORARY, dir=folder) as temporary:
         try:
@@ -110,7 +153,18 @@ def leftovers(folder: Path) -> list[Path]:
 
 
 def open_folder(path: Path) -> None:
-    """Create a folder and check that it can be written to, before the work that fills it."""
+    """Create a folder and check that it can be written to, before the work that fills it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Raises
+    ------
+    OSError
+        Names the folder if it cannot be written to.
+    """
     _refuse_dash(path)
     path.mkdir(parents=True, exist_ok=True)
     try:

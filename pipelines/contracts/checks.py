@@ -34,10 +34,24 @@ class Place:
 
 
 def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.ChunkedArray:
-    """Convert a column to the contract's type without loss, or refuse it.
+    """Convert a column to the contract's type without loss.
 
     Other tools write float32, integers, decimals or large strings where the contract has float64,
     int64 or string. A number of any width is accepted as long as its value survives.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        The column as it was read.
+    dtype : pyarrow.DataType
+        The contract's type.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        The type differs in kind, or a value does not fit.
     """
     if column.type == dtype:
         return column
@@ -93,7 +107,22 @@ def is_text(dtype: pa.DataType) -> bool:
 
 
 def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> None:
-    """Refuse infinities, and, unless ``nullable``, missing values (null or NaN)."""
+    """Refuse infinities and missing values.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        Values of any type.
+    nullable : bool
+        Whether missing values (null or NaN) are accepted.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        Names the first row.
+    """
     is_float = pa.types.is_floating(column.type)
     missing = pc.is_null(column, nan_is_null=True)
     if not nullable and _any(missing):
@@ -113,7 +142,22 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> Non
 
 
 def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where: Place) -> None:
-    """Refuse text that is none of the choices."""
+    """Refuse text that is none of the choices.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        Text.
+    choices : sequence of str
+        The accepted values.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        Names the first row.
+    """
     unknown = [value for value in pc.unique(column).to_pylist() if value not in (None, *choices)]
     if unknown:
         row = first_true(pc.equal(column, unknown[0]))
@@ -124,7 +168,20 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
 
 
 def refuse_implausible(column: pa.ChunkedArray, where: Place) -> None:
-    """Refuse numbers that no machine's quantity reaches."""
+    """Refuse numbers that no machine's quantity reaches.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        Numbers in SI units.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        A number is larger than ``LARGEST``.
+    """
     _refuse_beyond(
         LARGEST,
         column,
@@ -134,7 +191,20 @@ def refuse_implausible(column: pa.ChunkedArray, where: Place) -> None:
 
 
 def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
-    """Refuse angles that no leg reaches in radians."""
+    """Refuse angles that no leg reaches in radians.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        Angles, rad.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        An angle is larger than ``LARGEST_ANGLE_RAD``.
+    """
     remedy = ", which looks like degrees; expected radians, multiply by pi/180"
     _refuse_beyond(LARGEST_ANGLE_RAD, column, where, remedy)
 
@@ -152,7 +222,21 @@ def refuse_time_not_increasing(
 ) -> None:
     """Refuse time that does not strictly increase.
 
-    It may restart where a column of ``restarts_with`` changes.
+    Parameters
+    ----------
+    rows : pyarrow.Table
+        Rows in order.
+    time : str
+        Column of the time, s.
+    restarts_with : sequence of str
+        Columns at whose changes time may restart.
+    where : Place
+        Its place, for the message.
+
+    Raises
+    ------
+    ContractError
+        Names the first row that is not later than the one before.
     """
     before, after = rows.slice(0, rows.num_rows - 1), rows.slice(1)
     wrong = pc.less_equal(after[time], before[time])

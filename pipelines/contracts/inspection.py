@@ -41,7 +41,23 @@ class Inspection:
 
 
 def inspect(path: Path) -> Inspection:
-    """Describe a Parquet file, a JSON document or a TOML trajectory by its content."""
+    """Describe a Parquet file, a JSON document or a TOML trajectory by its content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Inspection
+        With ``fault`` set if the file breaks its contract.
+
+    Raises
+    ------
+    ContractError
+        The file cannot be read.
+    """
     if path.suffix == ".parquet":
         return _table(path)
     return _document(path) or _trajectory_toml(path) or _table(path)

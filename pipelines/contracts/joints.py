@@ -93,7 +93,18 @@ def either(words: Iterable[str]) -> str:
 
 
 def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
-    """Return the joints in a file's metadata; by default hip and knee, both revolute."""
+    """Return the joints in a file's metadata.
+
+    Parameters
+    ----------
+    metadata : mapping
+        Metadata of any contract.
+
+    Returns
+    -------
+    tuple of Joint
+        By default hip and knee, both revolute.
+    """
     if "joints" not in metadata:
         return HIP_AND_KNEE
     return tuple(

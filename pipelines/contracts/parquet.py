@@ -24,7 +24,23 @@ READ_AHEAD = 2**20
 
 
 def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
-    """Return a file's columns and its ``exoid`` metadata; refuse a file of another program."""
+    """Return a file's columns and its ``exoid`` metadata.
+
+    Parameters
+    ----------
+    path : Path
+        A Parquet file.
+
+    Returns
+    -------
+    tuple
+        Arrow schema and metadata.
+
+    Raises
+    ------
+    ContractError
+        The file is damaged or of another program.
+    """
     with _opened(path) as file:
         return file.schema_arrow, _metadata(file.schema_arrow, path)
 
@@ -39,7 +55,25 @@ def is_whole(path: Path) -> bool:
 
 
 def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Yield at most ``ROWS`` rows of a file at a time; all columns, or the named ones."""
+    """Yield the rows of a file piece by piece.
+
+    Parameters
+    ----------
+    path : Path
+        A Parquet file.
+    columns : sequence of str, optional
+        Names of columns; all by default.
+
+    Yields
+    ------
+    pyarrow.Table
+        At most ``ROWS`` rows.
+
+    Raises
+    ------
+    ContractError
+        The file is damaged.
+    """
     with _opened(path) as file:
         # Group by group, because Arrow's reader of several keeps all that it has read in memory.
         for group in range(file.num_row_groups):
@@ -48,7 +82,23 @@ def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tabl
 
 
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """Return a file's whole table and its ``exoid`` metadata."""
+    """Return a file's whole table and its metadata.
+
+    Parameters
+    ----------
+    path : Path
+        A Parquet file.
+
+    Returns
+    -------
+    tuple
+        Arrow table and ``exoid`` metadata.
+
+    Raises
+    ------
+    ContractError
+        The file is damaged or of another program.
+    """
     schema, metadata = header(path)
     # Not schema.empty_table(), for which Arrow imports pandas.
     empty = pa.Table.from_batches([], schema)
@@ -70,7 +120,22 @@ def _opened(path: Path) -> Iterator[pq.ParquetFile]:
 
 
 def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
-    """Write a table that comes in pieces, with its metadata, under ``path``, atomically."""
+    """Write a table that comes in pieces, atomically.
+
+    Parameters
+    ----------
+    path : Path
+        A name that ends in .parquet.
+    pieces : iterable of pyarrow.Table
+        At least one, all with the same columns.
+    metadata : mapping
+        With the key ``contract``.
+
+    Raises
+    ------
+    ContractError
+        ``path`` holds another kind of table, or has another suffix.
+    """
     pieces = iter(pieces)
     first = next(pieces)  # an error in it is raised before a folder or file is created
     refuse_place(path, metadata["contract"])
@@ -88,6 +153,18 @@ def refuse_place(path: Path, contract: str) -> None:
     """Refuse to write over a folder or over a table of another contract.
 
     A recording cannot be made again. Names must end in .parquet, or ``*.parquet`` misses them.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    contract : str
+        Name and version, such as ``recording/1``.
+
+    Raises
+    ------
+    ContractError
+        Names the path and its present content.
     """
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")

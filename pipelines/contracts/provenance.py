@@ -61,7 +61,23 @@ def sha256(path: Path) -> str:
 
 
 def recording_behind(path: Path) -> str:
-    """Return the SHA-256 of the recording in a file, or of the one behind a ``motion/1``."""
+    """Return the SHA-256 of the recording behind a file.
+
+    Parameters
+    ----------
+    path : Path
+        A recording, or a ``motion/1`` table computed from one.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+
+    Raises
+    ------
+    ContractError
+        The file is damaged or of another program.
+    """
     metadata = parquet.header(path)[1]
     if metadata["contract"].startswith("motion/") and metadata.get("inputs"):
         return str(metadata["inputs"][0]["sha256"])

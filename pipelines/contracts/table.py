@@ -48,7 +48,19 @@ class Column:
 def per_joint(
     quantity: str, meaning: str, *, required: bool = True, nullable: bool = False
 ) -> Column:
-    """Return a float column that every joint has; name and unit follow from the joint's kind."""
+    """Return a float column that every joint has; name and unit follow from the joint's kind.
+
+    Parameters
+    ----------
+    quantity : str
+        Key of ``QUANTITIES``, such as ``angle``.
+    meaning : str
+        For docs and Arrow's metadata.
+    required : bool, optional
+        Whether a table must have it.
+    nullable : bool, optional
+        Whether values may be missing.
+    """
     return Column(quantity, "", meaning, required=required, nullable=nullable, per_joint=True)
 
 
@@ -65,7 +77,18 @@ class Rows(Protocol):
     def joints(self) -> tuple[Joint, ...]: ...  # noqa: D102
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield the rows in their order; all columns, or the named ones."""
+        """Yield the rows in their order.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Names of columns; all by default.
+
+        Yields
+        ------
+        pyarrow.Table
+            The next rows.
+        """
         ...
 
 
@@ -117,7 +140,23 @@ class Stored:
         return joints_of(self.metadata)
 
     def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """Yield at most ``parquet.ROWS`` rows at a time; all columns, or the named ones."""
+        """Yield the rows in their order.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Names of columns; all by default.
+
+        Yields
+        ------
+        pyarrow.Table
+            At most ``parquet.ROWS`` checked rows.
+
+        Raises
+        ------
+        ContractError
+            The rows break the contract.
+        """
         return self.contract.conformed(
             parquet.pieces(self.path, columns), self.metadata, str(self.path), columns
         )
@@ -160,19 +199,62 @@ class Contract:
         return tuple(column for group in expanded for column in group)
 
     def read(self, path: Path | str) -> Table:
-        """Return the table in a file; raise ContractError where it breaks the contract."""
+        """Return the table in a file.
+
+        Parameters
+        ----------
+        path : Path or str
+            A Parquet file.
+
+        Returns
+        -------
+        Table
+            All rows, checked.
+
+        Raises
+        ------
+        ContractError
+            The file breaks the contract.
+        """
         rows, metadata = self.load(path)
         return Table(rows.to_pandas(), metadata, Path(path))
 
     def load(self, path: Path | str) -> tuple[pa.Table, dict[str, Any]]:
-        """Return the checked rows and metadata of a file without pandas, which starts slowly."""
+        """Return the rows and metadata of a file without pandas, which starts slowly.
+
+        Parameters
+        ----------
+        path : Path or str
+            A Parquet file.
+
+        Returns
+        -------
+        tuple
+            Arrow table and metadata, checked.
+
+        Raises
+        ------
+        ContractError
+            The file breaks the contract.
+        """
         stored = self.scan(path)
         rows = pa.concat_tables(stored.pieces())
         self._apply_rules(rows, stored.metadata, str(path))
         return rows, stored.metadata
 
     def scan(self, path: Path | str) -> Stored:
-        """Return the table in a file; its rows are read and checked when they are used."""
+        """Return the table in a file; its rows are read and checked when they are used.
+
+        Parameters
+        ----------
+        path : Path or str
+            A Parquet file.
+
+        Raises
+        ------
+        ContractError
+            The metadata break the contract.
+        """
         path = Path(path)
         _, metadata = parquet.header(path)
         self._refuse_other_contracts(metadata["contract"], path)
@@ -180,7 +262,22 @@ class Contract:
         return Stored(self, metadata, path)
 
     def write(self, path: Path | str, frame: "pd.DataFrame", metadata: Mapping[str, Any]) -> None:
-        """Check a table and write it atomically; ``contract`` is added to the metadata."""
+        """Check a table and write it atomically.
+
+        Parameters
+        ----------
+        path : Path or str
+            A name that ends in .parquet.
+        frame : DataFrame
+            Rows in SI units.
+        metadata : mapping
+            ``contract`` is added.
+
+        Raises
+        ------
+        ContractError
+            The table breaks the contract, or ``path`` cannot hold it.
+        """
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
         parquet.save(
@@ -190,7 +287,22 @@ class Contract:
     def write_pieces(
         self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]
     ) -> None:
-        """Write a table as ``write`` does, but piece by piece, to save memory."""
+        """Write a table as ``write`` does, but piece by piece, to save memory.
+
+        Parameters
+        ----------
+        path : Path or str
+            A name that ends in .parquet.
+        pieces : iterable of pyarrow.Table
+            Rows in order.
+        metadata : mapping
+            ``contract`` is added.
+
+        Raises
+        ------
+        ContractError
+            The table breaks the contract, or ``path`` cannot hold it.
+        """
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
         self._check_metadata(metadata, str(path))
@@ -203,7 +315,22 @@ class Contract:
     def check(
         self, frame: "pd.DataFrame", metadata: Mapping[str, Any], source: str = "table"
     ) -> None:
-        """Check a frame and its metadata; the message of a ContractError begins with ``source``."""
+        """Check a frame and its metadata.
+
+        Parameters
+        ----------
+        frame : DataFrame
+            Rows in SI units.
+        metadata : mapping
+            ``contract`` is added.
+        source : str, optional
+            Begin of the message.
+
+        Raises
+        ------
+        ContractError
+            The frame breaks the contract.
+        """
         self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)
 
     def _refuse_other_contracts(self, label: str, path: Path) -> None:
@@ -256,8 +383,26 @@ class Contract:
     ) -> Iterator[pa.Table]:
         """Yield the pieces of a table checked, with the contract's types, units and meanings.
 
-        Empty pieces are left out. If columns are ``named``, the others may be missing. A table that
-        breaks the contract raises ContractError.
+        Parameters
+        ----------
+        pieces : iterable of pyarrow.Table
+            Rows in order; empty pieces are left out.
+        metadata : mapping
+            With the joints of the table.
+        source : str
+            Begin of messages.
+        named : sequence of str, optional
+            Columns to require; the others may then be missing.
+
+        Yields
+        ------
+        pyarrow.Table
+            At least one piece.
+
+        Raises
+        ------
+        ContractError
+            The table breaks the contract, or has no rows.
         """
         known = self._columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]

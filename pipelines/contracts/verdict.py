@@ -307,7 +307,23 @@ def _listed(joints: Any) -> str:
 
 
 def parsed(path: Path) -> Any:
-    """Return the content of a JSON file; a ContractError names the place of a fault."""
+    """Return the content of a JSON file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    object
+        As `json.loads` returns it.
+
+    Raises
+    ------
+    ContractError
+        Names the place of a fault.
+    """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
@@ -322,7 +338,20 @@ def parsed(path: Path) -> Any:
 
 
 def check(content: Mapping[str, Any], source: str) -> None:
-    """Check a verdict; a ContractError names the first key that is missing or wrong."""
+    """Check a verdict.
+
+    Parameters
+    ----------
+    content : mapping
+        Keys of the verdict.
+    source : str
+        Begin of the message.
+
+    Raises
+    ------
+    ContractError
+        Names the first key that is missing or wrong.
+    """
     try:
         Verdict.model_validate(content)
     except ValidationError as error:
@@ -332,7 +361,18 @@ def check(content: Mapping[str, Any], source: str) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Return the checked verdict in a file."""
+    """Return the checked verdict in a file.
+
+    Parameters
+    ----------
+    path : Path
+        A JSON file.
+
+    Raises
+    ------
+    ContractError
+        The file is damaged, or a key is missing or wrong.
+    """
     content = parsed(path)
     check(content, str(path))
     return dict(content)

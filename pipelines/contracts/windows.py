@@ -23,8 +23,19 @@ class Window(NamedTuple):
 def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Window]:
     """Yield windows whose cores make up the whole table.
 
-    A core has ``length`` rows, the last one fewer. The margin has ``margin`` rows on each side,
-    fewer only where the table begins or ends.
+    Parameters
+    ----------
+    pieces : iterable of pyarrow.Table
+        Rows in order.
+    length : int
+        Rows of a core; the last one has fewer.
+    margin : int
+        Rows on each side of a core, fewer only where the table begins or ends.
+
+    Yields
+    ------
+    Window
+        Core and margins.
     """
     held: pa.Table | None = None
     first = start = 0

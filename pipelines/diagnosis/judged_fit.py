@@ -22,7 +22,15 @@ from pipelines.diagnosis.training_data import TrainingData
 
 
 def baseline_alone(data: TrainingData, prepared: PreparedRuns) -> ValidationResult:
-    """Return the baseline without causes, fitted, and measured on the validation runs."""
+    """Return the baseline without causes, fitted, and measured on the validation runs.
+
+    Parameters
+    ----------
+    data : TrainingData
+        Training and validation runs.
+    prepared : PreparedRuns
+        The training runs.
+    """
     loaded = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
     return ValidationResult.of(_refinement(prepared)(()), loaded, data.baseline)
 

@@ -83,6 +83,18 @@ class Backlash(Effect):
         If the teeth are hard, or the link's mass is unknown, the link lies on the side towards
         which the transmitted torque pushes it, at the motor's speed: after an impact of hard teeth,
         a motor jumps faster than it is sampled.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of the motors, n samples.
+        shape : array or tuple of float
+            Play, rad, and stiffness, N·m/rad; the latter may be missing.
+
+        Returns
+        -------
+        Motion
+            Of the links, n samples.
         """
         values = self.completed(shape)
         if motion.link_swing is not None and values[1] < max(self.shape[1].forms):

@@ -94,14 +94,36 @@ class Cogging(Effect):
         return replace(self, lines=max(present, default=1))
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line, (p,)."""
+        """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line.
+
+        Parameters
+        ----------
+        values : (3 lines,) array
+            Amplitudes of sine and cosine of each line, N·m, then the cycles per turn.
+
+        Returns
+        -------
+        (3 lines,) array
+            N·m, 1 and rad, line after line.
+        """
         values = np.asarray(values, dtype=float)
         sine, cosine = values[: 2 * self.lines].reshape(-1, 2).T
         cycles = values[2 * self.lines :]
         return np.column_stack([np.hypot(sine, cosine), cycles, np.arctan2(cosine, sine)]).ravel()
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sine and cosine of each line, then the cycles per turn, (p,)."""
+        """Return the amplitudes of sine and cosine of each line, then the cycles per turn.
+
+        Parameters
+        ----------
+        physical : (3 lines,) array
+            Amplitude, N·m, cycles per turn and phase, rad, line after line.
+
+        Returns
+        -------
+        (3 lines,) array
+            N·m, and the cycles.
+        """
         amplitude, cycles, phase = np.reshape(physical, (-1, 3)).T
         waves = np.column_stack([amplitude * np.cos(phase), amplitude * np.sin(phase)])
         return np.concatenate([waves.ravel(), cycles])

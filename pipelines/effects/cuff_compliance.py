@@ -83,7 +83,21 @@ class CuffCompliance(Effect):
         return values[0] * (twist * (1.0 + values[2] * twist * twist) + RELAXATION_S * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the limb; without its mass, it follows its torque immediately."""
+        """Return the motion of the limb; without its mass, it follows its torque immediately.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of the links, n samples.
+        shape : array or tuple of float
+            Stiffness, N·m/rad; then, unless missing, whether the knee is held, and hardening,
+            1/rad².
+
+        Returns
+        -------
+        Motion
+            Of the limb, n samples.
+        """
         stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
         if motion.limb_swing is not None:

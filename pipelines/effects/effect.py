@@ -167,13 +167,32 @@ class Parameter:
         return low > 0.0 and high / low > WIDE
 
     def off_middle(self, value: float) -> float:
-        """Return the distance of a value from the middle of the typical range, in half ranges."""
+        """Return the distance of a value from the middle of the typical range.
+
+        Parameters
+        ----------
+        value : float
+            In the parameter's unit.
+
+        Returns
+        -------
+        float
+            In half ranges, of logarithms for a parameter that varies by factors.
+        """
         ends = np.array([*self.typical, value])
         low, high, at = np.log(np.maximum(ends, np.finfo(float).tiny)) if self.by_factors else ends
         return float((2.0 * at - low - high) / (high - low))
 
     def at(self, machine: Machine, joint: str) -> "Parameter":
-        """Return the parameter with unit and ranges of a joint of a machine."""
+        """Return the parameter with unit and ranges of a joint of a machine.
+
+        Parameters
+        ----------
+        machine : Machine
+            With the scale of each joint.
+        joint : str
+            Name of the joint.
+        """
         if not self.of_joint:
             return self
         scale, (low, high) = machine.scale(joint).of(self.unit), self.typical
@@ -306,7 +325,15 @@ class Effect(ABC):
     def possible(cls, machine: Machine) -> list[str | None]:
         """Return the joints of a machine that can have the effect and show it.
 
-        ``[None]`` if it belongs to the whole machine.
+        Parameters
+        ----------
+        machine : Machine
+            Any machine.
+
+        Returns
+        -------
+        list
+            Names of joints; ``[None]`` if it belongs to the whole machine.
         """
         mechanism = machine.mechanism
         if cls.name in mechanism.absorbs:
@@ -395,11 +422,21 @@ class Effect(ABC):
         return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Return shapes for which the effect is linear; empty if it is not.
+        """Return shapes for which the effect is linear.
 
-        Each set of shapes (s,) is a candidate with one column per shape. The effect of any
-        combination is the same combination of the columns, so that no grid of shapes must be
-        searched.
+        The effect of any combination is the same combination of the columns, so that no grid of
+        shapes must be searched.
+
+        Parameters
+        ----------
+        motions : sequence of Motion
+            Runs, whose measurements decide which directions show.
+
+        Returns
+        -------
+        tuple
+            Sets of shapes (s,); each set is a candidate with one column per shape. Empty if the
+            effect is not linear.
         """
         return ()
 
@@ -412,18 +449,48 @@ class Effect(ABC):
         return motion.joint_index(self.joint) if self.joint else -1
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return the values of ``parameters`` for those of ``fitted``, (p,) each."""
+        """Return the values of ``parameters``.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of ``fitted``.
+
+        Returns
+        -------
+        (p,) array
+            In the units of ``parameters``.
+        """
         return np.asarray(values, dtype=float)
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the values of ``fitted`` for those of ``parameters``, (p,) each.
+        """Return the values of ``fitted``, the inverse of ``physical``.
 
-        The inverse of ``physical``.
+        Parameters
+        ----------
+        physical : (p,) array
+            Values of ``parameters``.
+
+        Returns
+        -------
+        (p,) array
+            In the units of ``fitted``.
         """
         return np.asarray(physical, dtype=float)
 
     def jacobian(self, values: NDArray) -> NDArray:
-        """Return the derivative of ``physical``, (parameters, fitted), at values (fitted,)."""
+        """Return the derivative of ``physical``.
+
+        Parameters
+        ----------
+        values : (fitted,) array
+            Where to differentiate.
+
+        Returns
+        -------
+        (parameters, fitted) array
+            By central differences, unless ``physical`` is the identity.
+        """
         values = np.asarray(values, dtype=float)
         if type(self).physical is Effect.physical:
             return np.eye(len(values))
@@ -440,7 +507,18 @@ class Effect(ABC):
         return self
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
-        """Return values of ``fitted``, (p,), with defaults for those missing at the end."""
+        """Return values with defaults for those missing at the end.
+
+        Parameters
+        ----------
+        values : (k,) array or tuple of float
+            The first values of ``fitted``.
+
+        Returns
+        -------
+        (p,) array
+            Values of all of ``fitted``.
+        """
         rest = [p.default for p in self.fitted[len(values) :]]
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 

@@ -69,7 +69,20 @@ class EncoderEccentricity(Effect):
         angle[joint] = q + once + values[2] * sin(2.0 * q) + values[3] * cos(2.0 * q)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion with the true angle, speed and acceleration."""
+        """Return the motion with the true angle, speed and acceleration.
+
+        Parameters
+        ----------
+        motion : Motion
+            As measured, n samples.
+        shape : (4,) array or tuple of float
+            Amplitudes of sine and cosine once and twice per turn, rad.
+
+        Returns
+        -------
+        Motion
+            Of the motors, n samples.
+        """
         values, j = self.completed(shape), self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         true = q[:, j].copy()
@@ -89,19 +102,49 @@ class EncoderEccentricity(Effect):
         return every[:2], every
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude and phase, once and twice per turn, (4,)."""
+        """Return amplitude and phase, once and twice per turn.
+
+        Parameters
+        ----------
+        values : (4,) array
+            Amplitudes of sine and cosine, once and twice per turn, rad.
+
+        Returns
+        -------
+        (4,) array
+            Amplitude, phase, amplitude, phase; rad.
+        """
         sines, cosines = np.reshape(values, (2, 2)).T
         return np.column_stack([np.hypot(sines, cosines), np.arctan2(cosines, sines)]).ravel()
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sines and cosines, (4,)."""
+        """Return the amplitudes of sines and cosines.
+
+        Parameters
+        ----------
+        physical : (4,) array
+            Amplitude, phase, amplitude, phase; rad.
+
+        Returns
+        -------
+        (4,) array
+            Sine and cosine, once and twice per turn, rad.
+        """
         amplitudes, phases = np.reshape(physical, (2, 2)).T
         return np.column_stack([amplitudes * np.cos(phases), amplitudes * np.sin(phases)]).ravel()
 
     def jacobian(self, values: NDArray) -> NDArray:
-        """Return the derivatives (4, 4) of amplitudes and phases.
+        """Return the derivatives of amplitudes and phases.
 
-        Those of a phase are zero if its amplitude is.
+        Parameters
+        ----------
+        values : (4,) array
+            Amplitudes of sine and cosine, rad.
+
+        Returns
+        -------
+        (4, 4) array
+            Zero for the phase of an amplitude of zero.
         """
         jacobian = np.zeros((4, 4))
         for k in (0, 2):

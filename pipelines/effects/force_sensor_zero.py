@@ -27,7 +27,20 @@ class ForceSensorZero(Effect):
     )
 
     def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray:
-        """Return the torque of unit forces about each joint, (n, 2, 3) N·m per N."""
+        """Return the torque of unit forces about each joint.
+
+        Parameters
+        ----------
+        motion : Motion
+            n samples of hip and knee.
+        columns : (n, 2, 3) array
+            Gives the shape of the result.
+
+        Returns
+        -------
+        (n, 2, 3) array
+            N·m per N.
+        """
         out = np.zeros_like(columns)
         geometry, knee = motion.geometry, motion.q[:, 1]
         thigh, shank = geometry.thigh_cuff_distance_m or 0.0, geometry.shank_cuff_distance_m or 0.0

@@ -74,7 +74,22 @@ class GainDrift(Effect):
         return (*with_time, *with_temperature)
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
-        """Divide by the present gain."""
+        """Divide the joint's torque by the present gain.
+
+        Parameters
+        ----------
+        torque : (n, J) array
+            As the sensor reads it, N·m.
+        motion : Motion
+            n samples.
+        values : (3,) array
+            Drift with time, 1/s; its time constant, s; drift with temperature, 1/°C.
+
+        Returns
+        -------
+        (n, J) array
+            True torque, N·m.
+        """
         true, unit = torque.copy(), np.zeros((*torque.shape, 1))
         unit[:, self.column(motion)] = 1.0
         true /= np.where(unit, self._read(unit, motion, values), 1.0)[:, :, 0]

@@ -62,6 +62,18 @@ class JointElasticity(Effect):
         """Return the motion of the link behind the spring.
 
         Without its mass, the link follows its torque immediately.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of the motors, n samples.
+        shape : array or tuple of float
+            Stiffness, N·m/rad; then, unless missing, hardening, 1/rad².
+
+        Returns
+        -------
+        Motion
+            Of the links, n samples.
         """
         if motion.link_swing is not None:
             return link_behind_motor(

@@ -175,8 +175,30 @@ def columns_along(
 ):
     """Evaluate the reaction kernel at an address along a motion.
 
-    The kernel has no memory. ``out`` is (n, J, p) N·m per unit. ``values`` hold the shape, and
-    zeros for the rest; ``scratch`` is (2 J,).
+    The kernel has no memory.
+
+    Parameters
+    ----------
+    where : int
+        Address of the kernel.
+    values : (p,) array
+        The shape, and zeros for the rest.
+    joint : int
+        Column of the joint; -1 for the whole machine.
+    time : (n,) array
+        s.
+    q, dq, ddq : (n, J) array
+        rad, rad/s and rad/s².
+    load : (n, J) array
+        Transmitted torque, N·m.
+    temperature : (n, J) array
+        °C.
+    geometry : (2,) array
+        Length, m, and gravity, m/s².
+    scratch : (2 J,) array
+        Overwritten.
+    out : (n, J, p) array
+        Written: N·m per unit.
     """
     kernel = reaction_at(where)
     joints = q.shape[1]
@@ -230,9 +252,32 @@ def columns_along_with_memory(
 ):
     """Evaluate the reaction kernel at an address along one unbroken stretch.
 
-    The kernel at the other address is the rate of its memory, which settles first. Between samples,
-    the motion is linear in time. ``out`` is (n, J, p) N·m per unit, ``scratch`` is (11, J), and
-    ``memory`` is (3, states) with a first row of zeros.
+    The memory settles at the first sample. Between samples, the motion is linear in time.
+
+    Parameters
+    ----------
+    where, where_rate : int
+        Addresses of the kernel and of the rate of its memory.
+    values : (p,) array
+        The shape, and zeros for the rest.
+    joint : int
+        Column of the joint; -1 for the whole machine.
+    time : (n,) array
+        s.
+    q, dq, ddq : (n, J) array
+        rad, rad/s and rad/s².
+    load : (n, J) array
+        Transmitted torque, N·m.
+    temperature : (n, J) array
+        °C.
+    geometry : (2,) array
+        Length, m, and gravity, m/s².
+    scratch : (11, J) array
+        Overwritten.
+    memory : (3, states) array
+        Overwritten; its first row must be zeros.
+    out : (n, J, p) array
+        Written: N·m per unit.
     """
     kernel, rate = reaction_at(where), derivative_at(where_rate)
     state, middle, slope = memory[0], memory[1], memory[2]
@@ -263,8 +308,26 @@ def columns_along_with_memory(
 def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
     """Apply a sensor, the kernel at an address, to p torques of one unbroken stretch.
 
-    ``torque`` and ``out`` are (n, J, p) N·m, and ``at_once`` is (J,). ``state`` (p, m) is the
-    sensor's memory for each torque, zero before the first sample.
+    Parameters
+    ----------
+    where : int
+        Address of the kernel.
+    values : array
+        Values of the effect.
+    joint : int
+        Column of the joint.
+    time : (n,) array
+        s.
+    temperature : (n, J) array
+        °C.
+    torque : (n, J, p) array
+        True torques, N·m.
+    at_once : (J,) array
+        Overwritten.
+    state : (p, m) array
+        The sensor's memory for each torque, zero before the first sample.
+    out : (n, J, p) array
+        Written: readings, N·m.
     """
     kernel = torque_reading_at(where)
     # All torques of a sample are next to each other in memory.

@@ -86,9 +86,17 @@ class ParallelSpring(Effect):
                 object.__setattr__(self, name, value)
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return stiffness and rest angle, (2,).
+        """Return stiffness and rest angle.
 
-        The rest angle is NaN if the stiffness is zero.
+        Parameters
+        ----------
+        values : (2,) array
+            Stiffness, N·m/rad, and preload, N·m.
+
+        Returns
+        -------
+        (2,) array
+            N·m/rad and rad; the angle is NaN if the stiffness is zero.
         """
         if self.reported is None:
             return super().physical(values)
@@ -96,7 +104,18 @@ class ParallelSpring(Effect):
         return np.array([stiffness, preload / stiffness if stiffness != 0.0 else np.nan])
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return stiffness and preload, (2,)."""
+        """Return stiffness and preload.
+
+        Parameters
+        ----------
+        physical : (2,) array
+            Stiffness, N·m/rad, and rest angle, rad.
+
+        Returns
+        -------
+        (2,) array
+            N·m/rad and N·m.
+        """
         if self.reported is None:
             return super().values_from(physical)
         stiffness, rest_angle = physical

@@ -159,7 +159,20 @@ void {name}_torque_reading(double t, double tau[{joints}]) {{
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return header and source; their functions start with the file's name."""
+    """Return header and source; their functions start with the file's name.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model to write.
+    stem : str
+        Name of the files without suffix.
+
+    Returns
+    -------
+    mapping
+        Text by suffix, ``.h`` and ``.c``.
+    """
     model, name = equations(exported), function_name(stem, ".c")
     joints = len(model.joints)
     of_memory = ", ".join(dict.fromkeys(model.memory_of))

@@ -133,7 +133,18 @@ def holding(term: Term) -> Holding:
 
 
 def equations(exported: Exported) -> Equations:
-    """Return the equations of a model."""
+    """Return the equations of a model.
+
+    Parameters
+    ----------
+    exported : Exported
+        Terms that no equation holds are left out.
+
+    Returns
+    -------
+    Equations
+        Constants in SI units; shifts of J angles, rad.
+    """
     terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
     named = [(term, parameter) for term in terms for parameter in term.effect.fitted]
     names = unique((_constant_name(term.effect, parameter) for term, parameter in named), RESERVED)

@@ -114,7 +114,18 @@ def column_of(term: Term) -> int:
 
 
 def shift_of(term: Term) -> NDArray | None:
-    """Return the constant that an effect adds to the encoders' angles, (J,) rad; None if none."""
+    """Return the constant that an effect adds to the encoders' angles.
+
+    Parameters
+    ----------
+    term : Term
+        Any term of J joints.
+
+    Returns
+    -------
+    (J,) array or None
+        rad; None if its reading is more than a shift, or it has none.
+    """
     if term.effect.reading is None:
         return None
     joints, joint = len(term.effect.on.joints), column_of(term)

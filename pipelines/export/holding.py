@@ -8,7 +8,18 @@ from pipelines.model import Term
 
 
 def sound_friction(term: Term) -> tuple[float, float]:
-    """Return Coulomb and viscous friction, at least 0: simulators refuse negative values."""
+    """Return Coulomb and viscous friction, at least 0: simulators refuse negative values.
+
+    Parameters
+    ----------
+    term : Term
+        Friction with two values.
+
+    Returns
+    -------
+    tuple of float
+        N·m and N·m·s/rad.
+    """
     coulomb, viscous = (max(float(value), 0.0) for value in term.values)
     return coulomb, viscous
 
@@ -31,7 +42,22 @@ Holdings = Mapping[str, Callable[[Term], Holding]]
 
 
 def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[Term], Holding]:
-    """Return the function from a term to its holding; ``shift`` describes encoders' shifts."""
+    """Return the function from a term to its holding.
+
+    Parameters
+    ----------
+    holdings : Holdings
+        Function by name of effect.
+    shift : str
+        How the format holds an encoder's shift.
+    format_name : str
+        For the reason of a term that is left out.
+
+    Returns
+    -------
+    callable
+        A term's holding.
+    """
 
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:

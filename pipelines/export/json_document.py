@@ -37,7 +37,20 @@ def holding(term: Term) -> Holding:
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the document's text by suffix."""
+    """Return the document's text.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model to write.
+    stem : str
+        Name of the model.
+
+    Returns
+    -------
+    mapping
+        Text by suffix, ``.json``.
+    """
     table = exported.table
     document = {
         "contract": CONTRACT,

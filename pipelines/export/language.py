@@ -29,7 +29,15 @@ class Language:
     """Returns the lines of a branch, from its condition and both lists of statements."""
 
     def text(self, formula: Any, at_least: int = SUM) -> str:
-        """Return a formula or a number, in brackets if its precedence is below ``at_least``."""
+        """Return a formula or a number as code.
+
+        Parameters
+        ----------
+        formula : Formula or float
+            The expression.
+        at_least : int, optional
+            Precedence below which it gets brackets.
+        """
         text, precedence = self._text_and_precedence(formula)
         return f"({text})" if precedence < at_least else text
 
@@ -52,13 +60,31 @@ class Language:
         return f"{self.names.get(operator, operator)}({', '.join(map(self.text, operands))})", ATOM
 
     def added(self, outcome: list | Branch, to: str) -> list[str]:
-        """Return the statements that add a kernel's outcome to an array, without zeros."""
+        """Return the statements that add a kernel's outcome to an array, without zeros.
+
+        Parameters
+        ----------
+        outcome : list or Branch
+            A formula or number by element.
+        to : str
+            Name of the array.
+        """
         return self._statements(
             outcome, lambda i, value: self._addition(self.element(to, i), value)
         )
 
     def assigned(self, outcome: list | Branch, to: str, first: int = 0) -> list[str]:
-        """Return the statements that assign a kernel's outcome to an array, from ``first`` on."""
+        """Return the statements that assign a kernel's outcome to an array.
+
+        Parameters
+        ----------
+        outcome : list or Branch
+            A formula or number by element.
+        to : str
+            Name of the array.
+        first : int, optional
+            Index of its first element.
+        """
         return self._statements(
             outcome, lambda i, value: self._assignment(self.element(to, first + i), value)
         )

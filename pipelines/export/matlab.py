@@ -117,7 +117,20 @@ end
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the function file."""
+    """Return the function file.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model to write.
+    stem : str
+        Name of the file without suffix.
+
+    Returns
+    -------
+    mapping
+        Text by suffix, ``.m``.
+    """
     model = equations(exported)
     joints = len(model.joints)
     order = [

@@ -57,7 +57,20 @@ HOLDINGS: Holdings = {
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model's text by suffix."""
+    """Return the model's text.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model to write.
+    stem : str
+        Name of the model.
+
+    Returns
+    -------
+    mapping
+        Text by suffix, ``.xml``.
+    """
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)

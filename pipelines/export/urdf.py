@@ -33,7 +33,20 @@ HOLDINGS: Holdings = {
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model's text by suffix."""
+    """Return the model's text.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model to write.
+    stem : str
+        Name of the robot.
+
+    Returns
+    -------
+    mapping
+        Text by suffix, ``.urdf``.
+    """
     root = ET.Element("robot", name=one_line(stem))
     joints = unique(one_line(joint.name) for joint in exported.joints)
     links = unique([f"{name}_link" for name in joints], ["base", *joints])

@@ -23,7 +23,18 @@ class Summary:
         self._velocity = _MeanSquare(len(motion.joints))
 
     def passing(self, pieces: Iterable[pa.Table]) -> Iterator[pa.Table]:
-        """Yield the motion's rows unchanged, and gather their statistics."""
+        """Yield the motion's rows unchanged, and gather their statistics.
+
+        Parameters
+        ----------
+        pieces : iterable of pyarrow.Table
+            Rows of ``motion/1`` in order.
+
+        Yields
+        ------
+        pyarrow.Table
+            The same rows.
+        """
         for piece in pieces:
             self._add(piece)
             yield piece

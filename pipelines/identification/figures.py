@@ -55,9 +55,14 @@ class _RunData:
 
 
 def draw(residuals: Rows, folder: Path) -> None:
-    """Write the figures of every validation run as PNG and PDF into a folder.
+    """Write the figures of every validation run as PNG and PDF.
 
-    ``residuals`` is a ``residuals/1`` table.
+    Parameters
+    ----------
+    residuals : Rows
+        A ``residuals/1`` table, N·m.
+    folder : Path
+        Where to write them.
     """
     joints = residuals.joints
     with plt.rc_context(STYLE):

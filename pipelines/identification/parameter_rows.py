@@ -12,7 +12,20 @@ from pipelines.model import BASELINE, Term
 
 
 def rows(training: Training, values: NDArray) -> Iterator[Row]:
-    """Yield the rows for the values of the columns, (p,)."""
+    """Yield the rows of a ``parameters/1`` table.
+
+    Parameters
+    ----------
+    training : Training
+        The fitted model and its runs.
+    values : (p,) array
+        Values of the columns, in their units.
+
+    Yields
+    ------
+    Row
+        Body alone, friction, body with a person, the person's, then extensions.
+    """
     terms = list(_sloped(training, values))
     bodies = [one for one in terms if isinstance(one[0].effect, RigidBody)]
     machine, *wearer = bodies

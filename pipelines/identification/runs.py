@@ -16,7 +16,15 @@ class Runs:
     motions: tuple[Run, ...]
 
     def of(self, purpose: str, run: str | None = None) -> list[Run]:
-        """Return the runs of a purpose, optionally of one kind."""
+        """Return the runs of a purpose.
+
+        Parameters
+        ----------
+        purpose : str
+            ``train`` or ``validate``.
+        run : str, optional
+            Kind of run; all kinds by default.
+        """
         return [m for m in self.motions if m.purpose == purpose and run in (None, m.run)]
 
     @property

@@ -35,7 +35,14 @@ class Validation:
     by_run: dict[str, Score]
 
     def as_json(self) -> dict[str, dict[str, dict[str, float]]]:
-        """Return the numbers by kind of run ("all" pools them) and joint, N·m."""
+        """Return the numbers for a file.
+
+        Returns
+        -------
+        dict
+            By kind of run ("all" pools them), joint, and ``rmse_nm``, ``rmse_unmasked_nm`` or
+            ``torque_rms_nm``, N·m.
+        """
         return {
             run: {
                 joint: {
@@ -58,7 +65,19 @@ def validate(
 ) -> Validation:
     """Return the torque error of each run's model, pooled and by kind of run.
 
-    Runs without a model do not count, nor do frequencies above ``cutoff_hz``.
+    Parameters
+    ----------
+    motions : sequence of Run
+        Validation runs of one machine, at least one.
+    model_of : callable
+        Return the model of a run, or None: then the run does not count.
+    cutoff_hz : float, optional
+        Frequencies above do not count, Hz.
+
+    Returns
+    -------
+    Validation
+        RMSE (J,) in N·m, with and without samples near reversals.
     """
     joints = motions[0].joints
     sums: dict[str, _Sums] = {}

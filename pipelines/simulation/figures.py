@@ -23,8 +23,21 @@ def draw_tracking(
     limit_nm: float,
     settled_after_s: float,
 ) -> None:
-    """Draw tracking, error and torque of a closed loop (Figures 4 to 6); ``frame`` is a
-    ``simulation/1`` table."""
+    """Draw tracking, error and torque of a closed loop (Figures 4 to 6).
+
+    Parameters
+    ----------
+    frame : DataFrame
+        A ``simulation/1`` table.
+    joints : tuple of Joint
+        Joints of the table.
+    folder : Path
+        Where to write ``tracking``, ``error`` and ``torque``.
+    limit_nm : float
+        Torque limit to draw, N·m.
+    settled_after_s : float
+        Begin of the settled part, s.
+    """
     with plt.rc_context(STYLE):
         save(_tracking(frame, joints), folder / "tracking")
         save(_error(frame, joints, settled_after_s), folder / "error")
@@ -32,7 +45,19 @@ def draw_tracking(
 
 
 def draw_sweep(sweep: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, chosen: float) -> None:
-    """Draw the largest settled error against the feedback gain (Figure 3)."""
+    """Draw the largest settled error against the feedback gain (Figure 3).
+
+    Parameters
+    ----------
+    sweep : DataFrame
+        Gains, N·m·s/rad, and the error of each joint, rad.
+    joints : tuple of Joint
+        Joints of the table.
+    folder : Path
+        Where to write ``kv-sweep``.
+    chosen : float
+        Gain of the simulation, N·m·s/rad.
+    """
     with plt.rc_context(STYLE):
         figure, axis = plt.subplots(figsize=(6, 3.6))
         gains = sweep["feedback_gain_nm_s_rad"]
@@ -72,7 +97,21 @@ def draw_replay(
     stem: Path,
     title: str,
 ) -> None:
-    """Draw a recording with its simulation, from the ``simulation/1`` tables of ``recorded``."""
+    """Draw a recording with its simulation.
+
+    Parameters
+    ----------
+    open_loop : DataFrame
+        Windows under the recorded torque, a ``simulation/1`` table.
+    closed_loop : DataFrame or None
+        The drives' loop under the recorded references, if it was simulated.
+    joints : tuple of Joint
+        Joints of the tables.
+    stem : Path
+        Path of the figure without suffix.
+    title : str
+        Title of the figure.
+    """
     with plt.rc_context(STYLE):
         columns = 1 if closed_loop is None else 2
         figure, axes = plt.subplots(

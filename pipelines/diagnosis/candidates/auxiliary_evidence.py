@@ -6,10 +6,20 @@ from pipelines.effects import VoluntaryTorque
 
 
 def auxiliary_evidence(prepared: PreparedRuns) -> dict[str, float]:
-    """Return the log likelihood ratio of each label from evidence other than the mean torque.
+    """Return the evidence of causes other than the mean torque.
 
     For a wearer's pushes it is the part that cuffs and drives share. A rhythm that is fitted
     explains some of it too.
+
+    Parameters
+    ----------
+    prepared : PreparedRuns
+        The searched runs and their residuals.
+
+    Returns
+    -------
+    dict
+        Log likelihood ratio by label.
     """
     ratios = cuff_coherence(prepared.runs, prepared.residuals)
     return {

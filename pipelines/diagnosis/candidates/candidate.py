@@ -50,13 +50,31 @@ class Candidate:
         return Term.of(self.effect, self.shapes[run])
 
     def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with shape ``i`` larger by a step, in some runs or in all."""
+        """Return the candidate with one shape larger by a step.
+
+        Parameters
+        ----------
+        i : int
+            Number of the shape.
+        step : float
+            In the shape's unit.
+        runs : sequence of int, optional
+            Runs that change; all by default.
+        """
         return self.with_own(
             i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)]
         )
 
     def with_own(self, i: int, values: Sequence[float]) -> "Candidate":
-        """Return the candidate with a value of shape parameter ``i`` for each run."""
+        """Return the candidate with one shape of its own in each run.
+
+        Parameters
+        ----------
+        i : int
+            Number of the shape.
+        values : sequence of float
+            One value for each run, in the shape's unit.
+        """
         shapes = zip(self.shapes, values, strict=True)
         return replace(
             self,
@@ -64,7 +82,17 @@ class Candidate:
         )
 
     def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
-        """Return the candidate with a new value of shape ``i``, in some runs or in all."""
+        """Return the candidate with a new value of one shape.
+
+        Parameters
+        ----------
+        i : int
+            Number of the shape.
+        value : float
+            In the shape's unit.
+        runs : sequence of int, optional
+            Runs that change; all by default.
+        """
         return self.with_own(
             i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)]
         )
@@ -75,16 +103,32 @@ class Candidate:
         return transforms_motion(self.effect)
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
-        """Return the places of the candidate's columns in runs of some kinds."""
+        """Return the places of the candidate's columns.
+
+        Parameters
+        ----------
+        kinds : sequence of str
+            Kind of each run.
+        start : int, optional
+            Number of the first column.
+        """
         width = max(1, len(self.directions))
         per_run = [self.effect.per_run] * width if self.transforms_motion else None
         return TermColumns.of(self.effect, kinds, per_run, start)
 
     def typical(self, kinds: Sequence[str]) -> NDArray:
-        """Return the amplitude of each column of an effect as large as on other machines, (k,).
+        """Return the amplitude of each column of an effect as large as on other machines.
 
-        Where the effect transforms the motion, a column has its shape or is proportional to its
-        direction.
+        Parameters
+        ----------
+        kinds : sequence of str
+            Kind of each run.
+
+        Returns
+        -------
+        (k,) array
+            In the parameters' units. Where the effect transforms the motion, a column has its shape
+            or is proportional to its direction.
         """
         if self.directions:
             sizes = [_largest(self.effect, direction) for direction in self.directions]
@@ -153,7 +197,22 @@ def _largest(effect: Effect, direction: Sequence[float]) -> float:
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
-    """Return the smallest value of a shape parameter that runs can determine, in its unit."""
+    """Return the smallest value of a shape parameter that runs can determine.
+
+    Parameters
+    ----------
+    effect : Effect
+        Bound to its joint.
+    parameter : Parameter
+        One of its shapes.
+    runs : sequence of Run
+        The searched runs.
+
+    Returns
+    -------
+    float
+        In the parameter's unit; minus infinity unless it counts cycles of the joint's angle.
+    """
     if parameter.unit not in TURNS or effect.joint is None:
         return -np.inf
     j = runs[0].motion.joints.index(effect.joint)
@@ -162,9 +221,20 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
 
 
 def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place where a machine can have it, in the kinds of the runs.
+    """Yield every effect at every place where a machine can have it.
 
-    Effects of the baseline are left out.
+    Parameters
+    ----------
+    baseline : Baseline
+        Its effects are left out.
+    kinds : sequence of str
+        Kinds of the runs, ``exo_alone`` and ``with_human``.
+
+    Yields
+    ------
+    Effect
+        Bound to a joint; where useful also with values of its own in each run, or in runs
+        with a person only.
     """
     machine, known = baseline.machine, {effect.label for effect in baseline.known}
     for effect in EFFECTS:

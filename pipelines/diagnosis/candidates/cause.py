@@ -82,7 +82,20 @@ class Cause:
 
 
 def towards(best: CandidateFit, others: Sequence[CandidateFit]) -> NDArray:
-    """Return the change from the best form of a cause to its best other form, (N, 0 or 1)."""
+    """Return the change from the best form of a cause to its best other form.
+
+    Parameters
+    ----------
+    best : CandidateFit
+        The cause at its best form.
+    others : sequence of CandidateFit
+        Other fits of the effect, the best first.
+
+    Returns
+    -------
+    (N, 0 or 1) array
+        Difference of the rows; no column without another form.
+    """
     forms = [p.forms for p in best.candidate.effect.shape]
     here = best.candidate.shapes[0]
     for other in others:

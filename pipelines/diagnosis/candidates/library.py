@@ -245,11 +245,23 @@ def _shapes(
 def best_transmission(
     fits: Sequence[CandidateFit], alone: ShapeRefinement
 ) -> tuple[CandidateFit, NDArray]:
-    """Return a transmission at its best shape, and its slopes there, (N, d).
+    """Return a transmission at its best shape.
 
     It is refined from several starts. Where a load swings, the likelihood has several maxima, and
     only refitted bodies show which is the highest. So the best shape with the baseline's bodies and
     the best shape with refitted bodies are both refined.
+
+    Parameters
+    ----------
+    fits : sequence of CandidateFit
+        Fits of one effect, the best first.
+    alone : ShapeRefinement
+        The baseline's rows alone.
+
+    Returns
+    -------
+    tuple
+        The fit, and its slopes (N, d).
     """
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]

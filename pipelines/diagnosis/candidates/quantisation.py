@@ -25,7 +25,20 @@ STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:
-    """Return the error of rounding a torque (n,) to multiples of a step, N·m."""
+    """Return the error of rounding a torque.
+
+    Parameters
+    ----------
+    torque : (n,) array
+        N·m.
+    step : float
+        Multiples to round to, N·m.
+
+    Returns
+    -------
+    (n,) array
+        Rounded less exact, N·m.
+    """
     return step * np.round(torque / step) - torque
 
 

@@ -39,7 +39,24 @@ Fit = Callable[[Candidate], CandidateFit | None]
 def screened(
     effect: Effect, alone: ShapeRefinement, runs: Sequence[Run], regression: DecisionRegression
 ) -> list[CandidateFit]:
-    """Return the fits of an effect's grid, those that explain most first."""
+    """Return the fits of an effect's grid.
+
+    Parameters
+    ----------
+    effect : Effect
+        Bound to its joint.
+    alone : ShapeRefinement
+        The baseline's rows alone.
+    runs : sequence of Run
+        The searched runs.
+    regression : DecisionRegression
+        Its rows.
+
+    Returns
+    -------
+    list of CandidateFit
+        Those that explain most first.
+    """
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
     elif any(p.per_run for p in effect.shape) and not transforms_motion(effect):
@@ -61,7 +78,17 @@ def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -
 
 
 def others_of(fits: Sequence[CandidateFit], chosen: CandidateFit, most: int) -> list[CandidateFit]:
-    """Return the best fits at other forms or other maxima than the chosen fit."""
+    """Return the best fits at other forms or other maxima than the chosen fit.
+
+    Parameters
+    ----------
+    fits : sequence of CandidateFit
+        Fits of one effect, the best first.
+    chosen : CandidateFit
+        The fit to differ from.
+    most : int
+        Greatest number of results.
+    """
     effect = chosen.candidate.effect
     kept = [chosen]
     for fitted in fits:
@@ -108,7 +135,24 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
-    """Return the values of an effect's shape to try on some runs, (count,), in its unit."""
+    """Return the values of an effect's shape to try on some runs.
+
+    Parameters
+    ----------
+    effect : Effect
+        Bound to its joint.
+    parameter : Parameter
+        One of its shapes.
+    count : int
+        Number of values.
+    runs : sequence of Run
+        The searched runs, whose angles a swept parameter follows.
+
+    Returns
+    -------
+    (count,) array
+        In the parameter's unit.
+    """
     if not parameter.swept or effect.joint is None:
         return values_of(parameter, count)
     j = runs[0].motion.joint_index(effect.joint)
@@ -117,7 +161,20 @@ def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[R
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:
-    """Return the values of a shape parameter to try, (count,) or fewer, in its unit."""
+    """Return the values of a shape parameter to try.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        A shape.
+    count : int
+        Greatest number of values, unless it has forms or counts cycles.
+
+    Returns
+    -------
+    array
+        In the parameter's unit.
+    """
     if parameter.forms:
         return np.array(parameter.forms)
     if parameter.default is not None:

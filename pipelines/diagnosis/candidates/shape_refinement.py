@@ -122,10 +122,20 @@ class ShapeRefinement:
         )
 
     def refined(self, start: CandidateFit) -> tuple[CandidateFit, NDArray]:
-        """Return the candidate at its best shape, and its derivative columns there, (N, d).
+        """Return the candidate at its best shape.
 
         A transmission's rigid bodies and shapes are fitted in turn. Either may come first, because
         there are several maxima. A refit of the bodies that does not explain more is left out.
+
+        Parameters
+        ----------
+        start : CandidateFit
+            Where to start.
+
+        Returns
+        -------
+        tuple
+            The fit, and its derivative columns (N, d).
         """
         if not start.candidate.effect.swings:
             return self._refined(start)
@@ -340,14 +350,45 @@ def log_searched(candidate: Candidate) -> float:
 
 
 def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
-    """Return the unit of change as a difference, at the candidate's own shape in a run."""
+    """Return the unit of change as a difference.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Its own shape is the scale of a change by factors.
+    i : int
+        Number of the shape.
+    unit : float
+        Unit of change; zero for a change by factors.
+    run : int, optional
+        Run whose shape is used.
+
+    Returns
+    -------
+    float
+        In the shape's unit.
+    """
     return unit if unit else abs(candidate.shapes[run][i])
 
 
 def changed(
     candidate: Candidate, i: int, unit: float, step: float, runs: Sequence[int] | None = None
 ) -> Candidate:
-    """Return the candidate after a step in units of change, within reach of its typical range."""
+    """Return the candidate after a step, within reach of its typical range.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Where to step from.
+    i : int
+        Number of the shape.
+    unit : float
+        Unit of change; zero for a change by factors.
+    step : float
+        In units of change, at most ``LARGEST_STEP`` either way.
+    runs : sequence of int, optional
+        Runs that change; all by default.
+    """
     parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
     step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))
     value = now + step * unit if unit else now * np.exp(step)

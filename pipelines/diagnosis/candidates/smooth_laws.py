@@ -80,7 +80,15 @@ class Spans:
 
     @classmethod
     def of(cls, runs: Sequence[Run], torque: NDArray) -> "Spans":
-        """Compute them from the searched runs; ``torque`` (J,) N·m is the joints' rms torque."""
+        """Compute the scales of the searched runs.
+
+        Parameters
+        ----------
+        runs : sequence of Run
+            The searched runs of J joints.
+        torque : (J,) array
+            rms torque of each joint, N·m.
+        """
         low = np.min([run.state[0].min(axis=0) for run in runs], axis=0)
         high = np.max([run.state[0].max(axis=0) for run in runs], axis=0)
         speed, acceleration = (

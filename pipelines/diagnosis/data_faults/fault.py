@@ -35,18 +35,36 @@ def column(motion: Motion, joint: int, quantity: str) -> str:
 
 
 def stretches(marked: NDArray) -> NDArray:
-    """Return the runs of true samples in (n,) bool, (runs, 2).
+    """Return the runs of true samples.
 
-    Each row has the first sample and one past the last.
+    Parameters
+    ----------
+    marked : (n,) bool array
+        Samples.
+
+    Returns
+    -------
+    (runs, 2) int array
+        First sample, and one past the last.
     """
     edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
 
 
 def constant_stretches(x: NDArray, least: int) -> NDArray:
-    """Return the runs of at least ``least`` equal values in (n,), (runs, 2).
+    """Return the runs of equal values.
 
-    Each row has the first sample and one past the last.
+    Parameters
+    ----------
+    x : (n,) array
+        Samples.
+    least : int
+        Least length of a run.
+
+    Returns
+    -------
+    (runs, 2) int array
+        First sample, and one past the last.
     """
     intervals = stretches(x[1:] == x[:-1])
     intervals[:, 1] += 1
@@ -54,7 +72,20 @@ def constant_stretches(x: NDArray, least: int) -> NDArray:
 
 
 def mask_of(intervals: NDArray, n: int) -> NDArray:
-    """Return the samples of stretches (runs, 2) as (n,) bool."""
+    """Return the samples of stretches.
+
+    Parameters
+    ----------
+    intervals : (runs, 2) int array
+        First sample, and one past the last.
+    n : int
+        Number of samples.
+
+    Returns
+    -------
+    (n,) bool array
+        True within a stretch.
+    """
     marked = np.zeros(n, dtype=bool)
     for start, stop in intervals:
         marked[start:stop] = True
@@ -62,7 +93,15 @@ def mask_of(intervals: NDArray, n: int) -> NDArray:
 
 
 def when(motion: Motion, intervals: NDArray) -> str:
-    """Return the times of stretches (runs, 2) in words."""
+    """Return the times of stretches in words.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples.
+    intervals : (runs, 2) int array
+        First sample, and one past the last; at least one.
+    """
     if len(intervals) == 1:
         start, stop = intervals[0]
         return f"from {motion.time[start]:.2f} s to {motion.time[stop - 1]:.2f} s"

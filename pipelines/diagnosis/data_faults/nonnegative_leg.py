@@ -46,16 +46,37 @@ class Averages:
     """(m, 2, 3) N, sums of front and back at thigh and shank; None where they were not read."""
 
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
-        """Return torque per unit of (X1 - X2, X2, X3, X4) under a reading, (m, 2, 4)."""
+        """Return torque per unit of (X1 - X2, X2, X3, X4) under a reading.
+
+        Parameters
+        ----------
+        reading : Reading, optional
+            Order and sign of the channels; as recorded by default.
+
+        Returns
+        -------
+        (m, 2, 4) array
+            N·m per unit.
+        """
         order, sign = reading
         q, dq, ddq = (x[:, list(order)] * sign for x in (self.q, self.dq, self.ddq))
         return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
-        """Return the columns of one joint, (m, k).
+        """Return the columns of one joint.
 
-        They are its share of the rigid body, Coulomb and viscous friction, and an offset of either
-        sign.
+        Parameters
+        ----------
+        joint : int
+            0 for the hip, 1 for the knee.
+        reading : Reading, optional
+            Order and sign of the channels; as recorded by default.
+
+        Returns
+        -------
+        (m, k) array
+            Its share of the rigid body, Coulomb and viscous friction, and an offset of either sign;
+            N·m per unit.
         """
         order, sign = reading
         body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]

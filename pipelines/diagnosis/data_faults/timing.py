@@ -163,10 +163,18 @@ class _Comparison:
 
     @classmethod
     def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Comparison":
-        """Compare the roughness of angles (n, J) with that due to stamps (n,) off their grid.
+        """Compare the roughness of angles with that due to stamps off their grid.
 
-        ``on_grid`` is in sample periods. Third differences hold noise of angles and of stamps, and
-        no smooth motion.
+        Third differences hold noise of angles and of stamps, and no smooth motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            n samples of J joints.
+        angle : (n, J) array
+            Measured angles, rad.
+        on_grid : (n,) array
+            Distance of each stamp from its grid, sample periods.
         """
         rough = np.diff(angle, 3, axis=0)
         stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]

@@ -180,11 +180,21 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
 
 
 def shank(run: Averages) -> tuple[float, float]:
-    """Return the shank's mass moment from the knee's torque, kg·m, and its multiple at the hip.
+    """Return the shank's mass moment from the knee's torque, and its multiple at the hip.
 
-    The multiple is how many times the shank the hip's torque carries: 1 where this shank explains
-    it. Drag at the hip can leave the multiple undetermined, but a wrong unit makes the shank too
-    heavy for the hip.
+    Drag at the hip can leave the multiple undetermined, but a wrong unit makes the shank too heavy
+    for the hip.
+
+    Parameters
+    ----------
+    run : Averages
+        Blocks of one run.
+
+    Returns
+    -------
+    tuple of float
+        Moment, kg·m, and how many times this shank the hip's torque carries: 1 where it explains
+        it.
     """
     at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
     at_hip, torque = run.joint_columns(0), run.torque[:, 0]

@@ -283,17 +283,42 @@ def _folds(variable: Variable, runs: Sequence[Run], j: int) -> list[NDArray]:
 
 
 def parts_of_period(run: Run) -> NDArray:
-    """Assign the parts of the excitation's period to folds, (m,).
+    """Assign the parts of the excitation's period to folds.
 
     A law learnt in some parts of the period predicts the others; a curve that only imitates the
     repeating residual does not. Without a period, stretches of a second are assigned.
+
+    Parameters
+    ----------
+    run : Run
+        m blocks.
+
+    Returns
+    -------
+    (m,) int array
+        Fold of each block.
     """
     length = (run.motion.period_s or PARTS) / PARTS
     return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
 
 
 def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
-    """Return (m, ...) values of all runs where a joint's blocks are usable."""
+    """Return the values of all runs where a joint's blocks are usable.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Runs of m blocks each.
+    values : sequence of (m, ...) arrays
+        One of each run.
+    j : int
+        Number of the joint.
+
+    Returns
+    -------
+    array
+        Rows of all runs, in their order.
+    """
     return np.concatenate([v[run.usable[:, j]] for run, v in zip(runs, values, strict=True)])
 
 

@@ -31,7 +31,17 @@ class Curve:
 
     @classmethod
     def along(cls, variables: Sequence["Variable"], runs: Sequence[Run], j: int) -> "Curve":
-        """Place the knots where equally many blocks lie between two."""
+        """Place the knots where equally many blocks lie between two.
+
+        Parameters
+        ----------
+        variables : sequence of Variable
+            One or two.
+        runs : sequence of Run
+            Runs whose usable blocks count.
+        j : int
+            Number of the joint.
+        """
         knots = []
         for variable in variables:
             values = [(run, variable.of(run, j)) for run in runs]
@@ -42,7 +52,18 @@ class Curve:
         return cls(tuple(variables), tuple(knots), j)
 
     def design(self, run: Run) -> NDArray:
-        """Return the splines' values in a run, (m, k); zero where the run lacks a variable."""
+        """Return the splines' values in a run.
+
+        Parameters
+        ----------
+        run : Run
+            m blocks.
+
+        Returns
+        -------
+        (m, k) array
+            Zero where the run lacks a variable.
+        """
         design = np.ones((len(run.time), 1))
         for variable, knots in zip(self.variables, self.knots, strict=True):
             x = variable.of(run, self.joint)
@@ -78,12 +99,34 @@ class Products:
     """(F,)."""
 
     def fitted(self, ridge: float) -> NDArray:
-        """Return the coefficients (k,) of a ridge fit to all folds."""
+        """Return the coefficients of a ridge fit to all folds.
+
+        Parameters
+        ----------
+        ridge : float
+            Weight of the penalty.
+
+        Returns
+        -------
+        (k,) array
+            N·m.
+        """
         A = self.columns.sum(axis=0)
         return np.linalg.solve(A + _shrinkage(A, np.array(ridge)), self.right.sum(axis=0))
 
     def held_out(self, ridges: NDArray) -> NDArray:
-        """Return the squared error of ridge fits (r,) on folds that were not fitted, (r,)."""
+        """Return the error of ridge fits on folds that were not fitted.
+
+        Parameters
+        ----------
+        ridges : (r,) array
+            Weights of the penalty.
+
+        Returns
+        -------
+        (r,) array
+            Squared errors, (N·m)².
+        """
         there = np.flatnonzero(self.square)
         columns, right = self.columns[there], self.right[there]
         others = self.columns.sum(axis=0) - columns
@@ -137,9 +180,17 @@ def _summed(columns: NDArray, right: NDArray, square: NDArray, fold: NDArray) ->
 
 
 def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
-    """Return the squared error on folds that were not fitted, and the ridge that minimises it.
+    """Return the error of a curve on folds that were not fitted.
 
-    Of several partitions the worst counts.
+    Parameters
+    ----------
+    products : sequence of Products
+        One of each partition, of which the worst counts.
+
+    Returns
+    -------
+    tuple of float
+        Squared error, and the ridge that minimises it.
     """
     worst = np.max([p.held_out(np.array(RIDGES)) for p in products], axis=0)
     best = int(np.argmin(worst))

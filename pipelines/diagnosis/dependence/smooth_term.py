@@ -49,7 +49,18 @@ class SmoothTerm:
     surfaces: tuple[Surface, ...]
 
     def torque(self, run: Run) -> NDArray:
-        """Return the surfaces' torque at each output, (m, O) N·m."""
+        """Return the surfaces' torque at each output.
+
+        Parameters
+        ----------
+        run : Run
+            m blocks of O outputs.
+
+        Returns
+        -------
+        (m, O) array
+            N·m.
+        """
         torque = np.zeros_like(run.measured)
         for surface in self.surfaces:
             if run.motion.run in surface.runs:

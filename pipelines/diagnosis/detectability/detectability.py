@@ -150,7 +150,17 @@ class DetectionProblem:
 
     @classmethod
     def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "DetectionProblem":
-        """Fit the baseline and prepare its projection."""
+        """Fit the baseline and prepare its projection.
+
+        Parameters
+        ----------
+        runs : sequence of Run
+            Planned or recorded runs.
+        baseline : Baseline
+            Rigid body and friction.
+        floor : Floor
+            Noise of each output, N·m.
+        """
         untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
@@ -173,16 +183,44 @@ class DetectionProblem:
         return replace(problem, basis=np.linalg.qr(problem.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
-        """Return columns (m, O, k) of each run as weighted rows (rows, k), usable ones only."""
+        """Return columns as weighted rows, usable ones only.
+
+        Parameters
+        ----------
+        columns : sequence of (m, O, k) arrays
+            One of each run, N·m per unit.
+
+        Returns
+        -------
+        (rows, k) array
+            In units of the noise.
+        """
         scaled = (c * self.root[:, np.newaxis] for c in columns)
         return np.concatenate([s[run.usable] for run, s in zip(self.runs, scaled, strict=True)])
 
     def outputs(self) -> NDArray:
-        """Return each row's output, (rows,)."""
+        """Return each row's output.
+
+        Returns
+        -------
+        (rows,) int array
+            Drives first.
+        """
         return np.concatenate([np.nonzero(run.usable)[1] for run in self.runs])
 
     def remainder(self, columns: Sequence[NDArray]) -> NDArray:
-        """Return columns less their projection on the baseline, (rows, k)."""
+        """Return columns less their projection on the baseline.
+
+        Parameters
+        ----------
+        columns : sequence of (m, O, k) arrays
+            One of each run, N·m per unit.
+
+        Returns
+        -------
+        (rows, k) array
+            In units of the noise.
+        """
         rows = self.rows(columns)
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rows = rows - self.basis @ (self.basis.T @ rows)
@@ -193,13 +231,34 @@ class DetectionProblem:
         return max(effect.column(self.runs[0].motion), 0)
 
     def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms of a column (m, O, 1) as a share of the joint's torque."""
+        """Return the rms of a column as a share of the joint's torque.
+
+        Parameters
+        ----------
+        effect : Effect
+            Whose joint counts.
+        column : sequence of (m, O, 1) arrays
+            One of each run, N·m.
+        """
         return self.rms(effect, column) / max(
             float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny
         )
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, where it acts."""
+        """Return the rms of a column at the effect's joint, where it acts.
+
+        Parameters
+        ----------
+        effect : Effect
+            Whose joint and runs count.
+        column : sequence of (m, O, 1) arrays
+            One of each run, N·m.
+
+        Returns
+        -------
+        float
+            N·m.
+        """
         j = self.joint(effect)
         acting = [
             (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
@@ -326,9 +385,18 @@ def as_json(results: Sequence[Detectable]) -> dict:
 
 @cache
 def needed_noncentrality(columns: int, price: float, power: float) -> float:
-    """Return the noncentrality at which a gain over ``columns`` exceeds its price.
+    """Return the noncentrality at which a gain exceeds its price.
 
-    It does so with this power: (z_a + z_b)^2 for one column, with z_a^2 twice the price.
+    It is (z_a + z_b)^2 for one column, with z_a^2 twice the price.
+
+    Parameters
+    ----------
+    columns : int
+        Degrees of freedom of the gain.
+    price : float
+        Log likelihood ratio that the gain must exceed.
+    power : float
+        Probability that it does.
     """
     price = 2.0 * price
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))

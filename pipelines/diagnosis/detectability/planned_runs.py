@@ -24,6 +24,19 @@ def planned_motions(
     """Return one motion of each kind of run, without cuff forces.
 
     Its torque is that of rigid body and friction.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of hip and knee.
+    plant : PlantSettings
+        Parameters of the leg and the wearer.
+    noise : NoiseSettings
+        Its ``duration_s`` limits the motion.
+    kinds : tuple of str
+        ``exo_alone``, ``with_human``.
+    rate_hz : float
+        Sample rate, Hz.
     """
     count = round(min(noise.duration_s, trajectory.duration_s) * rate_hz)
     time = np.arange(count) / rate_hz
@@ -81,6 +94,20 @@ def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> 
 
     For noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 -
     i/D) rho^i) / D, and its integral over all lags is that of the noise itself.
+
+    Parameters
+    ----------
+    noise : NoiseSettings
+        rms, N·m, and correlation time, s.
+    rate_hz : float
+        Sample rate, Hz.
+    block : BlockAverage
+        The regression filter.
+
+    Returns
+    -------
+    Floor
+        rms (4,), N·m, NaN for cuffs, and independent shares (4,).
     """
     rho = np.exp(-1.0 / (rate_hz * noise.correlation_s)) if noise.correlation_s > 0 else 0.0
     D = block.decimation

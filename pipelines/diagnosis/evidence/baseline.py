@@ -88,9 +88,19 @@ def only_trained_outputs(run: Run, baseline: Baseline) -> Run:
 
 
 def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
-    """Return baseline values (b,) part of the way to refitted ones.
+    """Return baseline values part of the way to refitted ones.
 
-    Without values ``before``, the refitted ones are returned.
+    Parameters
+    ----------
+    refitted : (b,) array
+        Values of the last fit.
+    before : (b,) array or None
+        Values before it; None: the refitted ones are returned.
+
+    Returns
+    -------
+    (b,) array
+        In the parameters' units.
     """
     return refitted if before is None else RELAXATION * refitted + (1.0 - RELAXATION) * before
 

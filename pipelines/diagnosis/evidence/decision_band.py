@@ -34,7 +34,13 @@ class DecisionBand:
 
     @classmethod
     def of(cls, run: Run) -> "DecisionBand":
-        """Place the averages over a run's blocks, starting again after each gap."""
+        """Place the averages over a run's blocks, starting again after each gap.
+
+        Parameters
+        ----------
+        run : Run
+            m blocks.
+        """
         width = run.block.decimation / run.motion.sample_rate_hz
         k = max(1, round(LENGTH_S / width))
         breaks = np.flatnonzero(np.diff(run.time) > 1.5 * width) + 1
@@ -51,7 +57,18 @@ class DecisionBand:
         return cls(run, run.time[blocks].mean(axis=1), blocks, weight, operators)
 
     def average(self, values: NDArray) -> NDArray:
-        """Average (m, O, ...) values of blocks over the usable ones, (M, O, ...)."""
+        """Average values of blocks over the usable ones.
+
+        Parameters
+        ----------
+        values : (m, O, ...) array
+            Values at each block and output.
+
+        Returns
+        -------
+        (M, O, ...) array
+            In the unit of ``values``.
+        """
         finite = np.nan_to_num(values)
         return np.stack([op @ finite[:, o] for o, op in enumerate(self.operators)], axis=1)
 

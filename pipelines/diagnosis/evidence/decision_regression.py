@@ -120,12 +120,34 @@ class DecisionRegression:
         return self.output < self.joints
 
     def rows(self, parts: Sequence[NDArray]) -> NDArray:
-        """Return weighted rows (N, k) of columns (m, O, k) in each run."""
+        """Return weighted rows of columns.
+
+        Parameters
+        ----------
+        parts : sequence of (m, O, k) arrays
+            Columns in each run, N·m per unit.
+
+        Returns
+        -------
+        (N, k) array
+            In units of the rows' noise.
+        """
         flat = [part.reshape(-1, part.shape[2]) for part in parts]
         return np.asarray(self.operator @ np.concatenate(flat))
 
     def project(self, columns: NDArray) -> NDArray:
-        """Return columns (N, k) less their projection on the baseline."""
+        """Return columns less their projection on the baseline.
+
+        Parameters
+        ----------
+        columns : (N, k) array
+            Weighted rows.
+
+        Returns
+        -------
+        (N, k) array
+            Orthogonal to the baseline.
+        """
         return columns - self.basis @ (self.basis.T @ columns)
 
     @cached_property
@@ -136,7 +158,18 @@ class DecisionRegression:
         return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=RANK) / size)
 
     def baseline_values(self, rows: NDArray) -> NDArray:
-        """Return the values of the baseline (b, k) that come nearest to rows (N, k)."""
+        """Return the values of the baseline that come nearest to rows.
+
+        Parameters
+        ----------
+        rows : (N, k) array
+            Weighted rows.
+
+        Returns
+        -------
+        (b, k) array
+            In the parameters' units.
+        """
         return np.asarray(self._inverse @ rows)
 
     @cached_property
@@ -146,9 +179,17 @@ class DecisionRegression:
         return np.asarray(self._inverse**2 @ of_output)
 
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield for each run the times (m,) s of an output's rows, and their residual, (m,).
+        """Yield an output's residual in each run under the baseline.
 
-        The residual is under the baseline, in units of the rows' noise.
+        Parameters
+        ----------
+        output : int
+            Number of the output, drives first.
+
+        Yields
+        ------
+        tuple of (m,) arrays
+            Times, s, and the residual in units of the rows' noise.
         """
         ends = np.cumsum([0, *(root.size for root in self.roots)])
         values = np.zeros(len(self.weighty))
@@ -163,9 +204,19 @@ class DecisionRegression:
         return splu(self.whitening.tocsc(), permc_spec="NATURAL")
 
     def shares(self, columns: NDArray) -> NDArray:
-        """Return rows (R, k) whose squares add up to a column's squared share of torque.
+        """Return rows whose squares add up to a column's squared share of torque.
 
         The share at a joint is the column's rms over the drive's rms torque.
+
+        Parameters
+        ----------
+        columns : (N, k) array
+            Weighted rows.
+
+        Returns
+        -------
+        (R, k) array
+            Rows of the drives.
         """
         use, columns = self.of_drives, self._coloured.solve(columns)
         roots = np.concatenate([root.ravel() for root in self.roots])[self.weighty][use]

@@ -12,7 +12,18 @@ ENOUGH_HZ = 200.0
 
 
 def downsampled(motion: Motion) -> Motion:
-    """Return the motion averaged to ``ENOUGH_HZ`` or a little more; unchanged if slower."""
+    """Return the motion at a lower rate.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples.
+
+    Returns
+    -------
+    Motion
+        Averaged to ``ENOUGH_HZ`` or a little more; unchanged if slower.
+    """
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion

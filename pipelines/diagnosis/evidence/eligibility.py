@@ -25,7 +25,18 @@ separate gravity, inertia and friction."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
-    """Raise InputError for motions that no diagnosis can use."""
+    """Refuse motions that no diagnosis can use.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        Runs of a session.
+
+    Raises
+    ------
+    InputError
+        Names the file: another machine, one angle twice, the same data twice, or a standstill.
+    """
     refuse_several_machines(motions)
     for motion in motions:
         if motion.machine.is_exoskeleton:

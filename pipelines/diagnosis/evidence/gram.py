@@ -79,16 +79,39 @@ def solve(gram: Gram, weights: NDArray) -> NDArray:
 
 
 def error(gram: Gram, values: NDArray) -> NDArray:
-    """Return each output's sum of squared errors under coefficients (c,), (O,) (N·m)²."""
+    """Return each output's sum of squared errors.
+
+    Parameters
+    ----------
+    gram : Gram
+        Products of c columns at O outputs.
+    values : (c,) array
+        Coefficients.
+
+    Returns
+    -------
+    (O,) array
+        (N·m)².
+    """
     quadratic = np.einsum("i,oij,j->o", values, gram.columns, values)
     linear = np.einsum("i,oi->o", values, gram.measured)
     return np.maximum(gram.square - 2 * linear + quadratic, 0.0)
 
 
 def weights_under(gram: Gram) -> NDArray:
-    """Return each output's inverse variance under the fit to all columns, (O,) 1/(N·m)².
+    """Return each output's inverse variance under the fit to all columns.
 
     The fit is weighted by these variances, and iterated.
+
+    Parameters
+    ----------
+    gram : Gram
+        Products of c columns at O outputs.
+
+    Returns
+    -------
+    (O,) array
+        1/(N·m)²; zero without usable blocks.
     """
     weights = np.where(gram.count > 0, 1.0, 0.0)
     for _ in range(PASSES):

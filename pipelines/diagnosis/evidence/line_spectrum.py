@@ -68,7 +68,20 @@ class Spectrum:
         return np.maximum(self.level, near)
 
     def false_alarm(self, ratio: float, searches: int) -> float:
-        """Return the chance that noise shows such a ratio anywhere in some similar spectra."""
+        """Return the chance that noise shows such a ratio anywhere in some similar spectra.
+
+        Parameters
+        ----------
+        ratio : float
+            Log likelihood ratio of a line.
+        searches : int
+            Number of similar spectra.
+
+        Returns
+        -------
+        float
+            0 to 1.
+        """
         if not len(self.cycles):
             return 1.0
         # The level is an estimate too, so the ratio has an F distribution. A median of k values has
@@ -101,7 +114,15 @@ def nothing(kind: Kind) -> Spectrum:
 
 
 def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectrum:
-    """Return the spectrum over a joint's angle, of lines that have one phase in all channels."""
+    """Return the spectrum over a joint's angle, of lines that have one phase in all channels.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        The joint's residual in each run.
+    searched : Orders
+        Range and width of the search, cycles per turn.
+    """
     finest = GRID * searched.highest
     step = 2.0 * np.pi / finest
     first = min(float(channel.grid.angle.min()) for channel in channels)
@@ -139,7 +160,15 @@ def _information_at(channel: Channel, orders: NDArray) -> NDArray:
 
 
 def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum:
-    """Return the spectrum over time, of lines that have a phase of their own in each channel."""
+    """Return the spectrum over time, of lines that have a phase of their own in each channel.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        The joint's residual in each run.
+    least_hz : float
+        Lowest frequency to search, Hz.
+    """
     longest = max(len(channel.grid.mask) / channel.grid.rate_hz for channel in channels)
     step = 0.5 / longest
     count = int(0.5 * min(channel.grid.rate_hz for channel in channels) / step)
@@ -196,7 +225,22 @@ def _with_harmonics(
 
 
 def information(channel: Channel, kind: Kind, cycles: float) -> float:
-    """Return D of the equation above for one line, in samples times 1/(N·m)²."""
+    """Return D of the equation above for one line.
+
+    Parameters
+    ----------
+    channel : Channel
+        A joint's residual in one run.
+    kind : Kind
+        Whether the line is over angle or time.
+    cycles : float
+        Per turn, or Hz.
+
+    Returns
+    -------
+    float
+        Samples times 1/(N·m)².
+    """
     if kind is Kind.TIME:
         return len(channel.score) * float(channel.weight(np.array(cycles))) + TINY
     return float(_information_at(channel, np.array([cycles]))[0])

@@ -18,7 +18,18 @@ explain."""
 
 
 def imperfection(runs: Sequence[Run]) -> NDArray:
-    """Return the error that every model of a real machine has, (O,) N·m."""
+    """Return the error that every model of a real machine has.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The searched runs.
+
+    Returns
+    -------
+    (O,) array
+        N·m.
+    """
     torque = varying_torque(runs)
     return torque * _imperfect_share(len(torque))
 
@@ -32,9 +43,19 @@ def _imperfect_share(outputs: int) -> NDArray:
 
 
 def varying_torque(runs: Sequence[Run]) -> NDArray:
-    """Return the rms of each output's torque, (O,) N·m.
+    """Return the rms of each output's torque.
 
     A constant is subtracted where the machine's bodies have one.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The searched runs.
+
+    Returns
+    -------
+    (O,) array
+        N·m.
     """
     squares, count = np.zeros(runs[0].measured.shape[1]), np.zeros(runs[0].measured.shape[1])
     for run in runs:

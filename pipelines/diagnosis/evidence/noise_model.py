@@ -59,18 +59,38 @@ class NoiseModel:
     from_periods: bool
 
     def at(self, hz: NDArray) -> NDArray:
-        """Return the density at frequencies (k,) Hz, (O, k) (N·m)²/Hz.
+        """Return the density at some frequencies.
 
         Below ``WANDER_HZ`` its growth is an extrapolation.
+
+        Parameters
+        ----------
+        hz : (k,) array
+            Hz.
+
+        Returns
+        -------
+        (O, k) array
+            (N·m)²/Hz.
         """
         first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
         pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, TINY_HZ))
         return (self.density * (first + pink).T).T
 
     def averaged(self, length_s: float) -> tuple[NDArray, NDArray]:
-        """Return standard deviation and correlation of adjacent averages, (O,) each.
+        """Return standard deviation and correlation of adjacent averages.
 
         Noise slower than ``WANDER_HZ`` counts as if it were at that frequency.
+
+        Parameters
+        ----------
+        length_s : float
+            Length of an average, s.
+
+        Returns
+        -------
+        tuple of (O,) arrays
+            N·m, and 0 to 1.
         """
         hz = np.linspace(0.0, 4.0 / length_s, 2001)
         passed = self.at(np.maximum(hz, WANDER_HZ)) * np.sinc(hz * length_s) ** 2
@@ -79,12 +99,36 @@ class NoiseModel:
         return np.sqrt(variance), np.maximum(adjacent / variance, 0.0)
 
     def sigma(self, length_s: float) -> NDArray:
-        """Return the effective standard deviation of averages for slow signals, (O,) N·m."""
+        """Return the effective standard deviation of averages for slow signals.
+
+        Parameters
+        ----------
+        length_s : float
+            Length of an average, s.
+
+        Returns
+        -------
+        (O,) array
+            N·m.
+        """
         sd, memory = self.averaged(length_s)
         return np.asarray(sd * np.sqrt((1.0 + memory) / (1.0 - memory)))
 
     def excess(self, hz: NDArray, length_s: float) -> NDArray:
-        """Return the excess of slow noise over first-order averages, (O, k) (N·m)²/Hz."""
+        """Return the excess of slow noise over first-order averages.
+
+        Parameters
+        ----------
+        hz : (k,) array
+            Hz.
+        length_s : float
+            Length of an average, s.
+
+        Returns
+        -------
+        (O, k) array
+            (N·m)²/Hz.
+        """
         sd, memory = self.averaged(length_s)
         turn = np.multiply.outer(memory, np.cos(2.0 * np.pi * hz * length_s))
         of_order_one = (sd**2 * (1.0 - memory**2) * length_s) / (1.0 + memory**2 - 2.0 * turn.T)

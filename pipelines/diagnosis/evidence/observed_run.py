@@ -47,11 +47,33 @@ class Run:
     """(m, O) N·m of the torque that blocks pass and the cut-off does not."""
 
     def average(self, full_rate: NDArray) -> NDArray:
-        """Filter and average (n, ...) at full rate to blocks, (m, ...)."""
+        """Filter and average to blocks.
+
+        Parameters
+        ----------
+        full_rate : (n, ...) array
+            At the sample rate.
+
+        Returns
+        -------
+        (m, ...) array
+            In the same unit.
+        """
         return self.block.mean(self.slow(full_rate), self.starts)
 
     def slow(self, full_rate: NDArray) -> NDArray:
-        """Return (n, ...) at full rate without content above the cut-off, if there is one."""
+        """Return the content below the cut-off, if there is one.
+
+        Parameters
+        ----------
+        full_rate : (n, ...) array
+            At the sample rate.
+
+        Returns
+        -------
+        (n, ...) array
+            In the same unit.
+        """
         return (
             full_rate
             if self.cutoff_hz is None
@@ -59,11 +81,28 @@ class Run:
         )
 
     def with_fast(self, residual: NDArray) -> NDArray:
-        """Return a residual (m, O) N·m plus the torque above the cut-off, which may hum."""
+        """Return a residual plus the torque above the cut-off, which may hum.
+
+        Parameters
+        ----------
+        residual : (m, O) array
+            N·m.
+
+        Returns
+        -------
+        (m, O) array
+            N·m.
+        """
         return residual if self.fast is None else residual + self.fast
 
     def blocks_in(self, seconds: float) -> float:
-        """Return the number of blocks in some seconds."""
+        """Return the number of blocks in some time.
+
+        Parameters
+        ----------
+        seconds : float
+            s.
+        """
         return seconds * self.motion.sample_rate_hz / self.block.decimation
 
     @property
@@ -73,7 +112,18 @@ class Run:
         return passed if self.cutoff_hz is None else min(passed, self.cutoff_hz)
 
     def measured_at(self, link: Motion) -> NDArray:
-        """Return the torque measured if the links are not where the encoders say, (m, O) N·m."""
+        """Return the torque measured if the links are not where the encoders say.
+
+        Parameters
+        ----------
+        link : Motion
+            n samples of the links.
+
+        Returns
+        -------
+        (m, O) array
+            N·m; only the cuffs' torque depends on the links.
+        """
         if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
         cuffs = self.motion.cuff_torque(link.q)
@@ -88,7 +138,20 @@ class Run:
 
 
 def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
-    """Filter and average one motion to blocks, with a low-pass where a cut-off is given."""
+    """Filter and average one motion to blocks.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+    cutoff_hz : float, optional
+        Cut-off of a low-pass before the averages, Hz.
+
+    Returns
+    -------
+    Run
+        m blocks of 2 J outputs: drives, then cuffs.
+    """
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)

@@ -102,7 +102,20 @@ class Sinusoids:
         return len(self.cycles)
 
     def with_one(self, cycles: float, amplitudes: NDArray) -> tuple["Sinusoids", "Sinusoids"]:
-        """Return the lines and one more, with zero and with given amplitudes, (r, 1, 2) N·m."""
+        """Return the lines and one more, with zero and with given amplitudes.
+
+        Parameters
+        ----------
+        cycles : float
+            Per turn, or Hz.
+        amplitudes : (r, 1, 2) array
+            Sine and cosine in each run, N·m.
+
+        Returns
+        -------
+        tuple of Sinusoids
+            With zero amplitudes, and with the given ones.
+        """
         more = replace(self, cycles=np.append(self.cycles, cycles))
         sizes = (np.zeros_like(amplitudes), amplitudes)
         without, with_it = (np.concatenate([self.amplitudes, size], axis=1) for size in sizes)
@@ -119,7 +132,20 @@ class Sinusoids:
         return replace(self, cycles=self.cycles[number : number + 1], amplitudes=amplitudes)
 
     def torque(self, waves: "_Waves", run: int) -> NDArray:
-        """Return the torque of all lines in one run, (u,) N·m."""
+        """Return the torque of all lines in one run.
+
+        Parameters
+        ----------
+        waves : _Waves
+            Sines and cosines at the run's u usable samples.
+        run : int
+            Number of the run.
+
+        Returns
+        -------
+        (u,) array
+            N·m.
+        """
         total = np.zeros(len(waves.grid.time))
         for cycles, (sine, cosine) in zip(self.cycles, self.amplitudes[run], strict=True):
             s, c = waves(self.kind, cycles)
@@ -284,7 +310,13 @@ class _Search:
         self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
 
     def remainder(self, lines: Sequence[Sinusoids]) -> list[Channel]:
-        """Return the residual in each run less the lines."""
+        """Return the residual in each run less the lines.
+
+        Parameters
+        ----------
+        lines : sequence of Sinusoids
+            Lines of each kind, N·m.
+        """
         return [
             waves.grid.channel(waves.grid.residual - sum(kind.torque(waves, r) for kind in lines))
             for r, waves in enumerate(self.waves)
@@ -299,7 +331,19 @@ class _Search:
     def added(
         self, lines: Sequence[Sinusoids], kind: Kind, cycles: float, channels: Sequence[Channel]
     ) -> list[Sinusoids]:
-        """Return lines with one more; its amplitudes come from the scores of the residual."""
+        """Return lines with one more; its amplitudes come from the scores of the residual.
+
+        Parameters
+        ----------
+        lines : sequence of Sinusoids
+            Lines of each kind.
+        kind : Kind
+            Kind of the new line.
+        cycles : float
+            Per turn, or Hz.
+        channels : sequence of Channel
+            The residual less the lines, in each run.
+        """
         if kind is Kind.TIME:
             cycles = self._sharpened(cycles, channels)
         products = np.array(
@@ -386,7 +430,24 @@ class _Search:
         spectra: Sequence[Spectrum],
         searches: int,
     ) -> tuple[Line, ...]:
-        """Return the lines that are significant in addition to all others, the strongest first."""
+        """Return the lines that are significant in addition to all others.
+
+        Parameters
+        ----------
+        lines : sequence of Sinusoids
+            Lines of each kind.
+        channels : sequence of Channel
+            The residual less all lines, in each run.
+        spectra : sequence of Spectrum
+            Spectrum of each kind.
+        searches : int
+            Number of similar searches.
+
+        Returns
+        -------
+        tuple of Line
+            The strongest first.
+        """
         significant = []
         for known, spectrum in zip(lines, spectra, strict=True):
             level = spectrum.steep_level if len(known) else spectrum.level

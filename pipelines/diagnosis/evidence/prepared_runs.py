@@ -55,7 +55,15 @@ class PreparedRuns:
 
 
 def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
-    """Fit the baseline alone, and measure the noise of its residual."""
+    """Fit the baseline alone, and measure the noise of its residual.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The searched runs.
+    baseline : Baseline
+        Rigid body, friction and known effects.
+    """
     columns = tuple(columns_under((), run, baseline)[0] for run in runs)
     gram = gram_of_runs(runs, columns)
     weights = weights_under(gram)

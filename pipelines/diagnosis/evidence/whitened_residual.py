@@ -46,7 +46,20 @@ class Trace:
 
 
 def traces_of(motion: Motion, residual: NDArray) -> list[Trace]:
-    """Return each joint's trace in a run whose residual torque is (n, J) N·m."""
+    """Return each joint's trace in a run.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+    residual : (n, J) array
+        N·m.
+
+    Returns
+    -------
+    list of Trace
+        Samples near reversals, or without a residual, are not usable.
+    """
     usable = motion.valid[:, np.newaxis] & away_from_reversals(motion) & np.isfinite(residual)
     return [
         Trace(
@@ -93,7 +106,15 @@ class Grid:
 
     @classmethod
     def of(cls, trace: Trace, slow_hz: float) -> "Grid":
-        """Place a trace on a grid, with content below ``slow_hz`` as slow."""
+        """Place a trace on a uniform grid.
+
+        Parameters
+        ----------
+        trace : Trace
+            A joint's residual in one run.
+        slow_hz : float
+            Content below counts as slow, Hz.
+        """
         used = trace.usable
         hz_per_order = np.abs(trace.speed[used]) / (2.0 * np.pi)
         place = np.round((trace.time - trace.time[0]) * trace.rate_hz).astype(int)
@@ -119,14 +140,31 @@ class Grid:
         )
 
     def channel(self, residual: NDArray) -> "Channel":
-        """Return a residual torque (u,) N·m without slow content, and its score."""
+        """Return a residual torque without slow content, and its score.
+
+        Parameters
+        ----------
+        residual : (u,) array
+            N·m.
+        """
         fast = self.fast(residual)
         spectrum = np.interp(self.hz, *noise(fast, self.mask, self.rate_hz))
         gain = self.passed * (1.0 - self.smooth) / spectrum
         return Channel(self, gain, _filtered(fast, gain)[self.place])
 
     def fast(self, torque: NDArray) -> NDArray:
-        """Return a torque (u,) without slow content on the grid, (N,) N·m."""
+        """Return a torque without slow content on the grid.
+
+        Parameters
+        ----------
+        torque : (u,) array
+            N·m.
+
+        Returns
+        -------
+        (N,) array
+            N·m.
+        """
         x = np.zeros_like(self.mask)
         x[self.place] = torque
         return (x - _filtered(x, self.smooth) / self.around) * self.mask
@@ -148,13 +186,34 @@ class Channel:
         return np.asarray(self.gain * (1.0 - self.grid.smooth))
 
     def score_of(self, torque: NDArray) -> NDArray:
-        """Return the score of another torque (u,) N·m under the same noise, (u,) 1/(N·m)."""
+        """Return the score of another torque under the same noise.
+
+        Parameters
+        ----------
+        torque : (u,) array
+            N·m.
+
+        Returns
+        -------
+        (u,) array
+            1/(N·m).
+        """
         return _filtered(self.grid.fast(torque), self.gain)[self.grid.place]
 
     def weight(self, hz: NDArray) -> NDArray:
-        """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)².
+        """Return the weight of a sample of a line.
 
         Above half of the sampling rate a line is aliased to a lower frequency.
+
+        Parameters
+        ----------
+        hz : (m,) array
+            Frequencies, Hz.
+
+        Returns
+        -------
+        (m,) array
+            1/(N·m)².
         """
         rate = self.grid.rate_hz
         folded = np.abs((hz + 0.5 * rate) % rate - 0.5 * rate)

@@ -88,7 +88,22 @@ def with_loads_of(runs: Sequence[Run], fitted: Fit, baseline: Baseline) -> list[
 
 
 def residuals_on(fitted: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
-    """Return a fit's residuals on each run that it was fitted to, (m, O) N·m."""
+    """Return a fit's residuals on each run that it was fitted to.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Causes and their values.
+    runs : sequence of Run
+        The runs of the fit, m blocks each.
+    baseline : Baseline
+        The fit's baseline.
+
+    Returns
+    -------
+    list of (m, O) arrays
+        N·m.
+    """
     columns = stacked_columns(fitted.causes, with_loads_of(runs, fitted, baseline), baseline)
     return [measured - c @ fitted.values for c, measured in columns]
 
@@ -142,7 +157,21 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
 def onsets_of(
     fitted: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline
 ) -> list[Onset]:
-    """Return for each run when a cause may begin, by its shape ``i``, all else held."""
+    """Return for each run when a cause may begin, all else held.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Causes and their values.
+    number : int
+        Number of the cause.
+    i : int
+        Number of its shape that is the onset.
+    runs : sequence of Run
+        The runs of the fit.
+    baseline : Baseline
+        The fit's baseline.
+    """
     ends = [
         fitted.instead(number, fitted.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)
     ]
@@ -190,6 +219,21 @@ def slope(
 
 
 def step_of(cause: Candidate, i: int, run: int = 0) -> float:
-    """Return the step of a difference along a shape parameter, scaled to its value in a run."""
+    """Return the step of a difference along a shape parameter.
+
+    Parameters
+    ----------
+    cause : Candidate
+        The cause.
+    i : int
+        Number of the shape.
+    run : int, optional
+        Run whose value is the scale of a wide positive range.
+
+    Returns
+    -------
+    float
+        In the shape's unit.
+    """
     low, high = cause.effect.shape[i].typical
     return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)

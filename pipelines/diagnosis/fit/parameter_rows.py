@@ -160,7 +160,15 @@ def _residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
 
 
 def residual_table(runs: Sequence[Run], by_model: Mapping[str, Sequence[NDArray]]) -> pd.DataFrame:
-    """Return ``residuals/1`` of several runs under several models, each residual (m, O) N·m."""
+    """Return ``residuals/1`` of several runs under several models.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        m blocks each.
+    by_model : mapping
+        By name of the model: a residual (m, O) of each run, N·m.
+    """
     return pd.concat(
         [
             _residual_rows(run, residual, model)

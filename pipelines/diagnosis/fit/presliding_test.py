@@ -119,7 +119,18 @@ class _About:
         return cls(motion, model, j, read, speed, rest, level, near)
 
     def remainder(self, side: "Side") -> NDArray:
-        """Return the residual near reversals with friction on that side, (near,) N·m."""
+        """Return the residual near reversals.
+
+        Parameters
+        ----------
+        side : callable
+            Return friction at each sample as a share of the Coulomb level, (n,).
+
+        Returns
+        -------
+        (near,) array
+            N·m.
+        """
         column = np.zeros((*self.motion.q.shape, 1))
         column[:, self.j, 0] = self.level * side(self)
         seen = self.model.observed(column, self.motion)[:, self.j, 0]

@@ -30,7 +30,17 @@ class ValidationResult:
 
     @classmethod
     def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "ValidationResult":
-        """Evaluate a fit on the validation runs."""
+        """Evaluate a fit on the validation runs.
+
+        Parameters
+        ----------
+        fit : Fit
+            Causes fitted to the training runs.
+        validate : sequence of Run
+            The validation runs.
+        baseline : Baseline
+            The fit's baseline.
+        """
         residuals = tuple(evaluate(fit, validate, baseline))
         return cls(fit, validate, residuals, errors_of(validate, residuals))
 
@@ -45,7 +55,18 @@ class ValidationResult:
         return bool(self.above(self.floor).any())
 
     def above(self, floor: Floor) -> NDArray:
-        """Return whether each joint's error is above a noise floor, (J,) bool."""
+        """Return whether each joint's error is above a noise floor.
+
+        Parameters
+        ----------
+        floor : Floor
+            rms of each output, N·m.
+
+        Returns
+        -------
+        (J,) bool array
+            Of the drives.
+        """
         return np.asarray(self.errors.rms > CRITERIA.at_floor * floor.rms[: len(self.errors.rms)])
 
 

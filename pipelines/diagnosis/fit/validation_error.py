@@ -36,7 +36,18 @@ class Errors:
 
 
 def scored(run: Run) -> NDArray:
-    """Return the samples that the RMSE counts: every drive's output usable, (m,) bool."""
+    """Return the blocks that the RMSE counts.
+
+    Parameters
+    ----------
+    run : Run
+        m blocks.
+
+    Returns
+    -------
+    (m,) bool array
+        Whether every drive's output is usable.
+    """
     return np.asarray(run.usable[:, : len(run.motion.joints)].all(axis=1))
 
 
@@ -82,9 +93,16 @@ class Gain:
 
 
 def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0) -> Gain:
-    """Return the gain at a joint, with an interval by resampling blocks.
+    """Return the gain at a joint, with a 95 % interval by resampling blocks.
 
-    Without a ``joint`` it is at the one that gains most.
+    Parameters
+    ----------
+    before, after : Errors
+        Errors of the same blocks without and with a cause, N·m.
+    joint : int, optional
+        The joint; that which gains most by default.
+    seed : int, optional
+        Seed of the random draws.
     """
     if joint is None:
         joint = int(np.argmax(before.rms - after.rms))

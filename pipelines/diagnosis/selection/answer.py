@@ -112,7 +112,21 @@ def in_place(
     """Return the probability of a cause with others, and of each listed cause in its place.
 
     Each set with the cause is compared with the sets that have another listed cause instead, all
-    else equal. The most probable comes first.
+    else equal.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Probabilities of sets.
+    label : str
+        The cause.
+    others : frozenset of str
+        Causes that a set must have as well.
+
+    Returns
+    -------
+    tuple
+        Probability, and by label those of rivals, the most probable first.
     """
     listed = {e.label for e in posterior.elements if not e.is_law}
     own, rivals = 0.0, dict.fromkeys(sorted(listed - others - {label}), 0.0)

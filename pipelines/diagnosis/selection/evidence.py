@@ -96,7 +96,17 @@ class Nonnegative:
 
     @classmethod
     def of(cls, library: Library, at: "_Places", count: int) -> "Nonnegative":
-        """Compute them from a library, whose columns have places among ``count``."""
+        """Compute the values of the baseline from a library.
+
+        Parameters
+        ----------
+        library : Library
+            Causes and laws.
+        at : _Places
+            Columns of the library.
+        count : int
+            Number of all columns.
+        """
         regression, chosen = library.regression, library.prepared.baseline.nonnegative
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
         # An unlisted law may contain friction itself, so it imitates none.

@@ -60,7 +60,13 @@ class MarginalLikelihood:
         return np.array([place for place, _, _ in background], dtype=int), np.array(sd)
 
     def prior(self, chosen: Sequence[int]) -> float:
-        """Return the prior log odds of a set against the empty one."""
+        """Return the prior log odds of a set against the empty one.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of elements.
+        """
         return float(of_set([self.features[i] for i in chosen]) @ self._weights)
 
     def __call__(self, chosen: Sequence[int]) -> float:
@@ -70,7 +76,15 @@ class MarginalLikelihood:
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Return the log Bayes factor of a set against the empty one.
 
-        Minus infinity where rounding makes its matrix not positive definite.
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of elements.
+
+        Returns
+        -------
+        float
+            Minus infinity where rounding makes its matrix not positive definite.
         """
         if not chosen:
             return 0.0
@@ -100,7 +114,18 @@ class MarginalLikelihood:
         return np.append(amplitude * np.array(element.variance), shapes)
 
     def sizes(self, chosen: Sequence[int]) -> NDArray:
-        """Return the share of each element of a set, (set,)."""
+        """Return the share of torque of each element of a set.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of elements.
+
+        Returns
+        -------
+        (set,) array
+            At least ``LEAST_SIZE``.
+        """
         elements = [self.evidence.elements[i] for i in chosen]
         columns = np.concatenate([self.parts[i] for i in chosen])
         largest = max(self.criteria.amplitudes) ** 2
@@ -144,7 +169,18 @@ class MarginalLikelihood:
         return float(np.sum(log_ndtr(values / spread) - log_ndtr(known.alone / np.sqrt(variance))))
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
-        """Return all pairs of elements with different labels, (p, 2), and rough log odds, (p,)."""
+        """Return all pairs of elements with different labels, and rough log odds.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of elements.
+
+        Returns
+        -------
+        tuple of arrays
+            Pairs (p, 2), and log odds (p,).
+        """
         numbers = np.asarray(chosen, dtype=int)
         labels = np.array([self.evidence.elements[i].label for i in numbers])
         one, other = np.triu_indices(len(numbers), 1)
@@ -189,7 +225,13 @@ class MarginalLikelihood:
         return np.where(sign > 0.0, odds, -np.inf)
 
     def rough(self, chosen: Sequence[int]) -> float:
-        """Return a set's log odds from its first columns alone."""
+        """Return a set's log odds from its first columns alone.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of elements, at least one.
+        """
         columns = np.concatenate([self.parts[i] for i in chosen])
         elements = [self.evidence.elements[i] for i in chosen]
         variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])

@@ -80,10 +80,17 @@ class Posterior:
         return self._with(self.log_odds + np.array(harm))
 
     def at_least(self, labels: frozenset[str], probability: float) -> "Posterior":
-        """Return the posterior where some label of a group has at least this probability.
+        """Return the posterior where some label of a group has at least a given probability.
 
         Ratios among the sets with such a label, and among those without, are kept (Jeffrey, 1965,
         The Logic of Decision, chapter 11).
+
+        Parameters
+        ----------
+        labels : frozenset of str
+            The group.
+        probability : float
+            0 to 1.
         """
         inside = np.array([not labels.isdisjoint(self.labels_of(chosen)) for chosen in self.sets])
         if not inside.any():
@@ -144,7 +151,15 @@ class Posterior:
 
 
 def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
-    """Weigh all sets of up to three elements."""
+    """Weigh all sets of up to three elements.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Products of the library's columns.
+    criteria : Criteria, optional
+        Prior odds and amplitudes.
+    """
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
     # A shape refined in a set counts in that set only: otherwise the cause would count twice.

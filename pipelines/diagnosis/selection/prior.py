@@ -35,16 +35,37 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
 
 
 def of_set(chosen: Sequence[NDArray]) -> NDArray:
-    """Return the features (f,) of a set from those of its elements, (f,) each."""
+    """Return the features of a set.
+
+    Parameters
+    ----------
+    chosen : sequence of (f,) arrays
+        Features of its elements.
+
+    Returns
+    -------
+    (f,) array
+        Their sum, and the number of further elements.
+    """
     total = np.sum(chosen, axis=0) if len(chosen) else np.zeros(len(FEATURES))
     total[FEATURES.index("further")] += max(len(chosen) - 1, 0)
     return total
 
 
 def weights(criteria: Criteria) -> NDArray:
-    """Return the log odds of one unit of each feature, (f,).
+    """Return the log odds of one unit of each feature.
 
     The base rate counts once in a set that is not empty.
+
+    Parameters
+    ----------
+    criteria : Criteria
+        Log odds by name.
+
+    Returns
+    -------
+    (f,) array
+        In the order of ``FEATURES``.
     """
     by_name = {name: getattr(criteria, name) for name in FEATURES}
     by_name["cause"] += criteria.base_rate

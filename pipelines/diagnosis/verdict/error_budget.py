@@ -28,9 +28,19 @@ it."""
 
 
 def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
-    """Return each joint's shares, (N·m)²; they add up to the square of ``baseline_rmse_nm``.
+    """Return the shares of each joint's mean square error.
 
     A cause's share, by its label, is below zero at a joint whose error it raises.
+
+    Parameters
+    ----------
+    d : Diagnosis
+        With residuals on the validation runs.
+
+    Returns
+    -------
+    dict
+        By joint and share, (N·m)²; a joint's shares add up to the square of ``baseline_rmse_nm``.
     """
     remaining = d.after.errors.rms**2
     floor = np.minimum(d.floor_rms**2, remaining)

@@ -42,7 +42,12 @@ class Unexplained:
 def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
     """Describe the residual of the validation runs, and fit a smooth term to the training runs.
 
-    ``dependences`` are those of the extended model's residual.
+    Parameters
+    ----------
+    d : Diagnosis
+        With the extended model.
+    dependences : list of Dependence
+        Of the extended model's residual.
     """
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)

@@ -32,7 +32,18 @@ class Stretch:
     end: float
 
     def within(self, time: NDArray) -> slice:
-        """Return the stretch's place among times (n,) s."""
+        """Return the stretch's place among times.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Increasing, s.
+
+        Returns
+        -------
+        slice
+            Into the times.
+        """
         first, last = np.searchsorted(time, [self.begin, self.end])
         return slice(int(first), int(last))
 

@@ -42,7 +42,19 @@ class Against:
 
 
 def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Against:
-    """Return a joint's residuals of validation runs of some kinds along a variable or ``tone``."""
+    """Return a joint's residuals of validation runs along a variable.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable, or ``tone``.
+    d : Diagnosis
+        With residuals before and after.
+    joint : str
+        Name of the joint.
+    kinds : sequence of str
+        Kinds of run to include.
+    """
     j = d.baseline.joints.index(joint)
     variable = next((v for v in VARIABLES if v.name == name), None)
     chosen = [
@@ -109,14 +121,37 @@ def _along_tone(
 
 
 def reach(*residuals: NDArray) -> float:
-    """Return the height of a panel for residuals (m,), N·m on either side of zero."""
+    """Return the height of a panel for residuals.
+
+    Parameters
+    ----------
+    *residuals : (m,) arrays
+        N·m.
+
+    Returns
+    -------
+    float
+        On either side of zero, N·m.
+    """
     return 1.1 * max(
         (float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0
     )
 
 
 def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) -> None:
-    """Draw before (grey) and, with named causes, after (blue), on the band of the noise floor."""
+    """Draw residuals before and, with named causes, after, on the band of the noise floor.
+
+    Parameters
+    ----------
+    axis : Axes
+        Where to draw.
+    seen : Against
+        Residuals along a variable, N·m.
+    floor, height : float
+        Noise floor, and height on either side of zero, N·m.
+    changed : bool
+        Whether causes are named.
+    """
     axis.axhspan(-floor, floor, color=NOISE, alpha=0.5, lw=0)
     axis.axhline(0, color="black", lw=0.6)
     step = max(1, len(seen.x) // DOTS)

@@ -75,7 +75,21 @@ def stack(
     colours: Mapping[str, str],
     scale: float = 1.0,
 ) -> None:
-    """Draw the shares end to end; negative ones, of causes that raise an error, go to the left."""
+    """Draw the shares end to end; negative ones, of causes that raise an error, go to the left.
+
+    Parameters
+    ----------
+    axis : Axes
+        Where to draw.
+    row : float
+        Height of the bar.
+    shares : mapping
+        Mean squares by share, (N·m)².
+    colours : mapping
+        Colour by share.
+    scale : float, optional
+        Length of the bar per (N·m)².
+    """
     right = left = 0.0
     whole = highest(shares) * scale
     for key, share in shares.items():
@@ -107,7 +121,18 @@ def lowest(shares: Mapping[str, float]) -> float:
 
 
 def rms(share: float) -> str:
-    """Return a mean square as root mean square, with a minus sign for a negative share."""
+    """Return a mean square as root mean square.
+
+    Parameters
+    ----------
+    share : float
+        (N·m)²; a negative one gets a minus sign.
+
+    Returns
+    -------
+    str
+        N·m.
+    """
     root = np.sqrt(abs(share))
     return (
         f"{'−' if share < 0 else ''}{root:.2f}"
