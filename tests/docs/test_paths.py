@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted(
-    path for pattern in ("*.md", "docs/**/*.md", "tests/**/README.md") for path in ROOT.glob(pattern)
-)
+PATTERNS = ("*.md", "docs/**/*.md", "datasets/**/*.md", "tests/**/*.md")
+PAGES = sorted(path for pattern in PATTERNS for path in ROOT.glob(pattern))
 IN_CODE = re.compile(r"`((?:pipelines|exoid_cli|tests|docs|datasets)/[\w./-]*)`")
 MADE = re.compile(r"`make ([a-z][a-z-]*)`")
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([\w-]+))?\)")
