@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PATTERNS = ("*.md", "docs/**/*.md", "datasets/**/*.md", "tests/**/*.md")
+PATTERNS = ("*.md", "docs/**/*.md", "datasets/**/*.md", "tests/**/README.md")
 PAGES = sorted(path for pattern in PATTERNS for path in ROOT.glob(pattern))
 IN_CODE = re.compile(r"`((?:pipelines|exoid_cli|tests|docs|datasets)/[\w./-]*)`")
 MADE = re.compile(r"`make ([a-z][a-z-]*)`")
