@@ -26,7 +26,13 @@ class Exchange:
         self._cycle = 0
 
     def refuse_signals(self) -> None:
-        """Refuse to go on where a signal asks for a stop."""
+        """Refuse to go on where a signal asks for a stop.
+
+        Raises
+        ------
+        DeviceError
+            Names the signal.
+        """
         if self._stopped_by:
             raise DeviceError(f"stopped by {self._stopped_by[0]}")
 
@@ -56,7 +62,23 @@ class Exchange:
         return self._supervisor.trackers[joint].is_stale(now)
 
     async def find(self, joint: int) -> tuple[Reading, float]:
-        """Ask a drive where it is, to go on from there; return its answer and the host's time."""
+        """Ask a drive where it is, to go on from there.
+
+        Parameters
+        ----------
+        joint : int
+            Number of the joint.
+
+        Returns
+        -------
+        tuple
+            The answer, and its time, host's clock, s.
+
+        Raises
+        ------
+        DeviceError
+            The drive did not answer, or refused.
+        """
         tracker = self._supervisor.trackers[joint]
         sent_at = tracker.sent_at
         reading, now = await self.machine.drives[joint].look(in_motion=True), time.monotonic()
@@ -67,7 +89,18 @@ class Exchange:
         return reading, now
 
     async def find_all(self) -> tuple[int, float]:
-        """Ask all drives where they are after a silence; return the first one's cycle and time."""
+        """Ask all drives where they are after a silence.
+
+        Returns
+        -------
+        tuple
+            Cycle of the first drive, and the answer's time, host's clock, s.
+
+        Raises
+        ------
+        DeviceError
+            A drive did not answer, or refused.
+        """
         (first, now), *_ = await all_answers(
             self.find(joint) for joint in range(len(self.machine.drives))
         )

@@ -19,11 +19,10 @@ the next sample is latched."""
 
 @contextmanager
 def urgent() -> Iterator[None]:
-    """Ask the system to let this process go first: a sample that is not fetched within its period
-    is lost.
+    """Ask the system to run this process first for the duration of the block.
 
-    Linux grants that to privileged users; others take their chance with whatever else the computer
-    does.
+    A sample that is not fetched within its period is lost. Linux grants that to privileged users;
+    others share the computer with its other processes.
     """
     # Else looking through all that was imported would cost several samples now and then.
     gc.freeze()

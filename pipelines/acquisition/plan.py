@@ -105,7 +105,20 @@ def check_trajectory(
 
 
 def check_start(rig: RigSettings, angle: NDArray) -> str | None:
-    """Return why the leg must not be moved from where it stands, (J,) rad; None if it may."""
+    """Return why the leg must not be moved from where it stands.
+
+    Parameters
+    ----------
+    rig : RigSettings
+        With the limits of J joints.
+    angle : (J,) array
+        Where the leg stands, rad.
+
+    Returns
+    -------
+    str or None
+        None if it may be moved.
+    """
     for drive, value in zip(rig.drive, angle, strict=True):
         low, high = drive.angle_rad
         if not low <= value <= high:

@@ -38,7 +38,18 @@ class SetPoints:
         return self.between(0, len(self))
 
     def between(self, begin: int, end: int) -> NDArray:
-        """Return set-points ``begin`` to before ``end``, (end - begin, J) rad."""
+        """Return some set-points.
+
+        Parameters
+        ----------
+        begin, end : int
+            First index, and the index before which to end.
+
+        Returns
+        -------
+        (end - begin, J) array
+            rad.
+        """
         first, stop = self.first, self.stop
         before, after = (
             self._lead_in[begin:end],
@@ -50,7 +61,12 @@ class SetPoints:
         )
 
     def pieces(self) -> Iterator[tuple[int, NDArray]]:
-        """Yield all in pieces (k, J), each with its first index; a piece begins with the last one
-        of the one before."""
+        """Yield all set-points in pieces; a piece begins with the last one of the piece before.
+
+        Yields
+        ------
+        tuple
+            Index of the first, and set-points (k, J), rad.
+        """
         for begin in range(0, len(self), PIECE):
             yield max(begin - 1, 0), self.between(max(begin - 1, 0), min(begin + PIECE, len(self)))

@@ -59,7 +59,20 @@ class Log:
         return {target: turn for target, turn in turns.items() if turn is not None}
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
-        """Return every channel, (n,) in SI, at the instants of a run; NaN where missing."""
+        """Return every channel at the instants of a run.
+
+        Parameters
+        ----------
+        run : Run
+            n instants.
+        findings : list of Finding
+            Extended by remarks on the channels.
+
+        Returns
+        -------
+        Columns
+            (n,) each, SI units; NaN where missing.
+        """
         return {
             channel.target: self._where_enabled(channel, run, findings) for channel in self.channels
         }

@@ -56,7 +56,18 @@ class Imported:
             )
 
     def write(self, folder: Path) -> None:
-        """Write the recording into a folder."""
+        """Write the recording into a folder.
+
+        Parameters
+        ----------
+        folder : Path
+            It is created if need be.
+
+        Raises
+        ------
+        ContractError
+            The recording breaks its contract.
+        """
         RECORDING.write_pieces(folder / self.file, self.pieces(), self.metadata)
 
     @property
@@ -356,7 +367,18 @@ def _metadata(
 
 
 def refuse_to_overwrite(path: Path) -> None:
-    """Refuse to overwrite another file, or a recording that was not imported."""
+    """Refuse to overwrite another file, or a recording that was not imported.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Raises
+    ------
+    ContractError
+        Names the path and its content.
+    """
     RECORDING.refuse_place(path)
     metadata = metadata_of(path)
     if metadata.get("contract") == RECORDING.label and "imported" not in metadata:

@@ -44,7 +44,18 @@ class Block:
         return [2 * word + byte for word in words for byte in (0, 1)[:: _STEP[register.byte_order]]]
 
     def decode(self, words: Sequence[int]) -> dict[str, float]:
-        """Return the SI values of ``count`` words read from ``address`` on."""
+        """Return the values of a block.
+
+        Parameters
+        ----------
+        words : sequence of int
+            ``count`` words, read from ``address`` on.
+
+        Returns
+        -------
+        dict
+            SI value by quantity.
+        """
         raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
         return {
             name: value * scale + offset
@@ -52,7 +63,18 @@ class Block:
         }
 
     def encode(self, values: Mapping[str, float]) -> list[int]:
-        """Return the ``count`` words of SI values; values beyond a register's range saturate."""
+        """Return the words of a block; values beyond a register's range saturate.
+
+        Parameters
+        ----------
+        values : mapping
+            SI value by quantity.
+
+        Returns
+        -------
+        list of int
+            ``count`` words.
+        """
         raw = []
         for name, (scale, offset), limits in zip(
             self.names, self._scales, self._ranges, strict=True
@@ -65,7 +87,18 @@ class Block:
         return list(self._words_format.unpack(packed))
 
     def span(self, name: str) -> float:
-        """Return the modulus of an unsigned register in SI units; 0 for other registers."""
+        """Return the modulus of an unsigned register.
+
+        Parameters
+        ----------
+        name : str
+            The quantity.
+
+        Returns
+        -------
+        float
+            SI units; 0 for other registers.
+        """
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0

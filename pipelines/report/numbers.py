@@ -18,7 +18,15 @@ def digits(value: float | None) -> str:
 
 
 def digits_for(value: float, half: float | None) -> str:
-    """Return a number to two digits of half its interval; like ``digits`` without an interval."""
+    """Return a number to two digits of half its interval.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    half : float or None
+        Half-width of its interval; like ``digits`` without one.
+    """
     if not half or not isfinite(half):
         return digits(value)
     return _written(value, _decimals(half, HALF_DIGITS))

@@ -86,9 +86,19 @@ class Session:
         return [one for one in self.artifacts if one.kind == kind]
 
     def file_of(self, name: str, digest: str) -> Path | None:
-        """Return the file with these bytes, of any origin; None if the folders lack it.
+        """Return the file with some bytes, of any origin.
 
-        A file that no stage wrote must also have that name.
+        Parameters
+        ----------
+        name : str
+            Its name, which counts for a file that no stage wrote.
+        digest : str
+            SHA-256 of its bytes, in hexadecimal.
+
+        Returns
+        -------
+        Path or None
+            None if the folders lack it.
         """
         for one in self.artifacts:
             if one.sha256 == digest:

@@ -27,7 +27,18 @@ class OwnClock:
         self._seen: list[Samples] = []
 
     def sampled(self, chunk: Samples) -> Samples:
-        """Add the plant's newest samples; return the device's new samples, if any."""
+        """Add the plant's newest samples; return the device's new samples.
+
+        Parameters
+        ----------
+        chunk : Samples
+            At the plant's rate.
+
+        Returns
+        -------
+        Samples
+            Interpolated at the device's instants; none between two of them.
+        """
         self._seen.append(chunk)
         latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)

@@ -18,10 +18,26 @@ LEAD_S = 4.0
 def record(
     plant: Plant, trajectory: Trajectory, duration_s: float, purpose: str = "train"
 ) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """Simulate a run of ``duration_s`` along a trajectory; return its table and metadata.
+    """Simulate a run along a trajectory.
 
     Physics and channels are those of the rig behind Modbus. The leg goes from rest into the motion
     first; the recording begins where the motion repeats.
+
+    Parameters
+    ----------
+    plant : Plant
+        The virtual machine.
+    trajectory : Trajectory
+        Of hip and knee.
+    duration_s : float
+        s.
+    purpose : str, optional
+        ``train`` or ``validate``.
+
+    Returns
+    -------
+    tuple
+        Table and metadata of ``recording/1``.
     """
     rate = plant.sample_rate_hz
     lead, count = round(LEAD_S * rate), round(duration_s * rate)

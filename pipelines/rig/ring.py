@@ -52,9 +52,16 @@ class Ring:
         self.last = sequence
 
     def show(self, registers: list[int], first: int, address: int, count: int) -> None:
-        """Write the requested part of the ring into a device's ``registers``.
+        """Write the requested part of the ring into a device's registers.
 
-        They begin at address ``first``; ``count`` of them are requested from ``address`` on.
+        Parameters
+        ----------
+        registers : list of int
+            Changed in place.
+        first : int
+            Address of the first of them.
+        address, count : int
+            First requested register, and number of registers.
         """
         low, high = max(address, self.address), min(address + count, self.address + len(self.held))
         if low < high:

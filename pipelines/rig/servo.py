@@ -75,7 +75,15 @@ class Servo:
         return word | (self._map.fault_mask & -self._map.fault_mask if self.fault else 0)
 
     def receive(self, reference: float, control: int) -> None:
-        """Accept a set-point (rad) and a control word."""
+        """Accept a set-point and a control word.
+
+        Parameters
+        ----------
+        reference : float
+            Set-point, rad.
+        control : int
+            Control word.
+        """
         # NaN would remain in the arithmetic for ever, so the drive holds instead.
         set_point = reference if isfinite(reference) else self._last
         cycles = self._cycles_to(set_point)
@@ -108,10 +116,20 @@ class Servo:
         )
 
     def next(self, angle: float) -> tuple[float, bool]:
-        """Return the set-point (rad) of the next sample, and whether the motor follows it.
+        """Return the set-point of the next sample, and whether the motor follows it.
 
-        If it does not, the set-point is the measured ``angle`` (rad), so that enabling the drive
-        causes no jump.
+        If it does not, the set-point is the measured angle, so that enabling the drive causes no
+        jump.
+
+        Parameters
+        ----------
+        angle : float
+            Measured angle, rad.
+
+        Returns
+        -------
+        tuple
+            Set-point, rad, and whether the drive is enabled.
         """
         reference = self._reference() if self.enabled else angle
         self._step, self._last = reference - self._last, reference

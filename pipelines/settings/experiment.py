@@ -58,7 +58,18 @@ class Experiment(Settings):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Return the experiment in a file; names of files in it are relative to its folder."""
+        """Return the experiment in a file; names of files in it are relative to its folder.
+
+        Parameters
+        ----------
+        path : Path or str
+            exoid.toml.
+
+        Raises
+        ------
+        SettingsError
+            Names the key that is missing or wrong.
+        """
         experiment = load_toml(path, cls)
         experiment._path = Path(path)
         return experiment
@@ -88,7 +99,13 @@ class Experiment(Settings):
         return sections
 
     def refuse_missing_files(self) -> None:
-        """Refuse names of missing files."""
+        """Refuse names of missing files.
+
+        Raises
+        ------
+        SettingsError
+            Names the key and the path.
+        """
         named = {"acquire.rig": self.acquire.rig}
         named |= {
             f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory
@@ -100,7 +117,13 @@ class Experiment(Settings):
                 raise SettingsError(f"{self._path}: {key}: {path}: no such file; {remedy}")
 
     def refuse_what_cannot_run(self) -> None:
-        """Refuse missing files, and a cut-off above the Nyquist frequency."""
+        """Refuse missing files, and a cut-off above the Nyquist frequency.
+
+        Raises
+        ------
+        SettingsError
+            Names the key and its value.
+        """
         self.refuse_missing_files()
         cutoff_hz, rate_hz = self.filter.cutoff_hz, self.acquire.sample_rate_hz
         if cutoff_hz != "auto" and cutoff_hz >= rate_hz / 2:

@@ -219,7 +219,13 @@ class JointReadingSettings(ReadingSettings):
     )
 
     def gain(self, target: str) -> float:
-        """Return the factor from a reading in SI to the quantity at the joint."""
+        """Return the factor from a reading in SI to the quantity at the joint.
+
+        Parameters
+        ----------
+        target : str
+            Dimension of the quantity.
+        """
         unit = unit_named(self.unit)
         assert unit is not None, "the joint checks its units"
         numbers = {key: getattr(self, key) for key in transmission.KEYS}

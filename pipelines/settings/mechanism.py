@@ -71,7 +71,18 @@ class MechanismSettings(Settings):
         return self
 
     def refuse_all_but_the_leg(self, command: str) -> None:
-        """Refuse other machines in a command for hip and knee alone."""
+        """Refuse other machines in a command for hip and knee alone.
+
+        Parameters
+        ----------
+        command : str
+            Name of the command, for the message.
+
+        Raises
+        ------
+        SettingsError
+            Names the mechanism and its joints.
+        """
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
                 f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg"

@@ -72,13 +72,30 @@ def effect_of_cause(cause: Mapping[str, Any]) -> Effect:
 
 
 def number(machine: Machine, torque: float) -> str:
-    """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for
-    an exoskeleton."""
+    """Return a torque or force at a joint of a machine as text.
+
+    Parameters
+    ----------
+    machine : Machine
+        Hundredths of a newton metre do for an exoskeleton.
+    torque : float
+        N·m or N.
+    """
     return f"{torque:.2f}" if machine.is_exoskeleton else f"{torque:.3g}"
 
 
 def amount(machine: Machine, joint: str, torque: float) -> str:
-    """Return a torque or force at a joint with its unit."""
+    """Return a torque or force at a joint with its unit.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    joint : str
+        Name of the joint.
+    torque : float
+        N·m or N.
+    """
     return f"{number(machine, torque)} {machine.joint(joint).unit('torque')}"
 
 

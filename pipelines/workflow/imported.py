@@ -24,7 +24,13 @@ class ImportedRuns:
     """Imported recordings that cannot be read, so that their run and purpose are unknown."""
 
     def refuse_damaged(self) -> None:
-        """Refuse to compute results without a recording that is damaged."""
+        """Refuse to compute results without a recording that is damaged.
+
+        Raises
+        ------
+        InputError
+            Names the damaged files.
+        """
         if self.damaged:
             raise InputError(damage(self.damaged))
 
@@ -80,7 +86,18 @@ def imported_in(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def refuse_imported(path: Path) -> None:
-    """Refuse to overwrite an imported recording; make's rules may be older than the import."""
+    """Refuse to overwrite an imported recording; make's rules may be older than the import.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Raises
+    ------
+    InputError
+        Names the path.
+    """
     if dict(_imported([path])):
         raise InputError(
             f"{path}: was imported, not overwritten; name another file with -o, or move it away"
@@ -88,7 +105,18 @@ def refuse_imported(path: Path) -> None:
 
 
 def refuse_recorded(path: Path) -> None:
-    """Refuse to overwrite a real rig's recording; a virtual leg's can be recorded again."""
+    """Refuse to overwrite a real rig's recording; a virtual leg's can be recorded again.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Raises
+    ------
+    InputError
+        Names the path and the rig.
+    """
     rig = metadata_of(path).get("config", {}).get("rig", {})
     if rig and not rig["embedded"]:
         raise InputError(

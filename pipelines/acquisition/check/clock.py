@@ -31,7 +31,22 @@ class Clock:
 
 
 def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
-    """Measure counter and clock over ``seconds``, from the first answer to the last."""
+    """Measure counter and clock from the first answer to the last.
+
+    Parameters
+    ----------
+    probe : Probe
+        The device.
+    series : Series
+        Its answers.
+    seconds : float
+        Time between first and last answer, host's clock, s.
+
+    Returns
+    -------
+    Clock
+        Rates in Hz, or None where they are unknown, and the usual step of the counter.
+    """
     counter = series.counted("sequence")
     steps = np.diff(counter)
     steps = steps[steps != 0]
@@ -163,7 +178,20 @@ def _keeps_time(time: NDArray, seconds: float) -> bool:
 
 
 def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
-    """Yield a finding if registers that are not latched change while the counter does not."""
+    """Yield a finding if registers that are not latched change while the counter does not.
+
+    Parameters
+    ----------
+    probe : Probe
+        The device.
+    series : Series
+        Its answers.
+
+    Yields
+    ------
+    Finding
+        At most one, with the names of the registers.
+    """
     if len(series.fresh) < 2:  # this needs a counter that counts
         return
     same = np.diff(series.words[:, _places(series, "sequence")], axis=0) == 0

@@ -22,7 +22,13 @@ class Latency:
 
     @classmethod
     def of(cls, durations: NDArray) -> "Latency":
-        """Summarize durations (n,), s."""
+        """Summarize durations.
+
+        Parameters
+        ----------
+        durations : (n,) array
+            s, at least one.
+        """
         least, median, p99, most = np.quantile(durations, [0.0, 0.5, 0.99, 1.0])
         counts, _ = np.histogram(np.log(durations), BINS, (np.log(least), np.log(most) + 1e-12))
         return cls(

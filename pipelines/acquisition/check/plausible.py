@@ -47,13 +47,33 @@ class Expectation:
     """Largest change a second."""
 
     def holds(self, values: NDArray) -> NDArray:
-        """Mark the values (n,) that are possible."""
+        """Return which values are possible.
+
+        Parameters
+        ----------
+        values : (n,) array
+            In SI units.
+
+        Returns
+        -------
+        (n,) bool array
+            True within the bounds.
+        """
         return has_plausible_size(values) & (values >= self.low) & (values <= self.high)
 
     def leaps(self, values: NDArray, seconds: NDArray, period_s: float) -> bool:
-        """Return whether values (n,) read at instants (n,) s change faster than possible.
+        """Return whether values change faster than possible.
 
-        Two answers that come soon after each other may be a ``period_s`` apart.
+        Two answers that come soon after each other may be a period apart.
+
+        Parameters
+        ----------
+        values : (n,) array
+            In SI units.
+        seconds : (n,) array
+            When they were read, s.
+        period_s : float
+            Time between samples, s.
         """
         with np.errstate(invalid="ignore", over="ignore"):
             return bool(
@@ -65,7 +85,22 @@ class Expectation:
 
 
 def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
-    """Yield findings about all registers except counter and clock, from one answer or more."""
+    """Yield findings about all registers except counter and clock.
+
+    Parameters
+    ----------
+    probe : Probe
+        The device.
+    series : Series
+        One answer or more.
+    rig : RigSettings
+        With the limits of the joints.
+
+    Yields
+    ------
+    Finding
+        Faults that are active, and values that are not possible at rest.
+    """
     if isinstance(probe.part, Drive):
         yield from _check_faults(probe, probe.part, series)
         expected = _of_drive(probe.part.settings, probe.in_lockstep)
@@ -77,7 +112,18 @@ def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[
 
 
 def has_plausible_size(values: NDArray) -> NDArray:
-    """Mark the values (n,) that are finite and of a credible magnitude."""
+    """Return which values are finite and of a credible magnitude.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In SI units.
+
+    Returns
+    -------
+    (n,) bool array
+        True for zero, and for a size between ``TINY`` and ``HUGE``.
+    """
     size = np.abs(values)
     return np.isfinite(values) & ((size == 0.0) | ((size > TINY) & (size < HUGE)))
 

@@ -29,7 +29,22 @@ class Series:
     def of(
         self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
     ) -> NDArray:
-        """Return a quantity's values (n,) in SI units, decoded as another ``register`` if given."""
+        """Return a quantity's values.
+
+        Parameters
+        ----------
+        name : str
+            The quantity.
+        register : Register, optional
+            Another way to decode it.
+        bytes_swapped : bool, optional
+            Whether to swap the bytes of each word.
+
+        Returns
+        -------
+        (n,) array
+            In SI units.
+        """
         register = register or self.block.registers[name]
         one = Block({name: register})
         start = register.address - self.block.address
@@ -41,7 +56,22 @@ class Series:
     def counted(
         self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
     ) -> NDArray:
-        """Return the values (n,) of a counter or clock without wraparounds, SI units."""
+        """Return the values of a counter or clock without wraparounds.
+
+        Parameters
+        ----------
+        name : str
+            The quantity.
+        register : Register, optional
+            Another way to decode it.
+        bytes_swapped : bool, optional
+            Whether to swap the bytes of each word.
+
+        Returns
+        -------
+        (n,) array
+            In SI units.
+        """
         unwrapped = Unwrapper(Block({name: register or self.block.registers[name]}).span(name))
         values = self.of(name, register, bytes_swapped=bytes_swapped)
         return np.array([unwrapped(value) for value in values])
@@ -106,7 +136,13 @@ class Probe:
         return self.block.decode(self._last)
 
     def take(self) -> Series:
-        """Return the answers since the last call, and forget them."""
+        """Return the answers since the last call, and forget them.
+
+        Returns
+        -------
+        Series
+            n answers; none where there was none.
+        """
         answers, self._answers = self._answers, []
         asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
         shaped = np.array(words, dtype=np.int64).reshape(len(answers), self.block.count)

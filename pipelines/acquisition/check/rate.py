@@ -63,7 +63,20 @@ async def cycles(
 
 
 def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
-    """Yield a finding where the lines are too slow for the experiment's rate."""
+    """Yield a finding where the lines are too slow for the experiment's rate.
+
+    Parameters
+    ----------
+    rate, drives : Rate
+        Measured with all devices, and with drives alone.
+    rate_hz : float
+        The experiment's sample rate, Hz.
+
+    Yields
+    ------
+    Finding
+        At most one, with a remedy.
+    """
     if rate.cycles_hz >= rate_hz and rate.late <= MOST_LATE:
         return
     enough = drives.cycles_hz >= rate_hz and drives.late <= MOST_LATE

@@ -33,12 +33,26 @@ class Bounds:
         self._last: tuple[float, float] | None = None
 
     def add(self, sequence: int, sent: float, received: float) -> None:
-        """Add a request sent and answered at these times (s), with its newest sample's number."""
+        """Add a request's bounds.
+
+        Parameters
+        ----------
+        sequence : int
+            Number of the newest sample in its answer.
+        sent, received : float
+            Host's clock, s.
+        """
         self._latest = min(self._latest, received - sequence * self._period_s)
         self._earliest = max(self._earliest, sent - (sequence + 1) * self._period_s)
 
     def close(self) -> tuple[float, float] | None:
-        """Return origin and width of the bounds (s), None without replies; then start again."""
+        """Return the bounds, then start again.
+
+        Returns
+        -------
+        tuple of float or None
+            Origin and width, s; None without replies.
+        """
         if not np.isfinite(self._latest):
             return None
         self._last = self.now()
@@ -46,12 +60,29 @@ class Bounds:
         return self._last
 
     def now(self) -> tuple[float, float]:
-        """Return origin and width of the bounds (s) so far."""
+        """Return the bounds so far.
+
+        Returns
+        -------
+        tuple of float
+            Origin and width, s.
+        """
         # Over a longer time a drift can bring the bounds past each other.
         return (self._latest + self._earliest) / 2, max(self._latest - self._earliest, 0.0)
 
     def until_next_sample(self, now: float) -> float | None:
-        """Return the time until the drive's next sample (s); None while that is unknown."""
+        """Return the time until the drive's next sample.
+
+        Parameters
+        ----------
+        now : float
+            Host's clock, s.
+
+        Returns
+        -------
+        float or None
+            s; None while that is unknown.
+        """
         if self._last is None:
             return None
         return (self._last[0] - now) % self._period_s
@@ -89,7 +120,15 @@ class Drift:
         self.estimate: Estimate | None = None
 
     def add(self, sequence: int, first: tuple[float, float], other: tuple[float, float]) -> None:
-        """Add both drives' bounds (origin, width; s) near a sample of the first drive."""
+        """Add both drives' bounds near a sample of the first drive.
+
+        Parameters
+        ----------
+        sequence : int
+            Number of that sample.
+        first, other : tuple of float
+            Origin and width, s.
+        """
         lead = (first[0] - other[0]) * self._rate_hz
         width = np.hypot(first[1], other[1]) * self._rate_hz
         if self._origin is None:

@@ -14,10 +14,22 @@ MOST_LOOKS = 200
 
 
 async def find_leads(drives: Sequence[Drive], rate_hz: float) -> list[int | None]:
-    """Return the samples by which each drive is ahead of the first; None where that is unclear.
+    """Return the samples by which each drive is ahead of the first.
 
     Each reply bounds a lead. Where the drives' clocks give a lead within these bounds, they show
     the same time, and it is that one; else the bounds must leave a single whole number.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        At least one.
+    rate_hz : float
+        Sample rate, Hz.
+
+    Returns
+    -------
+    list
+        Samples, 0 for the first; None where a lead is unclear.
     """
     all_bounds = [Bounds(1.0 / rate_hz) for _ in drives]
     for drive, bounds in zip(drives, all_bounds, strict=True):

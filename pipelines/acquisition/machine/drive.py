@@ -72,7 +72,23 @@ class Drive:
         return frozenset(always | ring | ({"temperature"} & reported))
 
     async def look(self, *, in_motion: bool = False) -> Reading:
-        """Read the drive without writing to it."""
+        """Read the drive without writing to it.
+
+        Parameters
+        ----------
+        in_motion : bool, optional
+            Whether to use the short time-out of a moving leg.
+
+        Returns
+        -------
+        Reading
+            SI units.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or the drive refused.
+        """
         asked = time.perf_counter()
         block = self.read_block
         words = await self.device.read(block.address, block.count, in_motion=in_motion)
@@ -101,7 +117,23 @@ class Drive:
         return self._note_newest(self._decode(block, words)["sequence"], asked)
 
     async def drain(self, newest: int) -> list[Reading]:
-        """Return new samples of the drive's own record up to number ``newest``, oldest first."""
+        """Return new samples of the drive's own record.
+
+        Parameters
+        ----------
+        newest : int
+            Number of the newest sample.
+
+        Returns
+        -------
+        list of Reading
+            Oldest first.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or the drive refused.
+        """
         assert self.ring  # only drives with recorders are drained
         return [self._of_ring(number, record) for number, record in await self.ring.drain(newest)]
 
@@ -110,7 +142,25 @@ class Drive:
         return self.ring is None or await self.ring.forget()
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
-        """Send a set-point (rad) and return the latched sample; ``halt`` sends the halt word."""
+        """Send a set-point and return the latched sample.
+
+        Parameters
+        ----------
+        reference : float
+            Set-point, rad.
+        halt : bool, optional
+            Whether to send the halt word.
+
+        Returns
+        -------
+        Reading
+            SI units.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or the drive refused.
+        """
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
         self.was_sent = True
@@ -124,7 +174,22 @@ class Drive:
         return reading
 
     async def write_idle(self, control: int, angle: float, *, in_motion: bool = False) -> None:
-        """Write a control word to a drive that shall not follow; its leg is at ``angle`` (rad)."""
+        """Write a control word to a drive that shall not follow.
+
+        Parameters
+        ----------
+        control : int
+            The control word.
+        angle : float
+            Where its leg is, rad.
+        in_motion : bool, optional
+            Whether to use the short time-out of a moving leg.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or the drive refused.
+        """
         words = await self.idle_words(control, angle)
         await self.device.write(self.write_block, words, in_motion=in_motion)
 
@@ -147,9 +212,21 @@ class Drive:
         return self._encode(control, min(max(reference, low + half), high - half))
 
     async def idle_words(self, control: int, angle: float) -> list[int]:
-        """Return the registers of a control word for a drive whose leg is at ``angle`` (rad).
+        """Return the registers of a control word for a drive that shall not follow.
 
-        Where that angle is outside the limits, the set-point is the one that the drive holds.
+        Where the leg is outside its limits, the set-point is the one that the drive holds.
+
+        Parameters
+        ----------
+        control : int
+            The control word.
+        angle : float
+            Where its leg is, rad.
+
+        Returns
+        -------
+        list of int
+            Words of the write block.
         """
         low, high = self.settings.angle_rad
         if low <= angle <= high:

@@ -173,6 +173,18 @@ class Machine:
         In lockstep the exchange with the drives ends a sample, so sensors are read before it. In
         real time the drives report when a new sample begins, so sensors are read after it. Nothing
         is sent twice, since a set-point that comes late is wrong by then.
+
+        Parameters
+        ----------
+        number : int
+            Number of the cycle, by which sensors take turns.
+        send : callable
+            Send one drive its set-point, and return its reading.
+
+        Returns
+        -------
+        Answers
+            ``row`` is None where an answer is missing.
         """
         if self.rig.clock == "lockstep":
             forces = await self.cuff_forces(number)
@@ -264,7 +276,23 @@ async def _answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[An
 
 
 async def all_answers(requests: Iterable[Awaitable[Answer]]) -> list[Answer]:
-    """Wait for all requests and return their answers; raise where one is missing."""
+    """Wait for all requests and return their answers.
+
+    Parameters
+    ----------
+    requests : iterable of awaitable
+        They run concurrently.
+
+    Returns
+    -------
+    list
+        In the order of the requests.
+
+    Raises
+    ------
+    Unanswered
+        An answer is missing.
+    """
     answers: list[Answer] = []
     for answer in await _answers_or_timeouts(requests):
         if isinstance(answer, Unanswered):

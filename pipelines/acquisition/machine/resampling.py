@@ -44,9 +44,19 @@ class Track:
         return self.newest is None or self.newest < needed
 
     def at(self, position: float) -> Reading | None:
-        """Interpolate the samples at a position; None where a neighbouring sample is missing.
+        """Interpolate the samples at a position.
 
         By a cubic through the four samples around it, or linearly where an outer one is missing.
+
+        Parameters
+        ----------
+        position : float
+            Fractional sample number of this drive.
+
+        Returns
+        -------
+        Reading or None
+            None where a neighbouring sample is missing.
         """
         base = floor(position)
         x = position - base
@@ -79,6 +89,16 @@ class Alignment:
         """Add each drive's new samples; return the rows that are complete now.
 
         A row for which one drive lacks a sample is left out: gaps are not interpolated.
+
+        Parameters
+        ----------
+        samples : sequence of sequences of Reading
+            New samples of each drive, oldest first.
+
+        Returns
+        -------
+        list of tuples of Reading
+            At the first drive's instants, oldest first.
         """
         self._first.extend(samples[0])
         for track, readings in zip(self._tracks, samples[1:], strict=True):

@@ -32,13 +32,35 @@ class Sampling(Protocol):
     """Decides which rows are recorded."""
 
     async def rows(self, row: Row) -> list[Row]:
-        """Return the rows that are complete with this cycle's row, oldest first."""
+        """Return the rows that are complete with this cycle's row.
+
+        Parameters
+        ----------
+        row : Row
+            The cycle's sample of all drives.
+
+        Returns
+        -------
+        list of Row
+            Oldest first.
+        """
 
     def end(self) -> None:
         """Cancel all requests to the drives besides those of the cycle."""
 
     def clocks(self, since_s: float) -> dict[str, dict]:
-        """Return each drive's clock error by joint; offsets are at ``since_s``, first clock."""
+        """Return each drive's clock error.
+
+        Parameters
+        ----------
+        since_s : float
+            First drive's clock, at which offsets are given, s.
+
+        Returns
+        -------
+        dict
+            By joint; empty where there is one clock.
+        """
 
 
 class LatchedSampling:
@@ -227,9 +249,17 @@ class AlignedSampling:
                 drift.add(row.drives[0].sequence, first, other)
 
     def clocks(self, since_s: float) -> dict[str, dict]:
-        """Return offset and rate of each drive's clock against the first one's, by joint.
+        """Return offset and rate of each drive's clock against the first one's.
 
-        The offset is that at ``since_s`` of the first drive's clock.
+        Parameters
+        ----------
+        since_s : float
+            First drive's clock, at which offsets are given, s.
+
+        Returns
+        -------
+        dict
+            By joint: offsets in s, rates in ppm.
         """
         clocks: dict[str, dict] = {}
         for j, drift in enumerate(self._drifts, start=1):

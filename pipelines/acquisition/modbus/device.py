@@ -86,7 +86,25 @@ class Device:
                 )
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
-        """Read words by FC03; ``in_motion`` with the short time-out of a moving leg."""
+        """Read words by FC03.
+
+        Parameters
+        ----------
+        address, count : int
+            First register, and number of registers.
+        in_motion : bool, optional
+            Whether to use the short time-out of a moving leg.
+
+        Returns
+        -------
+        list of int
+            The words.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
         action = f"reading registers {address} to {address + count - 1}"
         time_out = self._in_motion if in_motion else self._at_rest
         request = self._client.read_holding_registers
@@ -113,14 +131,49 @@ class Device:
         return registers
 
     async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
-        """Write a block by FC16; ``in_motion`` with the short time-out of a moving leg."""
+        """Write a block by FC16.
+
+        Parameters
+        ----------
+        block : Block
+            Registers to write.
+        words : sequence of int
+            One for each register.
+        in_motion : bool, optional
+            Whether to use the short time-out of a moving leg.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
         action = f"writing registers {_range(block)}"
         time_out = self._in_motion if in_motion else self._write
         request = self._client.write_registers
         await self._ask(action, None, time_out, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
-        """Write one block and read another in one FC23 exchange."""
+        """Write one block and read another in one FC23 exchange.
+
+        Parameters
+        ----------
+        write : Block
+            Registers to write.
+        words : sequence of int
+            One for each register to write.
+        read : Block
+            Registers to read.
+
+        Returns
+        -------
+        list of int
+            The words read.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
         action = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
         return await self._ask(
             action,

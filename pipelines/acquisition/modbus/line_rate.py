@@ -31,11 +31,24 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
 
 
 def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
-    """Return the highest sample rate, Hz, and the line that limits it.
+    """Return the highest sample rate of a rig's lines.
 
     A cycle reads the first drive's counter, exchanges with all drives, then reads the sensors that
     are due and drains drives that record themselves. Lines work concurrently, devices on one line
-    take turns. Infinity and None where no line's speed is known.
+    take turns.
+
+    Parameters
+    ----------
+    rig : RigSettings
+        Devices and lines.
+    with_sensors : bool
+        Whether force sensors are read.
+
+    Returns
+    -------
+    tuple
+        Rate, Hz, and name of the line that limits it; infinity and None where no line's speed is
+        known.
     """
     first = rig.drive[0]
     look = rig.line_of(first).exchange_s(
@@ -85,7 +98,20 @@ def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
 
 
 def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
-    """Return the time of one full read of a drive's own record, s, and its number of samples."""
+    """Return the effort of one full read of a drive's own record.
+
+    Parameters
+    ----------
+    line : LineSettings
+        The drive's line.
+    registers : DriveMap
+        With the ring of the drive.
+
+    Returns
+    -------
+    tuple
+        Time, s, and number of samples.
+    """
     ring = registers.ring
     assert ring  # the rig file is checked: with recorders, every drive has one
     brings = ring.records_per_read

@@ -64,9 +64,24 @@ class Ring:
         return True
 
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
-        """Return new records up to number ``newest``, each with its sequence number.
+        """Return new records.
 
         The first drain returns none: records begin after it.
+
+        Parameters
+        ----------
+        newest : int
+            Number of the drive's newest sample.
+
+        Returns
+        -------
+        list of tuples
+            Sequence number and record, oldest first.
+
+        Raises
+        ------
+        DeviceError
+            The drive did not answer, or refused.
         """
         first = newest + 1 if self._next is None else max(self._next, newest + 1 - self._capacity)
         newest = min(newest, first + self._most - 1)
@@ -140,9 +155,24 @@ class Queue:
         return False
 
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
-        """Return new records, each with its sequence number; ``newest`` is the drive's newest one.
+        """Return new records.
 
         Records from before the first drain are discarded.
+
+        Parameters
+        ----------
+        newest : int
+            Number of the drive's newest sample.
+
+        Returns
+        -------
+        list of tuples
+            Sequence number and record, oldest first.
+
+        Raises
+        ------
+        DeviceError
+            The drive did not answer, or refused.
         """
         if self._began is None:
             self._began = newest

@@ -7,9 +7,16 @@ CLOCK_SAMPLES = 0.5
 
 
 def unwrap(value: float, near: float, span: float) -> float:
-    """Return a value plus the multiple of its register's ``span`` that is closest to ``near``.
+    """Return a value plus the multiple of its register's span that is closest to another.
 
-    A ``span`` of 0 is that of a register without wraparound.
+    Parameters
+    ----------
+    value : float
+        As the register shows it.
+    near : float
+        Where the result is expected.
+    span : float
+        Modulus of the register; 0 for one without wraparound.
     """
     return value + span * round((near - value) / span) if span else value
 
@@ -28,5 +35,15 @@ class Unwrapper:
 
 
 def keeps_time(samples: float, seconds: float, rate_hz: float) -> bool:
-    """Return whether a clock advanced by as much as its sample counter."""
+    """Return whether a clock advanced by as much as its sample counter.
+
+    Parameters
+    ----------
+    samples : float
+        Advance of the counter.
+    seconds : float
+        Advance of the clock, s.
+    rate_hz : float
+        Sample rate, Hz.
+    """
     return abs(seconds * rate_hz - samples) <= CLOCK_SAMPLES + RATE_TOLERANCE * abs(samples)

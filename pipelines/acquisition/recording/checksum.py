@@ -15,13 +15,29 @@ _CHECKSUM = re.compile(rb"exoid-batch:([0-9a-f]{8})")
 
 
 def with_checksum(batch: bytes, head: bytes) -> bytes:
-    """Return a batch of a stream with its checksum in place of ``BLANK``."""
+    """Return a batch of a stream with its checksum in place of ``BLANK``.
+
+    Parameters
+    ----------
+    batch : bytes
+        With ``BLANK`` in its metadata.
+    head : bytes
+        The stream's head, which the checksum covers too.
+    """
     place = batch.index(BLANK) + len(BLANK) - 8
     return b"%b%08x%b" % (batch[:place], crc32(batch, crc32(head)), batch[place + 8 :])
 
 
 def fits(batch: bytes, head: bytes) -> bool:
-    """Return whether a batch has the checksum of its bytes and this head."""
+    """Return whether a batch has the checksum of its bytes and its head.
+
+    Parameters
+    ----------
+    batch : bytes
+        As read from a journal.
+    head : bytes
+        The journal's head.
+    """
     match = _CHECKSUM.search(batch)
     if match is None:
         return False

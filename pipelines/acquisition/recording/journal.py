@@ -82,7 +82,13 @@ class Journal:
             raise OSError(f"{MOST_WAITING} samples wait for the disk, which does not answer")
 
     def flush(self) -> None:
-        """Write the waiting samples; return when the operating system has them."""
+        """Write the waiting samples; return when the operating system has them.
+
+        Raises
+        ------
+        OSError
+            The disk is full or fails; the samples go on waiting.
+        """
         with self._writing:
             rows = [self._waiting.popleft() for _ in range(len(self._waiting))]
             if not rows:
@@ -114,9 +120,14 @@ class Journal:
             )
 
     def end(self, abort: str | None, metadata: Mapping[str, Any] | None = None) -> None:
-        """Set the last words: why the run was stopped early, None if it was not, and ``metadata``.
+        """Set the last words of a journal; that of a killed run has none.
 
-        The journal of a killed run has no last words.
+        Parameters
+        ----------
+        abort : str or None
+            Why the run was stopped early; None if it was not.
+        metadata : mapping, optional
+            Metadata of the run, known at its end.
         """
         words = {ABORT: abort or "", METADATA: json.dumps(metadata or {}), ROWS: str(self.rows)}
         self._last_words = {key: word.encode() for key, word in words.items()}

@@ -55,7 +55,23 @@ class JournalSummary:
 
 
 def summarize(journal: JournalFile) -> JournalSummary:
-    """Count a journal's samples, and those that are missing according to the device's counter."""
+    """Count a journal's samples, and those that are missing according to the device's counter.
+
+    Parameters
+    ----------
+    journal : JournalFile
+        The journal of one run.
+
+    Returns
+    -------
+    JournalSummary
+        Samples, gaps (time in s and number), and why the run ended.
+
+    Raises
+    ------
+    ContractError
+        The journal's metadata or columns are not those of a run.
+    """
     _refuse_other_columns(journal)
     rate_hz = _positive(journal, "sample_rate_hz")
     seconds = _positive(journal, "config", "run", "duration_s")
@@ -139,7 +155,19 @@ def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
 
 
 def write_recording(journal: JournalFile, path: Path, summary: JournalSummary, **more: Any) -> None:
-    """Write a journal's samples as ``recording/1``, with ``more`` in its metadata."""
+    """Write a journal's samples as ``recording/1``.
+
+    Parameters
+    ----------
+    journal : JournalFile
+        The journal of one run.
+    path : Path
+        The file to write.
+    summary : JournalSummary
+        Of the same journal.
+    **more
+        Further metadata.
+    """
     metadata = journal.metadata | summary.metadata | {"gaps": summary.gaps}
     if summary.abort:
         metadata["abort"] = summary.abort
@@ -151,9 +179,21 @@ def write_recording(journal: JournalFile, path: Path, summary: JournalSummary, *
 
 
 def recording_path(output: Path, abort: str | None) -> Path:
-    """Return the path of a recording: for a stopped run the first free ``.aborted`` name.
+    """Return the path of a recording.
 
     So that no one, make included, takes the recording of a stopped run for a complete one.
+
+    Parameters
+    ----------
+    output : Path
+        Path of a complete recording.
+    abort : str or None
+        Why the run was stopped, if it was.
+
+    Returns
+    -------
+    Path
+        For a stopped run the first free ``.aborted`` name.
     """
     if not abort:
         return output

@@ -31,6 +31,16 @@ class EnableState:
         """Note a report; return the reason to stop where the drive has a fault or dropped out.
 
         A drive with a fault counts as not enabled: it may be again as soon as the fault is cleared.
+
+        Parameters
+        ----------
+        status : DriveStatus
+            The drive's report.
+
+        Returns
+        -------
+        str or None
+            None where there is no reason to stop.
         """
         dropped = bool(self.enabled) and status.enabled is False
         if status.enabled is not None:
@@ -60,16 +70,51 @@ class EnableStates:
         return [state.joint for state in self._states if state.enabled is False]
 
     def update(self, joint: int, status: DriveStatus) -> None:
-        """Note one drive's report; raise DeviceError where it is a reason to stop."""
+        """Note one drive's report.
+
+        Parameters
+        ----------
+        joint : int
+            Number of the joint.
+        status : DriveStatus
+            The drive's report.
+
+        Raises
+        ------
+        DeviceError
+            The report is a reason to stop.
+        """
         self._update([(joint, status)])
 
     def update_all(self, samples: Row | Answers) -> None:
-        """Note the reports of samples; raise DeviceError where one is a reason to stop."""
+        """Note the reports of samples.
+
+        Parameters
+        ----------
+        samples : Row or Answers
+            One sample of each drive, as far as they answered.
+
+        Raises
+        ------
+        DeviceError
+            A report is a reason to stop.
+        """
         answers = enumerate(samples.drives)
         self._update((joint, one) for joint, one in answers if isinstance(one, Reading))
 
     def update_records(self, records: Sequence[Sequence[Reading]]) -> None:
-        """Note the reports of records, by joint; raise DeviceError for a reason to stop."""
+        """Note the reports of records.
+
+        Parameters
+        ----------
+        records : sequence of sequences of Reading
+            Samples of each drive.
+
+        Raises
+        ------
+        DeviceError
+            A report is a reason to stop.
+        """
         self._update((joint, one) for joint, samples in enumerate(records) for one in samples)
 
     def _update(self, reports: Iterable[tuple[int, DriveStatus]]) -> None:

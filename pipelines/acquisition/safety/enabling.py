@@ -35,7 +35,13 @@ class Enabling:
         """Where the leg stood when the plan was made, (J,) rad."""
 
     def start_at(self, angles: Sequence[float]) -> None:
-        """Enable the drives at these angles, (J,) rad."""
+        """Enable the drives where the leg stands.
+
+        Parameters
+        ----------
+        angles : (J,) sequence of float
+            rad.
+        """
         self._start = list(angles)
         for tracker, angle in zip(self._trackers, angles, strict=True):
             tracker.start_at(angle)

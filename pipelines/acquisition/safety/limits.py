@@ -34,7 +34,18 @@ class Limits:
         """By drive, its last sample."""
 
     def violation(self, samples: Row | Answers) -> str | None:
-        """Return which limit samples break, None if they keep all."""
+        """Return which limit samples break.
+
+        Parameters
+        ----------
+        samples : Row or Answers
+            One sample of each drive, as far as they answered, and cuff forces.
+
+        Returns
+        -------
+        str or None
+            None if they keep all.
+        """
         samples_hz = self._rate * self._samples_per_cycle
         for j, (drive, reading) in enumerate(zip(self._rig.drive, samples.drives, strict=True)):
             if isinstance(reading, Reading):
@@ -54,9 +65,21 @@ class Limits:
     def straying(
         self, samples: Row | Answers, set_points: Sequence[float], late: int = 0
     ) -> str | None:
-        """Return which joint is too far from its set-point, (J,) rad, None if none is.
+        """Return which joint is too far from its set-point.
 
-        A drive that was sent nothing for so many samples ``late`` may have gone on meanwhile.
+        Parameters
+        ----------
+        samples : Row or Answers
+            One sample of each drive, as far as they answered.
+        set_points : (J,) sequence of float
+            rad.
+        late : int, optional
+            Cycles in which a drive was sent nothing, so that it may have gone on.
+
+        Returns
+        -------
+        str or None
+            None if none is.
         """
         for drive, reading, reference in zip(
             self._rig.drive, samples.drives, set_points, strict=True
@@ -89,8 +112,18 @@ class Limits:
         return None
 
     def force_violation(self, forces: NDArray) -> str | None:
-        """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new
-        sample."""
+        """Return which force is above the limit.
+
+        Parameters
+        ----------
+        forces : (4, 3) array
+            N; a row of NaN is a sensor without a new sample.
+
+        Returns
+        -------
+        str or None
+            None if none is.
+        """
         most = self._rig.safety.cuff_force_n
         for cuff, force in zip(CUFFS, forces.tolist(), strict=True):
             if all(map(isnan, force)):
@@ -104,7 +137,22 @@ class Limits:
 def sample_violation(
     drive: DriveSettings, before: Reading, reading: Reading, samples_hz: float
 ) -> str | None:
-    """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
+    """Return which limit of its joint a drive's sample breaks.
+
+    Parameters
+    ----------
+    drive : DriveSettings
+        With the limits: rad, rad/s and N·m.
+    before, reading : Reading
+        The sample before, and the sample to check.
+    samples_hz : float
+        Samples of the drive a second, Hz.
+
+    Returns
+    -------
+    str or None
+        None if it keeps them all.
+    """
     low, high = drive.angle_rad
     if not low <= reading.angle <= high:
         return (
@@ -132,11 +180,24 @@ def sample_violation(
 
 
 def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: float) -> None:
-    """Refuse a set-point (rad) that no planned motion may ask for.
+    """Refuse a set-point that no planned motion may ask for.
 
     It stands between the plan and the line. Whatever went wrong before, a set-point is a number,
-    within its joint's limits, and no further from the ``last`` one than its speed limit leads in
-    the time that it is allowed, s.
+    within its joint's limits, and no further from the last one than its speed limit leads in time.
+
+    Parameters
+    ----------
+    drive : DriveSettings
+        With the limits of the joint.
+    last, reference : float
+        The last set-point, and the one to check, rad.
+    allowed_s : float
+        Time to move between them, s.
+
+    Raises
+    ------
+    DeviceError
+        Names the joint, the set-point and the limit.
     """
     low, high = drive.angle_rad
     if not low <= reference <= high:
@@ -161,7 +222,22 @@ def clamped(value: float, low: float, high: float) -> float:
 def slowed(
     reference: float, speed: float, deceleration: float, time_s: float
 ) -> tuple[float, float]:
-    """Return set-point (rad) and speed (rad/s) after some time of slowing down to rest."""
+    """Return set-point and speed after some time of slowing down to rest.
+
+    Parameters
+    ----------
+    reference, speed : float
+        At the beginning, rad and rad/s.
+    deceleration : float
+        rad/s², positive.
+    time_s : float
+        s.
+
+    Returns
+    -------
+    tuple of float
+        rad and rad/s.
+    """
     moving_s = min(time_s, abs(speed) / deceleration)
     path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)
     remaining = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0

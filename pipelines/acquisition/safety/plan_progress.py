@@ -44,7 +44,20 @@ class PlanProgress:
         self.cycle, self.followed_at = cycle, now
 
     def due(self, joint: int, cycle: int) -> Path:
-        """Return a joint's set-points due at a cycle and at the two before it, rad."""
+        """Return a joint's set-points due at a cycle and at the two before it.
+
+        Parameters
+        ----------
+        joint : int
+            Number of the joint.
+        cycle : int
+            Cycle of the machine.
+
+        Returns
+        -------
+        Path
+            Three set-points, rad, the newest first.
+        """
         now, before, earlier = (self._at(self._index(cycle - back)) for back in range(3))
         return float(now[joint]), float(before[joint]), float(earlier[joint])
 

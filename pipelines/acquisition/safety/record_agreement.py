@@ -45,7 +45,18 @@ class RecordAgreement:
             self._exchanged.popitem(last=False)
 
     def check(self, recorded: Reading) -> None:
-        """Raise DeviceError where a recorded sample differs from the exchange of that number."""
+        """Compare a recorded sample with the exchange of that number.
+
+        Parameters
+        ----------
+        recorded : Reading
+            A sample of the drive's own record.
+
+        Raises
+        ------
+        DeviceError
+            Angles or torques differ.
+        """
         exchanged = self._exchanged.pop(recorded.sequence, None)
         if exchanged is None:
             return

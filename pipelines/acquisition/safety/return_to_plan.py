@@ -74,7 +74,22 @@ def step_to_plan(
 
 
 def refuse_leap_of_plan(drive: DriveSettings, path: Path, rate_hz: float) -> None:
-    """Refuse a plan that leaps between two cycles, or leaves its limits."""
+    """Refuse a plan that leaps between two cycles, or leaves its limits.
+
+    Parameters
+    ----------
+    drive : DriveSettings
+        With the limits of the joint.
+    path : Path
+        Set-points of the plan, rad.
+    rate_hz : float
+        Cycles a second.
+
+    Raises
+    ------
+    DeviceError
+        Names the joint, the set-point and the limit.
+    """
     due, before, _ = path
     refuse_leap(drive, before, due, 1.0 / rate_hz)
 

@@ -32,10 +32,22 @@ class SafeStop:
         """For how many samples each drive has been held at rest."""
 
     def set_point(self, joint: int, now: float) -> tuple[float, bool] | None:
-        """Return the set-point (rad) that slows one drive down, and whether it is to halt there.
+        """Return the set-point that slows one drive down, one a sample.
 
-        One a sample; None as soon as the drive has been held for long enough, as holding on would
-        go on pressing, or as it must not be sent to enable.
+        There is none as soon as the drive has been held for long enough, as holding on would go on
+        pressing, or as it must not be sent to enable.
+
+        Parameters
+        ----------
+        joint : int
+            Number of the joint.
+        now : float
+            Host's clock, s.
+
+        Returns
+        -------
+        tuple or None
+            Set-point, rad, and whether the drive is to halt there.
         """
         is_held = self._samples_at_rest[joint] >= HOLD_SAMPLES
         if is_held or self.pressing or not self._enable_states[joint].may_be_sent:
@@ -62,5 +74,11 @@ class SafeStop:
         self._enable_states.update(joint, reading)
 
     def check_cuffs(self, forces: NDArray) -> None:
-        """Check the cuff forces (4, 3) N."""
+        """Check the cuff forces.
+
+        Parameters
+        ----------
+        forces : (4, 3) array
+            N.
+        """
         self.pressing |= self._checks.presses(forces)

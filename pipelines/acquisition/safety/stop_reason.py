@@ -32,7 +32,13 @@ class StopReason:
                 self.text = f"{self.text}; then {reason}"
 
     def refuse(self) -> None:
-        """Raise DeviceError where there is a reason to stop."""
+        """Refuse to go on where there is a reason to stop.
+
+        Raises
+        ------
+        DeviceError
+            The first reason.
+        """
         if self.text is not None:
             raise DeviceError(self.text)
 

@@ -25,7 +25,18 @@ class Counting:
     """Reading at which it wraps around to 0."""
 
     def undone(self, values: NDArray) -> NDArray:
-        """Return readings (n,) with their sign and without wraparounds."""
+        """Return readings with their sign and without wraparounds.
+
+        Parameters
+        ----------
+        values : (n,) array
+            As logged.
+
+        Returns
+        -------
+        (n,) array
+            In the unit of the log.
+        """
         values = values.astype(float)
         if self.bits is not None:
             values = signed(values, self.bits, "", [])
@@ -33,7 +44,20 @@ class Counting:
 
 
 def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, Counting]:
-    """Return how each quantity of a joint was counted, from a log's columns (n,)."""
+    """Return how each quantity of a joint was counted.
+
+    Parameters
+    ----------
+    joint : JointColumns
+        Columns and units of the joint.
+    columns : mapping
+        Columns of the log, (n,) each.
+
+    Returns
+    -------
+    dict
+        Counting by quantity.
+    """
     logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
     counted = {quantity: Counting(lost_sign(values)) for quantity, values in logged.items()}
     unit = joint.columns["angle"].unit

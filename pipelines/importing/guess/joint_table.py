@@ -138,7 +138,15 @@ class _JointWriter:
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
 
     def write_angle(self, time_s: NDArray, fit: TorqueFit | None) -> None:
-        """Write the table of the angle."""
+        """Write the table of the angle.
+
+        Parameters
+        ----------
+        time_s : (n,) array
+            s.
+        fit : TorqueFit or None
+            Fit of the torque, which shows the zero; None without a torque.
+        """
         self._write_column("angle")
         why, sure = self.units.why, self.units.sure
         if self.too_far:

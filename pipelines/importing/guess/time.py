@@ -42,7 +42,18 @@ class TimeGuess:
     """Longest step of a coarse clock without rows, s."""
 
     def stamps(self, values: NDArray) -> NDArray:
-        """Return the stamps of rows (n,) in the clock's unit, from the values of its column."""
+        """Return the stamps of rows.
+
+        Parameters
+        ----------
+        values : (n,) array
+            The clock's column.
+
+        Returns
+        -------
+        (n,) array
+            In the clock's unit.
+        """
         if self.rate_hz is None:
             return values
         return np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)

@@ -154,7 +154,18 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:
-    """Return the rows of columns (n,) in which each has a number, from the middle of the log."""
+    """Return the rows in which each column has a number, from the middle of the log.
+
+    Parameters
+    ----------
+    *columns : (n,) arrays
+        Columns of one log.
+
+    Returns
+    -------
+    list of (m,) arrays
+        The same columns.
+    """
     columns = _middle(*columns)
     known = np.all([np.isfinite(column) for column in columns], axis=0)
     return [column[known] for column in columns]

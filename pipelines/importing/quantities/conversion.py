@@ -66,7 +66,20 @@ def quantity(
 
 
 def counter_turn(reading: ReadingSettings, gain: float) -> float | None:
-    """Return the change of a quantity, SI, in a turn of its counter; None without a counter."""
+    """Return the change of a quantity in a turn of its counter.
+
+    Parameters
+    ----------
+    reading : ReadingSettings
+        Unit, scale and modulus.
+    gain : float
+        Quantity at the joint per SI unit of the reading.
+
+    Returns
+    -------
+    float or None
+        SI units; None without a counter.
+    """
     if reading.wraps_at is None:
         return None
     unit = unit_named(reading.unit)

@@ -105,6 +105,12 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
 
 
 def are_whole(values: NDArray) -> bool:
-    """Return whether values (n,) are whole numbers, with at most 1 % of exceptions."""
+    """Return whether values are whole numbers, with at most 1 % of exceptions.
+
+    Parameters
+    ----------
+    values : (n,) array
+        NaN is left out.
+    """
     known = values[np.isfinite(values)]
     return bool(len(known)) and bool(np.mean(known == np.round(known)) > 0.99)

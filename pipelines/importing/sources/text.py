@@ -19,7 +19,25 @@ CHUNK = 2**17
 
 
 def open_text(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a text file, in the given or derived dialect."""
+    """Return the log in a text file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    settings : SourceSettings
+        Dialect of the file, as far as it is given.
+
+    Returns
+    -------
+    Source
+        Columns are read on demand.
+
+    Raises
+    ------
+    InputError
+        The file holds no table of numbers.
+    """
     dialect = find_dialect(path, settings)
     return Source(
         path, "text", dialect.names, lambda names: _load(path, dialect, names), dialect.notes

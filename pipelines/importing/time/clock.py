@@ -57,7 +57,18 @@ class Run:
 
 
 def usual_units(step: float) -> list[str]:
-    """Return the units in which a step between stamps gives a usual rate of machines."""
+    """Return the units in which a step between stamps gives a usual rate of machines.
+
+    Parameters
+    ----------
+    step : float
+        In the unknown unit.
+
+    Returns
+    -------
+    list of str
+        Of s, ms, us and ns.
+    """
     return [
         unit
         for unit in ("s", "ms", "us", "ns")
@@ -237,7 +248,17 @@ def _unwrapped(since: NDArray, modulus: float, findings: list[Finding]) -> NDArr
 
 
 def uniform(rows: int, rate_hz: float, findings: list[Finding]) -> Run:
-    """Return the run of a log without a clock, of ``rows`` rows at a given rate."""
+    """Return the run of a log without a clock.
+
+    Parameters
+    ----------
+    rows : int
+        Number of rows.
+    rate_hz : float
+        Their rate, Hz.
+    findings : list of Finding
+        Extended by a remark.
+    """
     findings.append(
         Finding(
             "time",
@@ -286,7 +307,13 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
 
 
 def runs_backwards(time: NDArray) -> bool:
-    """Return whether a clock (n,) goes back at nine steps of ten."""
+    """Return whether a clock goes back at nine steps of ten.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps in any unit.
+    """
     steps = np.diff(time)
     return bool(len(steps)) and bool(np.mean(steps < 0.0) > BACKWARDS)
 
@@ -347,7 +374,18 @@ def _stays_behind(time: NDArray) -> int | None:
 
 
 def full_register(before: float, after: float) -> float | None:
-    """Return the modulus of a counter that goes back from one stamp to the next, if any fits."""
+    """Return the modulus of a counter that goes back from one stamp to the next.
+
+    Parameters
+    ----------
+    before, after : float
+        Both stamps, in counts.
+
+    Returns
+    -------
+    float or None
+        Counts; None where no register's width fits.
+    """
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
     if not near:
         return None

@@ -80,7 +80,13 @@ class Chart:
         return [series for panel in self.panels for series in panel.series]
 
     def thinned(self, rows: int) -> "Chart":
-        """Return the chart with at most ``rows`` of its rows, with every peak."""
+        """Return the chart with fewer rows, but with every peak.
+
+        Parameters
+        ----------
+        rows : int
+            Greatest number of rows.
+        """
         if len(self.x) <= rows:
             return self
         kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)
@@ -92,7 +98,15 @@ class Chart:
 
 
 def thinned_alike(charts: Sequence[Chart], values: int) -> list[Chart]:
-    """Return charts with at most ``values`` numbers in total, the longest thinned first."""
+    """Return charts with a limited number of values in total, the longest thinned first.
+
+    Parameters
+    ----------
+    charts : sequence of Chart
+        Charts of one page.
+    values : int
+        Greatest number of values of all charts.
+    """
     low, high = 1, max((len(chart.x) for chart in charts), default=1)
     while low < high:
         rows = (low + high + 1) // 2

@@ -57,7 +57,15 @@ def _increased_errors(session: Session) -> list[str]:
 
 
 def torque_error_grew(before: float | None, after: float | None = None, *, floor: float) -> bool:
-    """Return whether a torque error's mean square grows by more than that of the noise."""
+    """Return whether a torque error's mean square grows by more than that of the noise.
+
+    Parameters
+    ----------
+    before, after : float or None
+        RMSE without and with the causes, N·m; None if unknown.
+    floor : float
+        Noise floor, N·m.
+    """
     return before is not None and after is not None and after**2 - before**2 > floor**2
 
 

@@ -59,7 +59,20 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
 
 
 def check_counter(register: Register, name: str) -> None:
-    """Refuse a counter whose raw value is not the count, as its wraparound is then unknown."""
+    """Refuse a counter whose raw value is not the count, as its wraparound is then unknown.
+
+    Parameters
+    ----------
+    register : Register
+        The counter.
+    name : str
+        Its place in the file, for the message.
+
+    Raises
+    ------
+    ValueError
+        It has a scale, an offset or a sign.
+    """
     if not register.is_plain_count:
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
@@ -69,7 +82,20 @@ def check_counter(register: Register, name: str) -> None:
 
 
 def check_no_gap(block: Settings, name: str) -> None:
-    """Refuse a block with unnamed registers, as writing the block would overwrite them."""
+    """Refuse a block with unnamed registers, as writing the block would overwrite them.
+
+    Parameters
+    ----------
+    block : Settings
+        Registers by quantity.
+    name : str
+        Its place in the file, for the message.
+
+    Raises
+    ------
+    ValueError
+        Names the first register without a name.
+    """
     named = {
         address
         for register in registers_of(block).values()

@@ -21,7 +21,18 @@ from pipelines.settings.rig.safety import SafetySettings
 
 
 def check_joints(drives: Sequence[DriveSettings]) -> None:
-    """Refuse all but one drive for the hip, then one for the knee."""
+    """Refuse all but one drive for the hip, then one for the knee.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSettings
+        In the order of the file.
+
+    Raises
+    ------
+    ValueError
+        Names the joints.
+    """
     joints = [drive.joint for drive in drives]
     if joints != ["hip", "knee"]:
         raise ValueError(
@@ -30,7 +41,22 @@ def check_joints(drives: Sequence[DriveSettings]) -> None:
 
 
 def check_maps(kind: str, devices: Sequence[DeviceSettings], maps: Mapping[str, object]) -> None:
-    """Refuse a device whose register map is missing."""
+    """Refuse a device whose register map is missing.
+
+    Parameters
+    ----------
+    kind : str
+        ``drive`` or ``sensor``.
+    devices : sequence of DeviceSettings
+        In the order of the file.
+    maps : mapping
+        Maps by name.
+
+    Raises
+    ------
+    ValueError
+        Names the device and its map.
+    """
     for i, device in enumerate(devices):
         if device.map not in maps:
             raise ValueError(
@@ -40,7 +66,20 @@ def check_maps(kind: str, devices: Sequence[DeviceSettings], maps: Mapping[str, 
 
 
 def check_lines(lines: Mapping[str, LineSettings], devices: Sequence[DeviceSettings]) -> None:
-    """Refuse missing, unused and duplicate lines, and two devices at one address."""
+    """Refuse missing, unused and duplicate lines, and two devices at one address.
+
+    Parameters
+    ----------
+    lines : mapping
+        Lines by name.
+    devices : sequence of DeviceSettings
+        All devices of the rig.
+
+    Raises
+    ------
+    ValueError
+        Names the line or the address.
+    """
     for device in devices:
         if device.line is not None and device.line not in lines:
             raise ValueError(
@@ -73,7 +112,22 @@ def check_cuffs(sensors: Sequence[SensorSettings]) -> None:
 
 
 def check_rings(drives: Sequence[DriveSettings], maps: Maps, record_rate_hz: float | None) -> None:
-    """Refuse to drain rings that the drives do not have, or whose rate is missing."""
+    """Refuse to drain rings that the drives do not have, or whose rate is missing.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSettings
+        In the order of the file.
+    maps : Maps
+        Register maps.
+    record_rate_hz : float or None
+        Samples a second in the rings, Hz.
+
+    Raises
+    ------
+    ValueError
+        Names the key.
+    """
     if record_rate_hz is None:
         raise ValueError(
             'record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\' rings'
@@ -100,7 +154,20 @@ def check_saturation(
 
 
 def check_margin(drives: Sequence[DriveSettings], margin_rad: float) -> None:
-    """Refuse a distance from the limits that no set-point can keep."""
+    """Refuse a distance from the limits that no set-point can keep.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSettings
+        With limits, rad.
+    margin_rad : float
+        The distance, rad.
+
+    Raises
+    ------
+    ValueError
+        Names the joint and its range.
+    """
     for drive in drives:
         for key, limits in (
             ("angle_rad", drive.angle_rad),
@@ -117,7 +184,22 @@ def check_margin(drives: Sequence[DriveSettings], margin_rad: float) -> None:
 
 
 def check_set_points(drives: Sequence[DriveSettings], maps: Maps, safety: SafetySettings) -> None:
-    """Refuse registers that cannot represent every set-point, or only too coarsely."""
+    """Refuse registers that cannot represent every set-point, or only too coarsely.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSettings
+        With limits, rad.
+    maps : Maps
+        Register maps.
+    safety : SafetySettings
+        With the following error, rad.
+
+    Raises
+    ------
+    ValueError
+        Names the register and its range or step.
+    """
     following_rad = safety.with_human.following_error_rad or safety.following_error_rad
     for drive in drives:
         register, (low, high) = maps.drive[drive.map].write.reference, drive.angle_rad
@@ -142,7 +224,24 @@ def check_reach(
     maps: Maps,
     safety: SafetySettings,
 ) -> None:
-    """Refuse registers that end before a limit, as a value beyond it could not be seen."""
+    """Refuse registers that end before a limit, as a value beyond it could not be seen.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSettings
+        With limits, rad, rad/s and N·m.
+    sensors : sequence of SensorSettings
+        Cuff force sensors.
+    maps : Maps
+        Register maps.
+    safety : SafetySettings
+        With the highest cuff force, N.
+
+    Raises
+    ------
+    ValueError
+        Names the register and the limit.
+    """
     for drive in drives:
         use, most = maps.drive[drive.map], drive.torque_nm / drive.torque_per_ampere
         limits = {

@@ -61,7 +61,18 @@ class NetworkLine(Line):
         return self.silence_s
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time of a request and its reply, s; that of the network is unknown."""
+        """Return the least time of a request and its reply; that of the network is unknown.
+
+        Parameters
+        ----------
+        characters : int
+            Of both together.
+
+        Returns
+        -------
+        float
+            s.
+        """
         return self.quiet_s
 
 
@@ -167,7 +178,18 @@ class RtuLine(Line):
         return 3.5 * self._character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time of a request and its reply of so many characters together, s."""
+        """Return the least time of a request and its reply.
+
+        Parameters
+        ----------
+        characters : int
+            Of both together.
+
+        Returns
+        -------
+        float
+            s.
+        """
         return characters * self._character_s + 2 * self.quiet_s
 
 

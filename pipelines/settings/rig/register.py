@@ -135,7 +135,13 @@ class Register(Settings):
         return low, high
 
     def holds(self, low: float, high: float) -> bool:
-        """Return whether it can represent every SI value from ``low`` to ``high``."""
+        """Return whether it can represent every value of a range.
+
+        Parameters
+        ----------
+        low, high : float
+            SI units.
+        """
         if self.counts is None:
             return True
         scale, offset = self.si

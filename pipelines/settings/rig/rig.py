@@ -183,7 +183,18 @@ class RigSettings(Settings):
 
 
 def load_rig(path: Path | str) -> RigSettings:
-    """Return the rig in a file; names of files in it are relative to its folder."""
+    """Return the rig in a file; names of files in it are relative to its folder.
+
+    Parameters
+    ----------
+    path : Path or str
+        A rig file.
+
+    Raises
+    ------
+    SettingsError
+        Names the key that is missing or wrong.
+    """
     rig = load_toml(path, RigSettings)
     lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
     return rig.model_copy(update={"line": lines})

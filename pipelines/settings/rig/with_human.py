@@ -8,7 +8,20 @@ TIGHTER = "with a wearer a limit may only be tighter"
 
 
 def check_tighter(alone: Settings, with_human: Settings, *names: str) -> None:
-    """Refuse limits of runs with a wearer above those of the others."""
+    """Refuse limits of runs with a wearer above those of the others.
+
+    Parameters
+    ----------
+    alone, with_human : Settings
+        Limits of runs without and with a wearer.
+    *names : str
+        Keys to compare.
+
+    Raises
+    ------
+    ValueError
+        Names the key and both limits.
+    """
     for name in names:
         limit, allowed = getattr(with_human, name), getattr(alone, name)
         if limit is not None and limit > allowed:
