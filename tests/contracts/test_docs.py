@@ -1,9 +1,10 @@
-"""docs/contracts.md names every column in its table's section, and every key of a decision."""
+"""docs/contracts.md names every column in its table's section, and every key of a verdict."""
 
 import re
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from pipelines.contracts import CONTRACTS, verdict
 from pipelines.contracts.joints import QUANTITIES
@@ -57,6 +58,21 @@ def test_every_key_of_a_decision_stands_in_the_row_of_its_object(model):
     rows = re.findall(rf"^\| `{ROWS[model]}.*$", PAGE, re.MULTILINE)
     keys = {name.rpartition(".")[2] for name in names_in("\n".join(rows))}
     assert set(model.model_fields) - keys == set()
+
+
+OBJECTS = [
+    model
+    for model in vars(verdict).values()
+    if isinstance(model, type)
+    and issubclass(model, BaseModel)
+    and model.__module__ == verdict.__name__
+]
+
+
+@pytest.mark.parametrize("model", OBJECTS, ids=lambda model: model.__name__)
+def test_every_key_of_a_verdict_stands_in_its_section(model):
+    keys = {field.alias or name for name, field in model.model_fields.items()}
+    assert keys - set(re.findall(r"\w+", section_of("verdict/1"))) == set()
 
 
 def test_every_page_stands_in_the_index():
