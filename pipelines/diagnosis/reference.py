@@ -28,15 +28,17 @@ For readers who want to know the reasons of a verdict, or who change the decisio
 writes this page from the code. The first table has the hyper-parameters of the decision, from
 `pipelines/diagnosis/criteria.py`. `make learn` learns all of them except
 {", ".join(f"`{name}`" for name in HELD)}. It maximises the log probability that the posterior gives
-to the truth, over simulated sessions. {LEARNED} [science.md](science.md#9-the-decision) has their
-equations. The [other numbers](#other-numbers) of a diagnosis are at the end: those of its noise
-model, its search and its checks of the data. """
+to the truth, over simulated sessions. {LEARNED}
+[science.md](science.md#9-the-decision) has their equations. The [other numbers](#other-numbers) of
+a diagnosis are at the end: those of its noise model, its search and its checks of the data.
+"""
 OTHERS = """\
 ## Other numbers
 
 These are not learned. They concern physics, recording, numerical precision, or the length of
 reports. Each is defined at the head of its file in `pipelines/diagnosis`. Those of figures are not
-listed. """
+listed.
+"""
 HEADINGS = {
     "data_faults": "Faults of acquisition",
     "evidence": "Noise and evidence",

@@ -16,7 +16,8 @@ INTRODUCTION = """\
 Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The
 first two are the baseline of every fit; the others are the causes that `exoid diagnose` knows and a
 rig file may name. `exoid effects NAME` prints a page on the terminal. The site that `make docs`
-builds also shows the residual of each effect, drawn from a virtual leg that has it. """
+builds also shows the residual of each effect, drawn from a virtual leg that has it.
+"""
 
 
 def facts(effect: type[Effect]) -> dict[str, Any]:

@@ -63,7 +63,8 @@ def _without(legs: Sequence[dict[str, Any]]) -> str:
 
 Held-out torque: RMS error at hip / knee, N·m, of {_pooled([leg["torque_rms"] for leg in legs])} N·m
 rms. `exoid diagnose`, {seconds:.0f} s a leg, says
-{counts}{"; it names " + "; ".join(named) if named else ""}. """
+{counts}{"; it names " + "; ".join(named) if named else ""}.
+"""
 
 
 def _with(legs: Sequence[dict[str, Any]]) -> str:
@@ -116,7 +117,8 @@ tried. IDIM-LS and FIGAROH get the irregular log on a uniform grid. The truth is
 
 Above 5 Hz these angles are noise, which every model turns into torque. So the error below 5 Hz
 is listed too, reversals included, as in [real-data.md](real-data.md). `exoid diagnose` looked there
-alone, and gains there alone; IDIM-LS and FIGAROH filter at 10 Hz. """
+alone, and gains there alone; IDIM-LS and FIGAROH filter at 10 Hz.
+"""
 
 
 def _pooled(errors: Sequence[Sequence[float]]) -> str:
