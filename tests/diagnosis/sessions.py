@@ -26,7 +26,7 @@ RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("t
 SLOW = replace(RICH, omega=0.5 * RICH.omega)
 
 
-def recordings(effect=None, joint=None, seed=1, seconds=40.0, trained=RICH, **values):
+def recordings(effect=None, joint=None, seed=1, seconds=20.0, trained=RICH, **values):
     """Return four recordings of a leg with an effect hidden in it; the training runs follow
     ``trained``."""
     hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []

@@ -39,7 +39,7 @@ SESSIONS = {
         for m in session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
         if m.run == "exo_alone"
     ],
-    "unknown": lambda: [humming(m) for m in session(seed=7)],
+    "unknown": lambda: [humming(m) for m in session(seed=7, seconds=40.0)],
     "spoilt": lambda: [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)],
     "nothing": session,
 }
@@ -106,7 +106,7 @@ def test_without_periods_no_share_claims_to_repeat(diagnosed):
 
 
 def test_what_repeats_is_no_scatter_and_what_wanders_is():
-    run = observe(session(seed=2)[1])
+    run = observe(session(seed=2, seconds=40.0)[1])
     rng = np.random.default_rng(0)
     noise = 0.3 * rng.normal(size=(len(run.time), 4))
     repeats = 2.0 * np.sin(2 * np.pi * 3 * run.time / run.motion.period_s)[:, np.newaxis]

@@ -43,7 +43,7 @@ def stuck():
     """A spring at the knee; in one run to validate on the hip's encoder stands for five seconds."""
     motions = []
     for number, table in enumerate(
-        recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
+        recordings("parallel_spring", "knee", seed=4, seconds=40.0, stiffness=6.0, rest_angle=-0.5)
     ):
         frame = table.frame.copy()
         if number == 1:

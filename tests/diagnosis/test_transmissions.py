@@ -18,7 +18,7 @@ SOFT, HARDENING, PLAY = 130.0, 100.0, 0.04
 
 @pytest.fixture(scope="module")
 def soft():
-    return Screening.of(session("joint_elasticity", "knee", stiffness=SOFT))
+    return Screening.of(session("joint_elasticity", "knee", seconds=40.0, stiffness=SOFT))
 
 
 def test_a_soft_spring_is_found_from_a_stiffer_one(soft):

@@ -141,5 +141,5 @@ def test_an_identification_with_temperature_refuses_runs_without(warm_and_cold):
         identify(unread, extension=known)
     assert str(caught.value) == (
         "run_0.parquet: has no column knee_temperature_c, on which friction_temperature@knee"
-        " depends; record the temperature, or leave the effect out"
+        " depends. Record the temperature, or leave the effect out"
     )
