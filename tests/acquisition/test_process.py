@@ -147,10 +147,10 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
     ("number", "name"),
     [
         (signal.SIGINT, "Ctrl-C"),
-        (signal.SIGTERM, "SIGTERM"),
+        pytest.param(signal.SIGTERM, "SIGTERM", marks=pytest.mark.slow),
         pytest.param(signal.SIGQUIT, "SIGQUIT", marks=pytest.mark.slow),
         pytest.param(signal.SIGHUP, "SIGHUP", marks=pytest.mark.slow),
-        (signal.SIGTSTP, "Ctrl-Z"),
+        pytest.param(signal.SIGTSTP, "Ctrl-Z", marks=pytest.mark.slow),
     ],
 )
 def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(

@@ -89,6 +89,7 @@ figures = false
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not os.path.isdir("/proc/self/fd"), reason="only Linux tells which files are open"
 )

@@ -29,6 +29,7 @@ GOALS = [
         {"harmonics": 2, "theta0_rad": PAPERS_MEAN, "criterion": "condition"},
         38.6,
         id="2-fixed-condition",
+        marks=pytest.mark.slow,
     ),
     pytest.param({"harmonics": 2, "criterion": "condition"}, 32.0, id="2-free-condition"),
     pytest.param({"harmonics": 5, "criterion": "condition"}, 11.9, id="5-free-condition"),
@@ -99,7 +100,7 @@ def test_log_det_predicts_smaller_errors_of_inertia_than_the_published_excitatio
     assert 4.0 < before["X1"] / after["X1"]  # five to seven times
 
 
-@pytest.mark.parametrize("topology", ["ring", "global"])
+@pytest.mark.parametrize("topology", ["ring", pytest.param("global", marks=pytest.mark.slow)])
 def test_equal_seeds_give_equal_designs_and_other_seeds_others(topology):
     first, again, other = (
         design(quick(topology=topology, seed=seed)).trajectory for seed in (5, 5, 6)

@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 DRAWN = "cogging"
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -145,6 +145,7 @@ def false_alarms(sessions):
     return np.array(told)
 
 
+@pytest.mark.slow
 def test_good_angles_are_seldom_called_noisy():
     sessions = 30
     alarms = int(np.sum(false_alarms(sessions) < 0.05))

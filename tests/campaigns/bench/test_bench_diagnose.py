@@ -11,6 +11,7 @@ from tests.campaigns.bench.bench_diagnose import (
 )
 
 
+@pytest.mark.slow
 def test_the_posterior_outruns_a_refit_of_every_pair():
     library, weighed, refitted = posterior_rows(recorded(20.0), sample=10)
     assert "shapes" in library.name
@@ -34,6 +35,7 @@ def test_every_length_is_compared_with_the_first():
     assert float(second.value.split()[2]) > 0.5
 
 
+@pytest.mark.slow
 def test_order_tracking_is_timed_with_the_lines_that_it_finds():
     none, four = order_rows(recorded(40.0))
     assert "0 found" in none.name

@@ -143,9 +143,9 @@ def test_cuffs_given_by_the_metre_have_the_stiffness_about_their_joints():
     ("world", "effect", "joint"),
     [
         ("planar", "end_stop", HIP),
-        ("planar", "friction_temperature", KNEE),
+        pytest.param("planar", "friction_temperature", KNEE, marks=pytest.mark.slow),
         ("two_mass", "position_dependent_friction", HIP),
-        ("two_mass", "encoder_eccentricity", KNEE),
+        pytest.param("two_mass", "encoder_eccentricity", KNEE, marks=pytest.mark.slow),
         ("mujoco", "gain_drift", HIP),
     ],
 )

@@ -16,7 +16,11 @@ LONGEST_LOSS_S = 0.5
 
 
 @pytest.mark.parametrize(
-    ("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")]
+    ("number", "name"),
+    [
+        pytest.param(signal.SIGINT, "Ctrl-C", marks=pytest.mark.slow),
+        (signal.SIGTERM, "SIGTERM"),
+    ],
 )
 def test_a_signal_ends_the_run_with_all_that_was_exchanged(tmp_path, number, name):
     ended = strike(tmp_path, send(number), rows=40)
@@ -59,7 +63,7 @@ def kill_and_compare(folder, generator):
     return 0.0 if after is None else ended.struck_at - after.at
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_killed_run_is_recovered_but_for_its_last_half_second(tmp_path, seed):
     assert kill_and_compare(tmp_path, np.random.default_rng(seed)) < LONGEST_LOSS_S
 
