@@ -152,7 +152,13 @@ async def record_run(
     reset_faults: bool,
     claim: Callable[[], None],
 ) -> None:
-    """Move the leg and write the journal, which ends with why the run was stopped, if it was."""
+    """Move the leg and write the journal, which ends with the reason of a stop.
+
+    Raises
+    ------
+    DeviceError
+        A device disagrees with the rig file, or the journal cannot be written.
+    """
     rig = supervisor.rig
     with_human = run.run == "with_human"
     machine = Machine(rig, with_sensors=with_human, samples_per_cycle=supervisor.samples_per_cycle)

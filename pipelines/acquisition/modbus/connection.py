@@ -62,7 +62,13 @@ def client_of(
 
 
 def tls_context(settings: TlsLine) -> ssl.SSLContext:
-    """Return the certificate of a line and the authorities that it trusts, as a TLS context."""
+    """Return the certificate of a line and the authorities that it trusts, as a TLS context.
+
+    Raises
+    ------
+    SettingsError
+        A file is no certificate or key that can be used.
+    """
     file: Path | None = settings.ca
     try:
         context = ssl.create_default_context(cafile=settings.ca)

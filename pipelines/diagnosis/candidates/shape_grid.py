@@ -172,7 +172,7 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
 
     Returns
     -------
-    array
+    (n,) array
         In the parameter's unit.
     """
     if parameter.forms:
