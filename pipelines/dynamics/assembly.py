@@ -9,7 +9,6 @@ from numba.core.types import boolean, float64, int64
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
-from pipelines.effects.backlash import Backlash
 from pipelines.effects.baseline import RigidBody
 from pipelines.effects.kernel import address, derivative, reaction, reading, spring, torque_reading
 from pipelines.errors import InputError
@@ -160,10 +159,10 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     """
     if effect.on.is_exoskeleton:
         return effect.motor_inertia
-    if isinstance(effect, Backlash):
+    if effect.exoskeleton_only:
         raise InputError(
-            f"{effect.label}: backlash can only be simulated for an exoskeleton's joints; simulate"
-            " the model without it, as `exoid identify` writes it"
+            f"{effect.label}: {effect.title.lower()} can only be simulated for an exoskeleton's"
+            " joints; simulate the model without it, as `exoid identify` writes it"
         )
     mechanism = effect.on.mechanism
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)

@@ -1,6 +1,7 @@
 """Play between motor and link."""
 
 from math import sqrt
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import link_behind_motor
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
@@ -49,6 +51,14 @@ class Backlash(Effect):
         " there"
     )
     confirm = "hold the motor and shake the link by hand: it moves freely by the play"
+    reversal_travel = "play between encoder and friction"
+    ties: ClassVar = {
+        "encoder_offset": Tie(
+            "while the load pushes to one side only, play shifts the angle by a constant half of"
+            " it",
+            "move the joint through angles where the load changes sign, or shake the link by hand",
+        ),
+    }
     by_angle = True
     shape = (
         Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),
@@ -63,6 +73,7 @@ class Backlash(Effect):
         ),
     )
     motor_inertia = MOTOR_INERTIA
+    exoskeleton_only = True
     known_to = 0.2
     swings = True
 

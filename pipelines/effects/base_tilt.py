@@ -1,10 +1,13 @@
 """A machine whose base is not level."""
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reading
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
@@ -30,6 +33,13 @@ class BaseTilt(Effect):
     confirm = (
         "put a spirit level on the base, or let the machine hang freely and read its first angle"
     )
+    ties: ClassVar = {
+        "encoder_offset": Tie(
+            "a tilted base turns gravity just as a first encoder with a shifted zero does",
+            "put a spirit level on the base, or let the machine hang freely and read its first"
+            " angle",
+        ),
+    }
     by_angle = True
     whole_leg = True
     shape = (

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
-MOST_LINES = 4
 AMPLITUDE, ORDERS = (-4.0, 4.0), (4.0, 400.0)
 
 
@@ -67,6 +66,8 @@ class Cogging(Effect):
     shape = (_cycles(""),)
     reported = _reported("")
     parity = Parity.EVEN
+    order_tracked = True
+    most_parts = 4
 
     def __post_init__(self) -> None:
         """Use the parameters of all lines."""
@@ -87,11 +88,15 @@ class Cogging(Effect):
             angle = values[2 * lines + i] * at.q[joint]
             out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
 
+    def with_parts(self, number: int) -> "Cogging":
+        """Return the effect with a number of lines."""
+        return replace(self, lines=number)
+
     def with_parts_named(self, names: Collection[str]) -> "Cogging":
         """Return the effect with as many lines as the names of its values require."""
-        numbers = range(2, MOST_LINES + 1)
+        numbers = range(2, self.most_parts + 1)
         present = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]
-        return replace(self, lines=max(present, default=1))
+        return self.with_parts(max(present, default=1))
 
     def physical(self, values: NDArray) -> NDArray:
         """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line.

@@ -1,7 +1,10 @@
 """Dry friction that differs with direction."""
 
+from typing import ClassVar
+
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
+from pipelines.effects.tie import Tie
 
 
 class CoulombAsymmetry(Effect):
@@ -24,6 +27,15 @@ class CoulombAsymmetry(Effect):
         "move the empty joint slowly both ways through the same range: the mean torque less gravity"
         " is the asymmetry"
     )
+    absorbed_as = "constant"
+    ties: ClassVar = {
+        "torque_offset": Tie(
+            "while the joint always moves, a friction that differs with direction adds the same"
+            " constant torque",
+            "hold the joint still and read the torque with the drive off: an offset of the sensor"
+            " stays",
+        ),
+    }
     linear = (
         Parameter(
             "asymmetry", "N·m", "half of forward less backward Coulomb friction", "a", (-3.0, 3.0)

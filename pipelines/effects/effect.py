@@ -25,7 +25,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
@@ -239,10 +241,34 @@ class Effect(ABC):
     forms_differ: ClassVar[str] = ""
     """How the real effect may differ from the equation: a sentence without its full stop, or
     empty."""
+    ties: ClassVar[Mapping[str, Tie]] = {}
+    """Effects that data of some kind can never separate from it, by name; ``torque_gain`` of one
+    joint is tied with that of another. One of two tied effects lists the other."""
+    cuff_coherence: ClassVar[str] = ""
+    """Sentence on the coherence of cuff forces and drive torques, if that is evidence for it."""
+    reversal_travel: ClassVar[str] = ""
+    """Name of what takes up a travel while friction changes sign at a reversal; empty if nothing
+    does."""
+    order_tracked: ClassVar[bool] = False
+    """True if order tracking finds its lines over the joint's angle. Each of its shapes is then the
+    number of cycles a turn of one line."""
+    most_parts: ClassVar[int] = 1
+    """Largest number of parts (``with_parts``)."""
+    may_be_worn: ClassVar[bool] = False
+    """True if the wearer may carry it instead of the machine: then it acts in their runs only, and
+    the cuffs measure it."""
+    element: ClassVar[Element | None] = None
+    """Element of simulators' model formats that has its equation; None if there is none."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
     """By the place of a joint, the other parameter that absorbs it completely there."""
+    absorbed_as: ClassVar[str] = ""
+    """Kind of torque that a mechanism's parameters may absorb completely (``Mechanism.absorbs``);
+    empty if none can."""
+    mechanism_equation: ClassVar[str] = ""
+    """Key of its equation in ``Mechanism.reactions``; empty if it is the same for all
+    mechanisms."""
     needs_temperature: ClassVar[bool] = False
     """True if it acts only in runs whose motor temperature was measured."""
     by_angle: ClassVar[bool] = False
@@ -269,6 +295,10 @@ class Effect(ABC):
     """True if ``reaction`` depends on acceleration, and so adds to the mass matrix."""
     motor_inertia: ClassVar[float] = 0.0
     """kg·m² on the motor's side of ``spring``."""
+    damping_ratio: ClassVar[float] = 0.0
+    """Damping ratio of ``motor_inertia`` on ``spring``, if the spring is linear."""
+    exoskeleton_only: ClassVar[bool] = False
+    """True if ``spring`` can only be simulated for an exoskeleton's joints."""
     known_to: ClassVar[float] = 0.0
     """Relative standard error of its first shape parameter due to the effect's own
     approximations."""
@@ -318,8 +348,9 @@ class Effect(ABC):
                 declared = getattr(self, role)
                 scaled = declared and tuple(p.at(self.on, self.joint) for p in declared)
                 object.__setattr__(self, role, scaled)
-        if self.name in THE_LEG.mechanism.reactions:
-            object.__setattr__(self, "reaction", self.on.mechanism.reactions.get(self.name))
+        if self.mechanism_equation:
+            reaction = self.on.mechanism.reactions.get(self.mechanism_equation)
+            object.__setattr__(self, "reaction", reaction)
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
@@ -336,9 +367,9 @@ class Effect(ABC):
             Names of joints; ``[None]`` if it belongs to the whole machine.
         """
         mechanism = machine.mechanism
-        if cls.name in mechanism.absorbs:
+        if cls.absorbed_as in mechanism.absorbs:
             return []
-        if cls.name in THE_LEG.mechanism.reactions and cls.name not in mechanism.reactions:
+        if cls.mechanism_equation and cls.mechanism_equation not in mechanism.reactions:
             return []
         if cls.joints is not None and not set(cls.joints) & set(mechanism.places):
             return []
@@ -498,6 +529,13 @@ class Effect(ABC):
         ahead = np.array([self.physical(values + step) for step in steps])
         behind = np.array([self.physical(values - step) for step in steps])
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
+
+    def with_parts(self, number: int) -> "Effect":
+        """Return the effect with a number of parts, such as lines of a ripple.
+
+        Most effects have one part.
+        """
+        return self
 
     def with_parts_named(self, names: Collection[str]) -> "Effect":
         """Return the effect with as many parts as the names of its values require.

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from math import cos, sin
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reading
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
@@ -33,6 +35,13 @@ class EncoderEccentricity(Effect):
     source = "Lu, Graetz, Amin-Shahidi, Smeds (2010), CIRP Annals 59(1): self-calibrated encoders"
     looks_like = "gravity and inertia torques off by a share that changes with the joint's angle"
     confirm = "turn the joint to marks of known angle all the way round, and read the encoder"
+    ties: ClassVar = {
+        "encoder_offset": Tie(
+            "over less than half a turn an error once a turn is nearly a constant and a scale of"
+            " the angle",
+            "turn the joint to marks of known angle all the way round, and read the encoder",
+        ),
+    }
     shape = (
         Parameter("sine", "rad", "amplitude of sin(q)", "A1", (-0.06, 0.06)),
         Parameter("cosine", "rad", "amplitude of cos(q)", "B1", (-0.06, 0.06)),

@@ -1,6 +1,7 @@
 """Coulomb and viscous friction of a drive: the baseline of every other drive effect."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import reaction
 
 
@@ -24,6 +25,7 @@ class Friction(Effect):
     confirm = (
         "move the empty joint at several constant speeds both ways and plot torque against speed"
     )
+    element = Element.FRICTION
     linear = (
         Parameter("coulomb", "N·m", "friction torque once the joint moves", "Ks", (0.5, 8.0)),
         Parameter("viscous", "N·m·s/rad", "friction torque per unit of speed", "Km", (0.5, 10.0)),

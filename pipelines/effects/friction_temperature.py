@@ -1,7 +1,10 @@
 """Friction that depends on the temperature of the drive."""
 
+from typing import ClassVar
+
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.instant import REFERENCE_C
 
 
@@ -24,6 +27,13 @@ class FrictionTemperature(Effect):
     source = "Bittencourt, Wernholt, Sander-Tavallaey, Brogårdh (2010), IROS: load and temperature"
     looks_like = "residual in step with speed whose size follows the motor's temperature"
     confirm = "repeat one motion from cold to warm, and plot friction against the temperature"
+    ties: ClassVar = {
+        "friction_warmup": Tie(
+            "while a run warms steadily, its temperature and its time rise together",
+            "repeat the motion with the drive warm: friction that follows the temperature is low"
+            " from the start",
+        ),
+    }
     linear = (
         Parameter(
             "viscous_per_degree",

@@ -5,6 +5,7 @@ from math import sqrt
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
@@ -36,6 +37,8 @@ class JointElasticity(Effect):
     )
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"
     confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
+    reversal_travel = "play between encoder and friction"
+    element = Element.SERIES_SPRING
     shape = (
         Parameter("stiffness", "N·m/rad", "torque per angle of small twist", "k", (60.0, 8000.0)),
         Parameter(
@@ -49,6 +52,7 @@ class JointElasticity(Effect):
         ),
     )
     motor_inertia = MOTOR_INERTIA
+    damping_ratio = DAMPING_RATIO
     known_to = 0.08
     swings = True
 

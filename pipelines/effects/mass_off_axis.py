@@ -1,6 +1,10 @@
 """A segment whose centre of mass lies off its axis."""
 
+from typing import ClassVar
+
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.mechanisms.leg import LEG
 
 
@@ -29,6 +33,21 @@ class MassOffAxis(Effect):
     )
     looks_like = "gravity torque like the cosine of the link's angle: largest where the link hangs"
     confirm = "let the joint hang freely: it rests off the vertical, towards the mass"
+    mechanism_equation = "mass_across"
+    may_be_worn = True
+    element = Element.MASS_ACROSS
+    ties: ClassVar = {
+        "encoder_offset": Tie(
+            "under one load a shifted zero and a mass off the axis turn gravity alike",
+            "record with another load as well, a person or a known weight: an offset is one angle"
+            " in both, a mass is not",
+        ),
+        "base_tilt": Tie(
+            "under one load a tilted base and a mass off the axis turn gravity alike",
+            "record with another load as well, a person or a known weight, or put a spirit level on"
+            " the base",
+        ),
+    }
     by_angle = True
     linear = (
         Parameter(
@@ -37,4 +56,4 @@ class MassOffAxis(Effect):
     )
     inertial = True
     parity = Parity.EVEN
-    reaction = staticmethod(LEG.reactions["mass_off_axis"])
+    reaction = staticmethod(LEG.reactions[mechanism_equation])

@@ -1,12 +1,15 @@
 """A spring in parallel with the drive."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import reaction
+from pipelines.effects.tie import Tie
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
 
@@ -41,6 +44,19 @@ class ParallelSpring(Effect):
     confirm = (
         "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
     )
+    element = Element.SPRING
+    ties: ClassVar = {
+        "torque_offset": Tie(
+            "a soft spring that is far wound up adds little but a constant torque",
+            "let the joint rest with the drive off, and unhook the spring: an offset of the sensor"
+            " stays",
+        ),
+        "coulomb_asymmetry": Tie(
+            "a soft spring that is far wound up adds little but a constant torque. While the joint"
+            " always moves, friction that differs with direction does the same",
+            "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
+        ),
+    }
     linear = (
         Parameter("stiffness", "N·m/rad", "torque per angle", "k", (2.0, 40.0)),
         Parameter("preload", "N·m", "stiffness times rest angle", "b", (-30.0, 30.0)),
@@ -73,7 +89,7 @@ class ParallelSpring(Effect):
             object.__setattr__(self, "confirm", CONFIRM_A_SLIDES)
         elif self.on.mechanism.has_gravity is False:
             object.__setattr__(self, "confirm", CONFIRM_WITHOUT_GRAVITY)
-        if TorqueOffset.name in self.on.mechanism.absorbs:
+        if TorqueOffset.absorbed_as in self.on.mechanism.absorbs:
             assert self.reported is not None
             stiffness, rest = self.reported
             of_this = {

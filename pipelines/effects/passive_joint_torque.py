@@ -1,9 +1,11 @@
 """The human joint's own stiffness towards the end of its range."""
 
 from math import expm1
+from typing import ClassVar
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
+from pipelines.effects.tie import Tie
 
 
 class PassiveJointTorque(Effect):
@@ -30,6 +32,13 @@ class PassiveJointTorque(Effect):
     confirm = (
         "move the relaxed leg slowly to that end of its range and watch torque and cuff forces"
     )
+    ties: ClassVar = {
+        "end_stop": Tie(
+            "with the person in every run, a stop of the machine and one of the person's joint are"
+            " alike",
+            "record the machine with nobody in it through the same range",
+        ),
+    }
     acts_in = ("with_human",)
     linear = (Parameter("stiffness", "N·m/rad", "torque per angle at the onset", "k", (2.0, 60.0)),)
     shape = (

@@ -28,6 +28,8 @@ class PayloadChange(Effect):
     )
     looks_like = "gravity residual that begins at one instant and stays"
     confirm = "ask what was picked up or fell off at that time, and weigh it"
+    mechanism_equation = "payload"
+    may_be_worn = True
     linear = (
         Parameter("mass_moment", "kg·m", "mass times distance along the segment", "p", (-1.0, 1.0)),
     )
@@ -41,7 +43,7 @@ class PayloadChange(Effect):
     )
     inertial = True
     parity = Parity.EVEN
-    reaction = staticmethod(LEG.reactions["payload_change"])
+    reaction = staticmethod(LEG.reactions[mechanism_equation])
 
     def __post_init__(self) -> None:
         """Use a mass at a prismatic joint, where no distance matters."""

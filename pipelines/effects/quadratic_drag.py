@@ -1,6 +1,7 @@
 """Drag that grows with the square of speed."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import reaction
 
 
@@ -22,6 +23,7 @@ class QuadraticDrag(Effect):
     confirm = (
         "move the empty joint at constant speeds up to the fastest and plot torque against speed"
     )
+    element = Element.QUADRATIC_DAMPING
     linear = (Parameter("drag", "N·m·s²/rad²", "torque per speed squared", "c", (0.3, 6.0)),)
     parity = Parity.ODD
     dissipative = True

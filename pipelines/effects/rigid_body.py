@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
@@ -38,11 +39,13 @@ class RigidBody(Effect):
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
     looks_like = "torque in step with acceleration and with gravity; every fit starts with it"
     confirm = "weigh the links, or hold the machine still at several angles and read the torque"
+    mechanism_equation = "rigid_bodies"
+    element = Element.RIGID_BODIES
     whole_leg = True
     inertial = True
     parity = Parity.EVEN
     linear = _parameters(LEG)
-    reaction = staticmethod(LEG.reactions["rigid_body"])
+    reaction = staticmethod(LEG.reactions[mechanism_equation])
 
     def __post_init__(self) -> None:
         """Use the machine's own parameters."""

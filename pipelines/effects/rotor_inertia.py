@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import reaction
 
 
@@ -26,6 +27,8 @@ class RotorInertia(Effect):
     confirm = (
         "look up the rotor's inertia and the gear ratio: J is the inertia times the ratio squared"
     )
+    absorbed_as = "inertia"
+    element = Element.ARMATURE
     joints = ("knee",)
     absorbed: ClassVar = {"hip": "X1"}
     linear = (

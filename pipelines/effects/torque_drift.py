@@ -1,9 +1,11 @@
 """A torque channel whose zero wanders."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
+from pipelines.effects.tie import Tie
 from pipelines.effects.torque_offset import TorqueOffset
 
 
@@ -20,6 +22,12 @@ class TorqueDrift(Effect):
     source = "Fraden (2016), Handbook of Modern Sensors, 5th ed., ch. 3 (zero drift)"
     looks_like = "a residual that climbs through the run and does not repeat from period to period"
     confirm = "switch the drive off and read its torque for some minutes while the electronics warm"
+    ties: ClassVar = {
+        "torque_offset": Tie(
+            "over runs this short a drift is an offset that differs from run to run",
+            "record longer, or read the torque at rest before and after each run",
+        ),
+    }
     linear = (
         Parameter("rate", "N·m/s", "growth of the offset", "d", (-0.1, 0.1)),
         Parameter(
@@ -37,7 +45,7 @@ class TorqueDrift(Effect):
     def __post_init__(self) -> None:
         """Set the level to zero if the mechanism's parameters absorb a constant torque."""
         super().__post_init__()
-        if TorqueOffset.name in self.on.mechanism.absorbs:
+        if TorqueOffset.absorbed_as in self.on.mechanism.absorbs:
             rate, level = self.linear
             object.__setattr__(self, "linear", (rate,))
             object.__setattr__(self, "shape", (replace(level, per_run=False, forms=(0.0,)),))

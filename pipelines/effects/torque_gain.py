@@ -1,9 +1,13 @@
 """A torque channel with the wrong gain."""
 
+from typing import ClassVar
+
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import torque_reading
+from pipelines.effects.tie import Tie
 from pipelines.mechanics.motion import Motion
 
 
@@ -26,6 +30,16 @@ class TorqueGain(Effect):
         " between the rows"
     )
     confirm = "hang a known weight on the joint and compare the change of torque with the weight's"
+    absorbed_as = "gain"
+    element = Element.TORQUE_GAIN
+    ties: ClassVar = {
+        "torque_gain": Tie(
+            "without another measurement of the load only the ratio of both gains shows: one too"
+            " high looks like the other too low",
+            "hang a known weight on each joint in turn; or record the cuff forces, with and without"
+            " the person",
+        ),
+    }
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
 
     @torque_reading

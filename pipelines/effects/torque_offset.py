@@ -1,6 +1,7 @@
 """A torque channel with a wrong zero."""
 
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.element import Element
 from pipelines.effects.kernel import torque_reading
 
 
@@ -26,6 +27,8 @@ class TorqueOffset(Effect):
         "switch the drive off and read its torque: it should be zero; a sensor that is tared at"
         " each start reads zero then under any load: remove the load first"
     )
+    absorbed_as = "constant"
+    element = Element.TORQUE_OFFSET
     may_differ = "a torque sensor that is tared at every start"
     linear = (Parameter("offset", "N·m", "measured less true torque", "o", (-4.0, 4.0)),)
     parity = Parity.EVEN

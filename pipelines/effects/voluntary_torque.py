@@ -28,6 +28,10 @@ class VoluntaryTorque(Effect):
         "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not"
         " show it"
     )
+    cuff_coherence = (
+        "cycle-to-cycle differences appear in cuff forces and drive torque alike, so they come from"
+        " the wearer"
+    )
     acts_in = ("with_human",)
     linear = (
         Parameter("sine", "N·m", "amplitude of the sine", "A", (-10.0, 10.0), per_run=True),

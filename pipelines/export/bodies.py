@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.effects.element import Element
 from pipelines.errors import InputError
 from pipelines.export.exported import Exported
 from pipelines.mechanics.mechanism import Mechanism
@@ -170,7 +171,7 @@ def _cube(mass: float) -> float:
 
 
 def _moment_across(exported: Exported, joint: Joint) -> float:
-    term = exported.of("mass_off_axis", joint.name)
+    term = exported.of(Element.MASS_ACROSS, joint.name)
     return float(term.values[0]) if term else 0.0
 
 

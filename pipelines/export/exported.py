@@ -15,6 +15,7 @@ from pipelines.dynamics.assembly import cuffed
 from pipelines.dynamics.plant import make_plant
 from pipelines.effects import Side
 from pipelines.effects.baseline import Friction, RigidBody
+from pipelines.effects.element import Element
 from pipelines.errors import InputError, about
 from pipelines.export.format import Degree, Format, Holding, left_out
 from pipelines.mechanics.geometry import Geometry
@@ -58,10 +59,10 @@ class Exported:
         """Inertial parameters of all that moves, (p,) in the mechanism's order and units."""
         return self.terms[0].values
 
-    def of(self, effect: str, joint: str) -> Term | None:
-        """Return an effect's term at a joint, if the model has it."""
+    def of(self, element: Element, joint: str) -> Term | None:
+        """Return the term at a joint that is a simulator's element, if the model has it."""
         for term in self.terms:
-            if term.effect.name == effect and term.effect.joint == joint:
+            if term.effect.element is element and term.effect.joint == joint:
                 return term
         return None
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+from pipelines.effects.element import Element
 from pipelines.export.exported import shift_of
 from pipelines.export.format import Holding, approximate, exact, left_out
 from pipelines.model import Term
@@ -37,8 +38,8 @@ def held_friction(term: Term, whole: Holding) -> Holding:
     return approximate(f"its other coefficient only: {reason}")
 
 
-Holdings = Mapping[str, Callable[[Term], Holding]]
-"""Functions that return the holding of a term, by the effect's name."""
+Holdings = Mapping[Element | None, Callable[[Term], Holding]]
+"""Functions that return the holding of a term, by its element."""
 
 
 def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[Term], Holding]:
@@ -62,8 +63,8 @@ def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:
             return exact(shift)
-        if term.effect.name in holdings:
-            return holdings[term.effect.name](term)
+        if term.effect.element in holdings:
+            return holdings[term.effect.element](term)
         return left_out(f"{format_name} has no element for it")
 
     return holding

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import motor_inertia
-from pipelines.effects.joint_elasticity import DAMPING_RATIO
+from pipelines.effects.element import Element
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, approximate, exact
@@ -42,17 +42,17 @@ def _elasticity(term: Term) -> Holding:
 
 
 HOLDINGS: Holdings = {
-    "rigid_body": lambda term: exact("bodies of nominal masses that have these X"),
-    "friction": _friction,
-    "quadratic_drag": lambda term: exact(
+    Element.RIGID_BODIES: lambda term: exact("bodies of nominal masses that have these X"),
+    Element.FRICTION: _friction,
+    Element.QUADRATIC_DAMPING: lambda term: exact(
         "second coefficient of the joint's damping (read by MuJoCo 4.0)"
     ),
-    "rotor_inertia": lambda term: exact("joint armature"),
-    "parallel_spring": lambda term: exact("joint stiffness and springref"),
-    "mass_off_axis": lambda term: exact("place of the body's centre of mass"),
-    "joint_elasticity": _elasticity,
-    "torque_gain": lambda term: exact("gain of the actuator"),
-    "torque_offset": lambda term: exact("bias of the actuator"),
+    Element.ARMATURE: lambda term: exact("joint armature"),
+    Element.SPRING: lambda term: exact("joint stiffness and springref"),
+    Element.MASS_ACROSS: lambda term: exact("place of the body's centre of mass"),
+    Element.SERIES_SPRING: _elasticity,
+    Element.TORQUE_GAIN: lambda term: exact("gain of the actuator"),
+    Element.TORQUE_OFFSET: lambda term: exact("bias of the actuator"),
 }
 
 
@@ -136,7 +136,8 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     """Return friction and rotor inertia of a drive as attributes of its joint."""
     name, attributes = body.joint.name, {}
     damping = [0.0, 0.0]
-    friction, drag = exported.of("friction", name), exported.of("quadratic_drag", name)
+    friction = exported.of(Element.FRICTION, name)
+    drag = exported.of(Element.QUADRATIC_DAMPING, name)
     if friction and _friction(friction).degree is not Degree.NOT:
         coulomb, damping[0] = sound_friction(friction)
         attributes["frictionloss"] = number(coulomb)
@@ -146,7 +147,7 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
         damping[1] = drag.values[0]
     if any(damping):
         attributes["damping"] = numbers(*damping) if damping[1] else number(damping[0])
-    rotor, soft = exported.of("rotor_inertia", name), exported.of("joint_elasticity", name)
+    rotor, soft = exported.of(Element.ARMATURE, name), exported.of(Element.SERIES_SPRING, name)
     armature = rotor.values[0] if rotor else 0.0
     if soft:
         armature += motor_inertia(soft.effect, exported.model, exported.geometry)
@@ -154,7 +155,7 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
 
 
 def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
-    spring = exported.of("parallel_spring", joint.name)
+    spring = exported.of(Element.SPRING, joint.name)
     if spring is None:
         return {}
     stiffness, rest = spring.effect.physical(spring.values)
@@ -163,12 +164,12 @@ def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
 
 def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
     """Return the joint between motor and link, whose angle is minus the transmission's twist."""
-    soft = exported.of("joint_elasticity", joint.name)
+    soft = exported.of(Element.SERIES_SPRING, joint.name)
     if soft is None:
         return {}
     stiffness, hardening = soft.values
     text = numbers(stiffness, 0.0, stiffness * hardening) if hardening else number(stiffness)
-    damping = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * soft.effect.motor_inertia)
+    damping = 2.0 * soft.effect.damping_ratio * np.sqrt(stiffness * soft.effect.motor_inertia)
     return {"stiffness": text, "damping": number(damping)}
 
 
@@ -176,7 +177,7 @@ def _spring_across(
     springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported
 ) -> None:
     """Add the spring of a link behind an elastic joint, whose angle is a sum of two."""
-    if exported.of("joint_elasticity", joint.name) is None:
+    if exported.of(Element.SERIES_SPRING, joint.name) is None:
         return
     place = [other.name for other in exported.joints].index(joint.name)
     spring = _spring(joint, exported.shift()[place], exported)
@@ -190,7 +191,8 @@ def _spring_across(
 
 
 def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported) -> None:
-    gain, offset = exported.of("torque_gain", joint.name), exported.of("torque_offset", joint.name)
+    gain = exported.of(Element.TORQUE_GAIN, joint.name)
+    offset = exported.of(Element.TORQUE_OFFSET, joint.name)
     if gain is None and offset is None:
         ET.SubElement(actuators, "motor", name=name, joint=name)
         return

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from pipelines.effects.element import Element
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, exact
@@ -26,9 +27,9 @@ def _friction(term: Term) -> Holding:
 
 
 HOLDINGS: Holdings = {
-    "rigid_body": lambda term: exact("links of nominal masses that have these X"),
-    "friction": _friction,
-    "mass_off_axis": lambda term: exact("place of the link's centre of mass"),
+    Element.RIGID_BODIES: lambda term: exact("links of nominal masses that have these X"),
+    Element.FRICTION: _friction,
+    Element.MASS_ACROSS: lambda term: exact("place of the link's centre of mass"),
 }
 
 
@@ -89,7 +90,7 @@ def _joint(
     ET.SubElement(joint, "child", link=link)
     ET.SubElement(joint, "axis", xyz=numbers(*body.axis))
     ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
-    friction = exported.of("friction", body.joint.name)
+    friction = exported.of(Element.FRICTION, body.joint.name)
     if friction and _friction(friction).degree is not Degree.NOT:
         coulomb, viscous = sound_friction(friction)
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))

@@ -47,16 +47,17 @@ class Mechanism:
     """Places of the joints on whose positions its torque depends; empty if it depends on
     acceleration alone."""
     reactions: Mapping[str, Any] = field(hash=False, compare=False)
-    """Compiled equations of effects that depend on the mechanism, by the effect's name,
-    ``rigid_body`` included. An effect without one cannot occur."""
+    """Compiled equations that depend on the mechanism: of its ``rigid_bodies``, of a mass
+    ``mass_across`` a link, of a ``payload`` that comes or goes. An effect without one cannot
+    occur."""
     broken: Callable[[NDArray, Geometry], list[str]] = field(hash=False, compare=False)
     """Function that lists the conditions of a real machine that the parameters X violate."""
     inertia_forms: Callable[[Geometry], NDArray] = field(hash=False, compare=False)
     """Function that returns symmetric B, (p, m, m). M(q) > 0 at every q if and only if the sum of
     X_i B_i is: the same conditions in the form of a convex program."""
     absorbs: Mapping[str, str] = field(default_factory=dict, hash=False, compare=False)
-    """Effects that its own parameters absorb completely, by name, and which parameters those
-    are."""
+    """Kinds of torque that its own parameters absorb completely, and which parameters those are:
+    an ``inertia`` at a joint, a ``gain`` of the whole torque, a ``constant`` torque."""
     has_length: bool = False
     """Whether its equations contain the distance between the first two axes, ``thigh_length_m``."""
 

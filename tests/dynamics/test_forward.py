@@ -98,7 +98,7 @@ def test_a_machine_of_three_joints_goes_as_far_as_newton_has_it():
         LEG,
         kinds=("prismatic",) * 3,
         parameters=LEG.parameters[:1],
-        reactions={"rigid_body": _slides},
+        reactions={"rigid_bodies": _slides},
     )
     machine = Machine(mechanism, tuple(Joint(name, "prismatic") for name in "xyz"))
     a = assemble(Model((Term(RigidBody(on=machine), np.array([2.0])),)), GEOMETRY, machine.names)

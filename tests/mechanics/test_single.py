@@ -73,7 +73,7 @@ def test_the_torque_at_an_instant_is_that_along_a_motion(mechanism):
     X = draw.uniform(0.5, 3.0, len(mechanism.parameters))
     for q, dq, ddq in draw.uniform(-2, 2, (20, 3, joints)):
         torque, none = np.zeros(joints), np.zeros(joints)
-        mechanism.reactions["rigid_body"](
+        mechanism.reactions["rigid_bodies"](
             Instant(0.0, q, dq, ddq, none, none, none), np.zeros(0), X, geometry, -1, torque
         )
         assert_allclose(

@@ -2,14 +2,14 @@
 
 from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
 from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
-from pipelines.effects import VoluntaryTorque
+from pipelines.effects import EFFECTS
 
 
 def auxiliary_evidence(prepared: PreparedRuns) -> dict[str, float]:
     """Return the evidence of causes other than the mean torque.
 
-    For a wearer's pushes it is the part that cuffs and drives share. A rhythm that is fitted
-    explains some of it too.
+    It is the part of the torque that cuffs and drives share, for effects with ``cuff_coherence``. A
+    rhythm that is fitted explains some of it too.
 
     Parameters
     ----------
@@ -23,6 +23,8 @@ def auxiliary_evidence(prepared: PreparedRuns) -> dict[str, float]:
     """
     ratios = cuff_coherence(prepared.runs, prepared.residuals)
     return {
-        VoluntaryTorque(joint=joint).label: float(ratio)
+        effect(joint=joint).label: float(ratio)
+        for effect in EFFECTS
+        if effect.cuff_coherence
         for joint, ratio in zip(prepared.baseline.joints, ratios, strict=True)
     }

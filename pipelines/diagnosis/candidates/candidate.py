@@ -14,9 +14,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import EFFECTS, Effect, Parameter
 from pipelines.model import BASELINE, Term, TermColumns
 
-WORN = ("mass_off_axis", "payload_change")
-"""Structural effects that the person may carry instead: then in their runs only, and measured by
-the cuffs."""
 NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
@@ -247,5 +244,5 @@ def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
             yield plain
             if effect.may_differ and len(kinds) > 1:
                 yield effect(joint=joint, on=machine, each_run=True)
-            if effect.name in WORN and "with_human" in kinds:
+            if effect.may_be_worn and "with_human" in kinds:
                 yield effect(joint=joint, run="with_human", on=machine)

@@ -7,6 +7,7 @@ together with the others of the set.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
-from pipelines.effects import Cogging, Effect
+from pipelines.effects import EFFECTS, Effect
 from pipelines.wording.law import law_label
 
 ALTERNATIVES = 2
@@ -208,10 +209,11 @@ def _ripples(
 ) -> list[Cause]:
     """Return each joint's ripple from order tracking, at the full sampling rate."""
     ripples, machine = [], prepared.baseline.machine
-    for joint in prepared.baseline.joints:
+    tracked = [effect for effect in EFFECTS if effect.order_tracked]
+    for effect, joint in product(tracked, prepared.baseline.joints):
         if orders := orders_of(joint, prepared):
-            effect = Cogging(joint, on=machine, lines=len(orders))
-            fitted = alone.fit(Candidate(effect, (orders,) * len(prepared.runs)))
+            ripple = effect(joint, on=machine).with_parts(len(orders))
+            fitted = alone.fit(Candidate(ripple, (orders,) * len(prepared.runs)))
             if fitted is not None:
                 none = np.zeros((len(fitted.columns), 0))
                 ripples.append(Cause.of(fitted, none, regression, first=True))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.effects.torque_offset import TorqueOffset
 
 IMPERFECTION = (0.009, 0.02)
 """Share of a drive's and of a cuff's torque that even a good model of a good machine does not
@@ -62,7 +61,7 @@ def varying_torque(runs: Sequence[Run]) -> NDArray:
         known = np.where(run.usable, run.measured, 0.0)
         number = run.usable.sum(axis=0)
         squares += np.sum(known**2, axis=0)
-        if TorqueOffset.name in run.motion.machine.mechanism.absorbs:
+        if "constant" in run.motion.machine.mechanism.absorbs:
             squares -= np.sum(known, axis=0) ** 2 / np.maximum(number, 1)
         count += number
     return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))

@@ -27,7 +27,8 @@ from pipelines.diagnosis.evidence.line_spectrum import (
     spectrum_over_time,
 )
 from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel, Grid, Trace, traces_of
-from pipelines.effects.cogging import MOST_LINES, Cogging
+from pipelines.effects import EFFECTS
+from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 
 LEAST_WAVES = 4.0
@@ -48,6 +49,10 @@ NEIGHBOURS, MUCH_WEAKER = 5.0, 0.05
 is a part of it."""
 LEAST_S = 2.0
 """Least usable motion in a run that is searched, s."""
+RIPPLES = tuple(effect for effect in EFFECTS if effect.order_tracked)
+"""Effects that have lines over the angle."""
+MOST_LINES = max(effect.most_parts for effect in RIPPLES)
+"""Largest number of lines of one kind at a joint."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +177,7 @@ def lines_in(motions: Sequence[Motion], residuals: Sequence[NDArray]) -> list[Jo
     each = [
         traces_of(motion, residual) for motion, residual in zip(motions, residuals, strict=True)
     ]
-    ripples = [Cogging(joint, on=machine) for joint in machine.names]
-    bounds = [ripple.shape[0].typical for ripple in ripples]
+    bounds = [_orders(joint, machine) for joint in machine.names]
     return lines_of([list(traces) for traces in zip(*each, strict=True)], bounds)
 
 
@@ -196,10 +200,16 @@ def lines_of(
     list of JointLines
         One for each joint. Of sessions of noise alone, a share of ``FALSE_ALARMS`` shows any line.
     """
-    bounds = bounds or [Cogging.shape[0].typical] * len(joints)
+    bounds = bounds or [_orders(THE_LEG.names[0], THE_LEG)] * len(joints)
     searches = len(Kind) * len(joints)
     every = zip(joints, bounds, strict=True)
     return [_lines_of_joint(traces, ends, searches) for traces, ends in every]
+
+
+def _orders(joint: str, machine: Machine) -> tuple[float, float]:
+    """Return the range of cycles a turn of ripples at a joint, rad/m where it slides."""
+    ranges = [ripple(joint, on=machine).shape[0].typical for ripple in RIPPLES]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
 def _lines_of_joint(

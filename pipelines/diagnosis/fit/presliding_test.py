@@ -18,7 +18,6 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.fitted_model import model_of_run
 from pipelines.diagnosis.fit.joint_fit import Fit
-from pipelines.effects import Backlash, JointElasticity, PreslidingHysteresis
 from pipelines.effects.baseline import Friction
 from pipelines.estimation.angle_noise import CUTOFF_HZ
 from pipelines.estimation.regression import turns
@@ -50,9 +49,6 @@ NEEDED = 6.0
 COUNTS = 2
 """Shortest travel in counts of the encoder: over a shorter one friction changes sides between two
 readings."""
-GIVES = (PreslidingHysteresis, Backlash, JointElasticity)
-"""Causes by which friction changes sides over a travel of the measured angle. A joint with such a
-named cause is not tested."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ Side = Callable[[_About], NDArray]
 def built_up(
     fit: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
 ) -> list[BuildUp]:
-    """Return the joints whose friction builds up over a travel.
+    """Return the joints whose friction builds up over a travel that no named cause explains.
 
     The training runs determine the travel, and the validation runs confirm it.
 
@@ -160,7 +156,8 @@ def built_up(
     baseline : Baseline
     train, validate : sequences of Run
     """
-    known = {cause.label for cause in fit.causes}
+    # Their friction changes sides over a travel anyway.
+    known = {cause.effect.joint for cause in fit.causes if cause.effect.reversal_travel}
     # Once for all joints: per-run values are fitted for each model.
     runs = [
         [(run.motion, model_of_run(fit, baseline, run)) for run in some]
@@ -168,7 +165,7 @@ def built_up(
     ]
     rows = []
     for j, joint in enumerate(baseline.joints):
-        if known & {gives(joint, on=baseline.machine).label for gives in GIVES}:
+        if joint in known:
             continue
         seen = [[_About.of(*run, baseline, j) for run in some] for some in runs]
         about = [[one for one in some if one is not None] for some in seen]

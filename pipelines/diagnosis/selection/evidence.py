@@ -22,7 +22,7 @@ from pipelines.diagnosis.candidates.smooth_laws import HUM, QUANTISATION, TIME, 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
-from pipelines.effects import Cogging, Family
+from pipelines.effects import Family
 from pipelines.wording.law import FAMILIES, law_label
 
 LEAST_VARIANCE = 1e-10
@@ -369,9 +369,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, prepared: PreparedRuns) ->
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
     tracked = (
-        isinstance(effect, Cogging)
-        and joint
-        and cause.candidate.shapes[0] == orders_of(joint, prepared)
+        effect.order_tracked and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
     )
     return Element(
         label=effect.label,

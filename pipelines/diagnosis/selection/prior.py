@@ -10,8 +10,6 @@ from pipelines.diagnosis.selection.evidence import Element
 
 FEATURES = ("cause", "law", "further", "searched", "each_run", "worn", "coherence")
 """Names of the criteria by which the features of a set are multiplied."""
-AUXILIARY = {"voluntary_torque": "coherence"}
-"""The criterion that weights an effect's auxiliary evidence."""
 
 
 def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
@@ -29,8 +27,7 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
     own["further"] = float(at_both)
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
-    if element.name in AUXILIARY:
-        own[AUXILIARY[element.name]] = auxiliary.get(element.label, 0.0)
+    own["coherence"] = auxiliary.get(element.label, 0.0)
     return np.array(list(own.values()))
 
 

@@ -3,7 +3,7 @@
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import NamedCause, in_place
-from pipelines.effects import Effect, VoluntaryTorque
+from pipelines.effects import Effect
 from pipelines.wording.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
@@ -12,13 +12,6 @@ MENTIONED_FROM = 3.0
 """Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
 NEARLY_ALL = 0.9
 """Share of the systematic error below which the evidence says that a cause may be a look-alike."""
-AUXILIARY = {
-    VoluntaryTorque.name: (
-        "cycle-to-cycle differences appear in cuff forces and drive torque "
-        "alike, so they come from the wearer"
-    ),
-}
-"""The auxiliary evidence in words, by effect (``candidates/auxiliary_evidence.py``)."""
 
 
 def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
@@ -46,7 +39,7 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None
     if d.selected.evidence.auxiliary.get(label, 0.0) > MENTIONED_FROM:
-        sentences.append(AUXILIARY[effect.name])
+        sentences.append(effect.cuff_coherence)
     lines = len(named.element.shown)
     if lines:
         plural = "s stand" if lines > 1 else " stands"

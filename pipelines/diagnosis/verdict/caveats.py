@@ -6,7 +6,7 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
-from pipelines.effects import PreslidingHysteresis
+from pipelines.effects import EFFECTS
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.mechanics.geometry import Geometry
 from pipelines.wording.label import amount, label_in_words
@@ -123,10 +123,12 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
     machine = d.baseline.machine
     joint = machine.joint(one.joint)
     before, after = (amount(machine, one.joint, error) for error in (one.at_once, one.over_travel))
+    # Two effects may have the same words.
+    reasons = dict.fromkeys(effect.reversal_travel for effect in EFFECTS if effect.reversal_travel)
     return (
         f"near reversals {the(one.joint)}'s friction changes sign over about "
-        f"{1e3 * one.travel:.1g} m{joint.unit('angle')} of travel: {PreslidingHysteresis.name}, or "
-        f"play between encoder and friction. The model ignores it: the {joint.effort} error within "
+        f"{1e3 * one.travel:.1g} m{joint.unit('angle')} of travel: {', or '.join(reasons)}. "
+        f"The model ignores it: the {joint.effort} error within "
         f"{NEAR_S:g} s of reversals is {before}, {after} with such a travel"
     )
 

@@ -174,7 +174,7 @@ def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
 
 
 def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
-    tie = tie_between(effect.name, rival.name, effect.confirm, rival.confirm)
+    tie = tie_between(effect, rival)
     return {
         "effect": rival.name,
         "joint": rival.joint,

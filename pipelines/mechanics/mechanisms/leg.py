@@ -218,9 +218,9 @@ LEG = Mechanism(
     along=_along,
     bends_at=("hip", "knee"),
     reactions={
-        "rigid_body": _rigid_body,
-        "mass_off_axis": _mass_off_axis,
-        "payload_change": _payload_change,
+        "rigid_bodies": _rigid_body,
+        "mass_across": _mass_off_axis,
+        "payload": _payload_change,
     },
     broken=_broken,
     inertia_forms=_inertia_forms,

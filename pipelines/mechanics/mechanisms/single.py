@@ -106,8 +106,8 @@ def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
     return np.array([[[1.0]], [[0.0]]])
 
 
-_ABSORBED = {"rotor_inertia": "X1", "torque_gain": "all parameters together"}
-"""Effects that only a second joint, which carries the same links, would separate."""
+_ABSORBED = {"inertia": "X1", "gain": "all parameters together"}
+"""Torques that only a second joint, which carries the same links, could separate."""
 
 _INERTIA = Inertial(
     "X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0)
@@ -127,9 +127,9 @@ PENDULUM = Mechanism(
     along=_pendulum_along,
     bends_at=("joint",),
     reactions={
-        "rigid_body": _pendulum,
-        "mass_off_axis": _mass_off_axis,
-        "payload_change": _payload_change,
+        "rigid_bodies": _pendulum,
+        "mass_across": _mass_off_axis,
+        "payload": _payload_change,
     },
     broken=_broken_inertia,
     inertia_forms=_inertia_forms_under_gravity,
@@ -143,7 +143,7 @@ TURNTABLE = replace(
     parameters=(_INERTIA,),
     along=_inertia_along,
     bends_at=(),
-    reactions={"rigid_body": _inertia},
+    reactions={"rigid_bodies": _inertia},
     inertia_forms=_inertia_forms,
 )
 
@@ -152,7 +152,7 @@ SLIDE = replace(
     title="one level prismatic joint",
     kinds=("prismatic",),
     parameters=(_MASS,),
-    reactions={"rigid_body": _inertia, "payload_change": _mass_change},
+    reactions={"rigid_bodies": _inertia, "payload": _mass_change},
     broken=_broken_mass,
 )
 
@@ -170,7 +170,7 @@ LIFT = replace(
         ),
     ),
     along=_lift_along,
-    reactions={"rigid_body": _lift, "payload_change": _mass_change},
+    reactions={"rigid_bodies": _lift, "payload": _mass_change},
     inertia_forms=_inertia_forms_under_gravity,
-    absorbs=_ABSORBED | dict.fromkeys(("torque_offset", "coulomb_asymmetry"), "X2"),
+    absorbs=_ABSORBED | {"constant": "X2"},
 )
