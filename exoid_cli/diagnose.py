@@ -61,6 +61,7 @@ def diagnose(
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import all_or_none, folder_to_fill, write_text
     from pipelines.contracts.provenance import recording_behind
+    from pipelines.contracts.verdict import check
     from pipelines.diagnosis.detectability.detectability import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
     from pipelines.diagnosis.verdict.candidate_table import candidates
@@ -89,6 +90,7 @@ def diagnose(
     with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
         diagnosis = find(motions, report, settings.diagnose.known)
     document = verdict(diagnosis)
+    checked = check(document, str(output / "verdict.json"))
     machine, geometry = motions[0].machine, motions[0].geometry
     used_settings = settings.sections_about(
         machine.is_exoskeleton, "mechanism", "filter", "diagnose"
@@ -132,13 +134,13 @@ def diagnose(
         if figures:
             from pipelines.diagnosis.verdict.figures.drawing import draw
 
-            draw(diagnosis, document, folder)
+            draw(diagnosis, checked, folder)
         drawn = {path.name for path in folder.iterdir()}
     for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
         if old not in drawn:
             (output / old).unlink(missing_ok=True)
     console.emit(document)
-    show_verdict(document, machine.joints)
+    show_verdict(checked, machine.joints)
     console.wrote(
         output,
         "verdict.json",

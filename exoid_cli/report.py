@@ -67,7 +67,7 @@ def report(
         page = page_of(session, title, output)
     write_text(output, page)
     warn_of_unreadable(session)
-    summary = session.verdict["summary"] if session.verdict else None
+    summary = session.verdict.summary if session.verdict else None
     console.emit({"path": str(output), "bytes": len(page.encode()), "summary": summary})
     if summary:
         console.say(summary)

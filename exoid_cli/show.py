@@ -75,11 +75,13 @@ def _show_content(inspection: "Inspection") -> bool:
     if inspection.contract == CANDIDATES.label:
         _show_candidates(CANDIDATES.load(inspection.file)[0].to_pylist())
         return True
-    if inspection.contract.startswith("verdict/") and "causes" in inspection.metadata:
+    if inspection.contract.startswith("verdict/"):
         from exoid_cli.verdict_view import show_verdict
+        from pipelines.contracts.verdict import Verdict
 
         console.say("")
-        show_verdict(inspection.metadata, joints_of(inspection.metadata))
+        verdict = Verdict.model_validate(inspection.metadata)
+        show_verdict(verdict, joints_of(inspection.metadata))
         return True
     return False
 

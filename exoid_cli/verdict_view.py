@@ -1,14 +1,15 @@
 """A verdict as text: missing physics, its probability, the torque errors, and each cause."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from exoid_cli.console import console
 
 if TYPE_CHECKING:
     from pipelines.contracts import Joint
+    from pipelines.contracts.verdict import Cause, Control, Known, Parameter, Verdict
 
 
 ERRORS = {
@@ -30,41 +31,41 @@ FAULTS = 5
 """Faults of acquisition that are listed."""
 
 
-def show_verdict(verdict: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
-    """Print a verdict/1 document about a machine of these joints."""
+def show_verdict(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
+    """Print a verdict about a machine of these joints."""
     from pipelines.contracts.joints import HIP_AND_KNEE
 
-    console.say(verdict["summary"])
+    console.say(verdict.summary)
     _show_findings(verdict)
     _show_faults(verdict)
-    for caveat in verdict["caveats"]:
+    for caveat in verdict.caveats:
         console.say(f"\nBut {caveat}.")
     _show_router(verdict)
     _show_errors(verdict, joints)
-    for known in verdict.get("known", ()):
+    for known in verdict.known:
         _show_known(known)
-    for cause in verdict["causes"]:
+    for cause in verdict.causes:
         _show_cause(cause)
     # The gait that would be followed is a leg's.
-    if verdict["causes"] and tuple(joints) == HIP_AND_KNEE:
-        _show_control(verdict["control"])
+    if verdict.causes and tuple(joints) == HIP_AND_KNEE:
+        _show_control(verdict.control)
 
 
-def _show_faults(verdict: Mapping[str, Any]) -> None:
+def _show_faults(verdict: "Verdict") -> None:
     """List the faults of acquisition; the summary names only the first."""
-    faults = verdict["data_faults"]
-    if verdict.get("acquisition_at_fault"):
+    faults = verdict.data_faults
+    if verdict.acquisition_at_fault:
         console.say("\nNo cause was sought. Correct the acquisition, and record again.")
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")
     for fault in faults[:FAULTS]:
-        console.note(f"- {fault['file']}, {fault['channel']}: {fault['what']}")
+        console.note(f"- {fault.file}, {fault.channel}: {fault.what}")
     if len(faults) > FAULTS:
         console.note(f"- {len(faults) - FAULTS} more, in data_faults of verdict.json")
 
 
-def _show_findings(verdict: Mapping[str, Any]) -> None:
+def _show_findings(verdict: "Verdict") -> None:
     """Print the probability that something is missing, and the path to its cause."""
     from pipelines.wording.findings import outcomes, rows
 
@@ -95,12 +96,12 @@ def _broken(words: str, depth: int) -> list[str]:
     return wrap(words, room, initial_indent=indent, subsequent_indent=f"{indent}    ")
 
 
-def _show_router(verdict: Mapping[str, Any]) -> None:
+def _show_router(verdict: "Verdict") -> None:
     """Print the parts of each joint's residual, and the variables it depends on."""
     from pipelines.wording.findings import searched_runs, shares
 
     joints = shares(verdict)
-    if not joints or verdict.get("acquisition_at_fault"):
+    if not joints or verdict.acquisition_at_fault:
         return
     parts = {part: words for part, words in ROUTER.items() if any(j.parts[part] for j in joints)}
     variables = list(joints[0].predicted)
@@ -130,22 +131,23 @@ def _listed(words: Iterable[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _show_errors(verdict: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
+def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     from pipelines.contracts.joints import HIP_AND_KNEE, either
 
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
-    errors = {key: words for key, words in ERRORS.items() if key in verdict}  # older files lack one
-    if not verdict["causes"]:
+    # Files of older versions lack one of these errors.
+    errors = {key: words for key, words in ERRORS.items() if getattr(verdict, key)}
+    if not verdict.causes:
         del errors["extended_rmse_nm"]
-    headings = ("joint", *errors.values(), *["excess left"] * bool(verdict["causes"]))
+    headings = ("joint", *errors.values(), *["excess left"] * bool(verdict.causes))
     console.say("")
     console.table(
         headings,
         [
             (
                 joint.name,
-                *(f"{verdict[key][joint.name]:{digits}}" for key in errors),
-                *[_excess_left(verdict, joint.name)] * bool(verdict["causes"]),
+                *(f"{getattr(verdict, key)[joint.name]:{digits}}" for key in errors),
+                *[_excess_left(verdict, joint.name)] * bool(verdict.causes),
             )
             for joint in joints
         ],
@@ -155,64 +157,62 @@ def _show_errors(verdict: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     )
 
 
-def _excess_left(verdict: Mapping[str, Any], joint: str) -> str:
+def _excess_left(verdict: "Verdict", joint: str) -> str:
     """Return the remaining share of a joint's error beyond noise."""
-    share = verdict["unexplained"][joint]
+    share = verdict.unexplained[joint]
     return "at the floor" if share is None else f"{share:.0%}"
 
 
-def _show_known(known: Mapping[str, Any]) -> None:
-    from pipelines.wording.label import cause_label
-
-    console.say(f"\n{cause_label(known)}, assumed present")
-    for parameter in known["parameters"]:
+def _show_known(known: "Known") -> None:
+    console.say(f"\n{known.label}, assumed present")
+    for parameter in known.parameters:
         console.note(_in_words(parameter))
 
 
-def _show_cause(cause: Mapping[str, Any]) -> None:
+def _show_cause(cause: "Cause") -> None:
     from pipelines.contracts.joints import the
     from pipelines.wording.label import effect_of_cause, in_words
 
-    where = f" at {the(cause['joint'])}" if cause["joint"] else ""
-    likely = f"probability {cause['probability']:.2f}"
-    together = " with its ties" if cause["indistinguishable_from"] else ""
-    console.say(f"\n{cause['effect']}{where} ({cause['side']}), {likely}{together}")
-    of = next((f", of {one['file']}" for one in cause.get("each_run", ())), "")
-    for p in cause["parameters"]:
-        console.note(_in_words(p) + of * (p["name"] in cause.get("fitted_on_validate", ())))
-    for sentence in cause["evidence"]:
+    where = f" at {the(cause.joint)}" if cause.joint else ""
+    likely = f"probability {cause.probability:.2f}"
+    together = " with its ties" if cause.indistinguishable_from else ""
+    console.say(f"\n{cause.effect}{where} ({cause.side}), {likely}{together}")
+    of = next((f", of {one.file}" for one in cause.each_run), "")
+    for p in cause.parameters:
+        console.note(_in_words(p) + of * (p.name in cause.fitted_on_validate))
+    for sentence in cause.evidence:
         console.note(f"- {sentence}")
-    for tie in cause["indistinguishable_from"]:
-        console.note(f"or {in_words(effect_of_cause(tie))}: {tie['why']}; {tie['how_to_separate']}")
+    for tie in cause.indistinguishable_from:
+        console.note(f"or {in_words(effect_of_cause(tie))}: {tie.why}; {tie.how_to_separate}")
 
 
-def _in_words(parameter: Mapping[str, Any]) -> str:
+def _in_words(parameter: "Parameter") -> str:
     """Return a parameter with its interval; an assumed or chosen value has none."""
-    low, high = parameter["ci95"]
-    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+    low, high = parameter.ci95
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     interval = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
-    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({interval})"
+    return f"{parameter.name} {parameter.value:.4g}{unit} ({interval})"
 
 
-def _show_control(verdict: Mapping[str, Any]) -> None:
+def _show_control(control: "Control") -> None:
     """Print tracking error and peak torque under adaptive control, without and with the causes."""
     console.say("")
-    if verdict["reason"]:
-        console.say(f"Under adaptive control: not compared, {verdict['reason']}.")
+    before, after = control.without, control.with_
+    if control.reason or before is None or after is None:
+        console.say(f"Under adaptive control: not compared, {control.reason}.")
         return
-    before, after = verdict["without"], verdict["with"]
     headings = ("joint", "error mrad", "error with", "peak N·m", "peak with")
     console.table(
         headings,
         [
             (
                 joint,
-                f"{1e3 * before['tracking_rmse_rad'][joint]:.2f}",
+                f"{1e3 * before.tracking_rmse_rad[joint]:.2f}",
                 f"{1e3 * error:.2f}",
-                f"{before['peak_torque_nm'][joint]:.1f}",
-                f"{after['peak_torque_nm'][joint]:.1f}",
+                f"{before.peak_torque_nm[joint]:.1f}",
+                f"{after.peak_torque_nm[joint]:.1f}",
             )
-            for joint, error in after["tracking_rmse_rad"].items()
+            for joint, error in after.tracking_rmse_rad.items()
         ],
         title="tracking error and peak torque under adaptive control, without and with the causes",
         numbers=", ".join(headings[1:]),

@@ -21,6 +21,18 @@ class _Object(BaseModel):
     model_config = ConfigDict(extra="allow")
 
 
+class Named(_Object):
+    """An effect, and the joint that has it; null for the whole machine."""
+
+    effect: str
+    joint: str | None
+
+    @property
+    def label(self) -> str:
+        """``effect@joint``."""
+        return f"{self.effect}@{self.joint}" if self.joint else self.effect
+
+
 class Parameter(_Object):
     """One number of a cause."""
 
@@ -39,11 +51,9 @@ class Gain(_Object):
     joint: str
 
 
-class Tie(_Object):
+class Tie(Named):
     """A cause that these data cannot separate from a named one."""
 
-    effect: str
-    joint: str | None
     why: str
     how_to_separate: str
     probability: Number | None = None
@@ -62,34 +72,40 @@ class OneRun(_Object):
     """Null for values fitted to this run alone; files of older versions lack it."""
 
 
-class Known(_Object):
+class Known(Named):
     """An effect given as present, which is part of the baseline."""
 
-    effect: str
-    joint: str | None
     parameters: list[Parameter]
 
 
-class Cause(_Object):
+class Cause(Named):
     """One named cause."""
 
-    effect: str
-    joint: str | None
     side: str
     probability: Probability
     parameters: list[Parameter]
     gain: Gain
     indistinguishable_from: list[Tie]
     evidence: list[str]
+    fitted_on_validate: list[str] = []
+    """Names of the parameters that are fitted to each validation run."""
     each_run: list[OneRun] = []
     """Empty if all runs share all values; files of older versions lack it."""
 
+    @property
+    def per_run(self) -> bool:
+        """Whether its values differ from run to run."""
+        return bool(self.each_run)
 
-class Likely(_Object):
+    @property
+    def alike(self) -> "list[Cause | Tie]":
+        """The cause, and those that these data cannot separate from it."""
+        return [self, *self.indistinguishable_from]
+
+
+class Likely(Named):
     """A listed cause that a finding could be."""
 
-    effect: str
-    joint: str | None
     family: str
     probability: Probability
     words: str
@@ -163,6 +179,9 @@ class Control(_Object):
     """The adaptive loop on both models, or the reason why there is none."""
 
     reason: str | None
+    run: str = ""
+    """Kind of run; empty if there is no loop."""
+    controller: dict[str, Any] = {}
     without: Loop | None = None
     with_: Loop | None = Field(None, alias="with")
 
@@ -337,8 +356,8 @@ def parsed(path: Path) -> Any:
         ) from error
 
 
-def check(content: Mapping[str, Any], source: str) -> None:
-    """Check a verdict.
+def check(content: Mapping[str, Any], source: str) -> Verdict:
+    """Return a checked verdict.
 
     Parameters
     ----------
@@ -353,14 +372,14 @@ def check(content: Mapping[str, Any], source: str) -> None:
         Names the first key that is missing or wrong.
     """
     try:
-        Verdict.model_validate(content)
+        return Verdict.model_validate(content)
     except ValidationError as error:
         raise ContractError(
             f"{source}: {explain(error, content)} (`exoid diagnose` makes it again)"
         ) from error
 
 
-def read(path: Path) -> dict[str, Any]:
+def read(path: Path) -> Verdict:
     """Return the checked verdict in a file.
 
     Parameters
@@ -373,6 +392,4 @@ def read(path: Path) -> dict[str, Any]:
     ContractError
         The file is damaged, or a key is missing or wrong.
     """
-    content = parsed(path)
-    check(content, str(path))
-    return dict(content)
+    return check(parsed(path), str(path))

@@ -159,9 +159,22 @@ class Session:
         return files[0] if files else None
 
     @cached_property
-    def verdict(self) -> dict[str, Any] | None:
-        """The verdict's content; None without a diagnosis."""
+    def verdict(self) -> verdicts.Verdict | None:
+        """The verdict; None without a diagnosis."""
         return verdicts.read(self.verdict_file.path) if self.verdict_file else None
+
+    @property
+    def causes(self) -> list[verdicts.Cause]:
+        """The named causes; empty without a diagnosis."""
+        return self.verdict.causes if self.verdict else []
+
+    def noise_floor(self, joint: Joint) -> float | None:
+        """Return the noise floor at a joint, N·m; None without a diagnosis."""
+        return self.verdict.noise_floor_nm.get(joint.name) if self.verdict else None
+
+    def dependences(self, joint: Joint) -> list[verdicts.Dependence]:
+        """Return the variables on which a joint's error depends; empty without a diagnosis."""
+        return self.verdict.depends_on.get(joint.name, []) if self.verdict else []
 
     @property
     def has_damaged_verdict(self) -> bool:

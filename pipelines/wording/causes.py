@@ -1,13 +1,16 @@
 """The causes of a verdict, and labels in sentences, in words; unknown effects by their names."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
-from pipelines.wording.label import cause_label, effect_of_cause, in_words, label_in_words
+from pipelines.wording.label import effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import LAW
+
+if TYPE_CHECKING:
+    from pipelines.contracts.verdict import Cause, Tie
 
 
 def any_label_in_words(label: str) -> str:
@@ -20,21 +23,18 @@ def any_label_in_words(label: str) -> str:
         return name.removeprefix(LAW).replace("_", " ") + at
 
 
-def cause_in_words(cause: Mapping[str, Any]) -> str:
+def cause_in_words(cause: "Cause | Tie") -> str:
     """Return a verdict's cause in words, with a note if it differs from run to run."""
     try:
         return in_words(effect_of_cause(cause))
     except InputError:
-        return any_label_in_words(cause_label(cause))
+        return any_label_in_words(cause.label)
 
 
-def shares_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
+def shares_in_words(causes: Iterable["Cause"]) -> dict[str, str]:
     """Return a verdict's causes and their ties in words, by label."""
-    return {
-        cause_label(one): cause_in_words(one)
-        for cause in verdict["causes"]
-        for one in (*ties_of(cause), cause)
-    }
+    # A cause may be tied with itself as it would be if each run had its own: its own words count.
+    return {one.label: cause_in_words(one) for cause in causes for one in reversed(cause.alike)}
 
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:
@@ -46,23 +46,19 @@ def labels_in_words(text: str, labels: Iterable[str]) -> str:
     return re.sub(pattern, lambda match: any_label_in_words(match[0]), text)
 
 
-def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
+def causes_in_words(causes: Sequence["Cause"]) -> str:
     """Return a verdict's causes in words, most probable first, each with its ties."""
     words = [_tied_in_words(cause) for cause in causes]
-    return (", and " if any(map(ties_of, causes)) else " and ").join(words)
+    tied = any(cause.indistinguishable_from for cause in causes)
+    return (", and " if tied else " and ").join(words)
 
 
-def _tied_in_words(cause: dict[str, Any]) -> str:
+def _tied_in_words(cause: "Cause") -> str:
     """Return a cause in words, with its only tie, or with the number of its ties."""
-    words, ties = cause_in_words(cause), ties_of(cause)
+    words, ties = cause_in_words(cause), cause.indistinguishable_from
     if not ties:
         return words
     if len(ties) > 1:
         return f"{words} or {len(ties)} others that these data cannot separate"
-    other, where = cause_in_words(ties[0]), f" at {the(cause['joint'])}"
+    other, where = cause_in_words(ties[0]), f" at {the(cause.joint or '')}"
     return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"
-
-
-def ties_of(cause: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the causes that these data cannot separate from a named one."""
-    return list(cause["indistinguishable_from"])

@@ -4,9 +4,13 @@ For terminal and report alike, from the keys ``findings``, ``router`` and ``post
 verdict; files of older versions lack these, and then nothing is shown.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pipelines.contracts.verdict import Finding, Law, Likely, Verdict
+    from pipelines.contracts.verdict import Node as Step
 
 LEAST = 0.01
 """Probability below which an alternative is not shown."""
@@ -73,12 +77,12 @@ VARIABLES = ("angle", "speed", "load", "time", "tone")
 """Variables whose share is shown."""
 
 
-def outcomes(verdict: Mapping[str, Any]) -> tuple[Outcome, ...]:
+def outcomes(verdict: "Verdict") -> tuple[Outcome, ...]:
     """Return the three cases and their probabilities; nothing where physics was not looked at."""
-    posterior = verdict.get("posterior")
-    if not posterior:
+    posterior = verdict.posterior
+    if posterior is None:
         return ()
-    nothing, unlisted = round(posterior["nothing_missing"], 2), round(posterior["unlisted"], 2)
+    nothing, unlisted = round(posterior.nothing_missing, 2), round(posterior.unlisted, 2)
     listed = round(max(1.0 - nothing - unlisted, 0.0), 2)
     return (
         Outcome("nothing", "nothing", nothing),
@@ -87,31 +91,31 @@ def outcomes(verdict: Mapping[str, Any]) -> tuple[Outcome, ...]:
     )
 
 
-def rows(verdict: Mapping[str, Any]) -> list[Row]:
+def rows(verdict: "Verdict") -> list[Row]:
     """Return the tree of findings, each node above its branches; empty without findings."""
     root = Node("", 1.0)
-    for finding in verdict.get("findings") or ():
+    for finding in verdict.findings:
         _grow(root, finding)
     return [row for node in root.below.values() for row in _rows_of(node, 0)]
 
 
-def searched_runs(verdict: Mapping[str, Any]) -> str:
+def searched_runs(verdict: "Verdict") -> str:
     """Return which runs causes were sought on, whose residual is split."""
-    return "all runs" if verdict.get("sought_on") == "all" else "training runs"
+    return "all runs" if verdict.sought_on == "all" else "training runs"
 
 
-def shares(verdict: Mapping[str, Any]) -> list[Shares]:
+def shares(verdict: "Verdict") -> list[Shares]:
     """Return how each joint's residual splits."""
     rows = []
-    slides = all(of["angle"] == "m" for of in verdict["units"].values())
-    for joint, router in (verdict.get("router") or {}).items():
-        depends = {one["variable"]: one["share_before"] for one in verdict["depends_on"][joint]}
+    slides = all(of["angle"] == "m" for of in verdict.units.values())
+    for joint, router in verdict.router.items():
+        depends = {one.variable: one.share_before for one in verdict.depends_on[joint]}
         rows.append(
             Shares(
                 joint,
-                router["rms_nm"],
-                {part: router[part] or 0.0 for part in PARTS},
-                router["with_person_only"],
+                router.rms_nm,
+                {part: getattr(router, part) or 0.0 for part in PARTS},
+                router.with_person_only,
                 {
                     "position" if slides and name == "angle" else name: depends[name]
                     for name in VARIABLES
@@ -122,37 +126,37 @@ def shares(verdict: Mapping[str, Any]) -> list[Shares]:
     return rows
 
 
-def _grow(root: Node, finding: Mapping[str, Any]) -> None:
+def _grow(root: Node, finding: "Finding") -> None:
     """Add a finding's path to the tree, and the possible answers at its end."""
-    node, is_cause = root, finding["level"] == "cause"
-    path = finding["path"]
+    node, is_cause = root, finding.level == "cause"
+    path = finding.path
     # That something is missing is one of the outcomes; it is a line only where no more is known.
     for one in path[1 : len(path) - is_cause] or path[: 1 - is_cause]:
-        node = _under(node, (one["level"], one["value"]), one["words"], one["probability"])
+        node = _under(node, (one.level, one.value), one.words, one.probability)
     if is_cause:
         _answer(node, path[-1], finding)
     else:
         node.is_answer = True
-        for cause in finding["causes"]:
-            _alternative(node, cause["words"] + AGAINST * cause["dropped"], cause)
-    for law in finding["laws"]:
-        _alternative(node, UNLISTED + law["words"], law)
+        for cause in finding.causes:
+            _alternative(node, cause.words + AGAINST * cause.dropped, cause)
+    for law in finding.laws:
+        _alternative(node, UNLISTED + law.words, law)
 
 
-def _answer(node: Node, last: Mapping[str, Any], finding: Mapping[str, Any]) -> None:
+def _answer(node: Node, last: "Step", finding: "Finding") -> None:
     """Add a named cause, with those that are tied with it below one line for all of them."""
-    first, *ties = finding["causes"]
-    words = TIED if ties else first["words"]
-    here = _under(node, (last["level"], last["value"]), words, finding["probability"])
+    first, *ties = finding.causes
+    words = TIED if ties else first.words
+    here = _under(node, (last.level, last.value), words, finding.probability)
     here.is_answer = True
     if ties:
-        for cause in finding["causes"]:
-            _under(here, cause["words"], cause["words"], cause["probability"])
+        for cause in finding.causes:
+            _under(here, cause.words, cause.words, cause.probability)
 
 
-def _alternative(node: Node, words: str, entry: Mapping[str, Any]) -> None:
-    if entry["probability"] >= LEAST:
-        _under(node, words, words, entry["probability"])
+def _alternative(node: Node, words: str, entry: "Likely | Law") -> None:
+    if entry.probability >= LEAST:
+        _under(node, words, words, entry.probability)
 
 
 def _under(node: Node, key: Any, words: str, probability: float) -> Node:

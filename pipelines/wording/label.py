@@ -1,7 +1,7 @@
 """A cause's label, ``effect@joint`` (see ``Effect.label``), its effect, and its wording."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from pipelines.contracts.joints import the
 from pipelines.effects import EFFECTS, Effect
@@ -9,6 +9,9 @@ from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
 from pipelines.wording.law import LAW, law_in_words
+
+if TYPE_CHECKING:
+    from pipelines.contracts.verdict import Cause, Tie
 
 NAMES = ("Coulomb", "Stribeck")
 """Of people, whose capital stays."""
@@ -20,11 +23,6 @@ SHARES = {
     "unexplained": "unexplained",
 }
 """Shares of the verdict's ``error_budget`` that are no cause, in words."""
-
-
-def cause_label(cause: Mapping[str, Any]) -> str:
-    """Return the label of a cause, or of a rival, as a verdict has it."""
-    return f"{cause['effect']}@{cause['joint']}" if cause["joint"] else str(cause["effect"])
 
 
 def effect_labelled(label: str) -> Effect:
@@ -64,11 +62,10 @@ def effect_at(
     )
 
 
-def effect_of_cause(cause: Mapping[str, Any]) -> Effect:
-    """Return the effect of a cause, or of a rival, of a verdict."""
-    effect = effect_named(cause["effect"])
-    differs = cause.get("each_run") or cause.get("per_run")
-    return effect(joint=cause["joint"], each_run=bool(effect.may_differ and differs))
+def effect_of_cause(cause: "Cause | Tie") -> Effect:
+    """Return the effect of a verdict's cause, or of a rival that is tied with one."""
+    effect = effect_named(cause.effect)
+    return effect(joint=cause.joint, each_run=bool(effect.may_differ and cause.per_run))
 
 
 def number(machine: Machine, torque: float) -> str:

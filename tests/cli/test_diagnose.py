@@ -5,9 +5,10 @@ import re
 import pytest
 
 from exoid_cli.console import console
-from exoid_cli.verdict_view import ERRORS, _in_words, show_verdict
+from exoid_cli.verdict_view import _in_words, show_verdict
 from pipelines.contracts import HIP_AND_KNEE, Joint
-from tests.report.sessions import decision_of, verdict_of
+from pipelines.contracts.verdict import Parameter
+from tests.report.sessions import checked_verdict, decision_of, verdict_of
 
 
 @pytest.fixture(autouse=True)
@@ -30,19 +31,20 @@ ROW = re.compile(r"^( *)(\w.*?) +([01]\.\d\d)$", flags=re.MULTILINE)
     ids=["measured", "a pure number", "chosen"],
 )
 def test_a_parameter_has_its_unit_and_an_interval_only_if_it_was_fitted(value, unit, ci95, output):
-    assert _in_words({"name": "play", "value": value, "unit": unit, "ci95": ci95}) == output
+    parameter = Parameter(name="play", value=value, unit=unit, ci95=ci95)
+    assert _in_words(parameter) == output
 
 
 def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
-    show_verdict(verdict_of(status="nothing_missing", causes=[]), HIP_AND_KNEE)
+    show_verdict(checked_verdict(status="nothing_missing", causes=[]), HIP_AND_KNEE)
     printed = capsys.readouterr().out
     assert "with the causes" not in printed
     assert "excess left" not in printed
 
 
 def test_an_error_stands_next_to_its_torque_which_older_files_lack(capsys):
-    show_verdict(verdict_of(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
-    show_verdict(verdict_of(), HIP_AND_KNEE)
+    show_verdict(checked_verdict(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
+    show_verdict(checked_verdict(), HIP_AND_KNEE)
     knee, older = [
         line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")
     ][::2]
@@ -52,18 +54,17 @@ def test_an_error_stands_next_to_its_torque_which_older_files_lack(capsys):
 
 def test_a_gait_is_printed_of_a_leg_alone(capsys):
     slide = [Joint("axis", "prismatic")]
-    errors = {key: {"axis": 0.5} for key in (*ERRORS, "unexplained")}
-    control = verdict_of()["control"] | {
+    control = verdict_of(slide)["control"] | {
         "reason": "the reference case is a leg's gait, with its gains and limits"
     }
-    show_verdict(verdict_of(**errors, control=control), slide)
+    show_verdict(checked_verdict(slide, control=control), slide)
     assert "adaptive control" not in capsys.readouterr().out
-    show_verdict(verdict_of(), HIP_AND_KNEE)
+    show_verdict(checked_verdict(), HIP_AND_KNEE)
     assert "adaptive control" in capsys.readouterr().out
 
 
 def shown(capsys, **decision):
-    show_verdict(verdict_of(**decision), HIP_AND_KNEE)
+    show_verdict(checked_verdict(**decision), HIP_AND_KNEE)
     return capsys.readouterr().out
 
 
@@ -196,5 +197,5 @@ def test_a_verdict_of_an_older_version_is_shown_without_findings(capsys):
 
 def test_what_slides_depends_on_its_position(capsys):
     joints = (Joint("axis", "prismatic"),)
-    show_verdict(verdict_of(joints, **decision_of(joints)), joints)
+    show_verdict(checked_verdict(joints, **decision_of(joints)), joints)
     assert "per run  position  speed\n" in capsys.readouterr().out

@@ -9,14 +9,14 @@ from matplotlib import pyplot as plt
 from pipelines.diagnosis.verdict.figures.decision import FAMILIES, UNLISTED, _bars, figure
 from pipelines.effects import Family
 from tests.diagnosis.test_findings_in_words import ANGLE, COGGING, HUM, OFFSET, SPEED, diagnosed
-from tests.report.sessions import decision_of, verdict_of
+from tests.report.sessions import checked_verdict, decision_of
 
 SETS = {(SPEED, ANGLE): 0.5, (OFFSET, ANGLE): 0.3, (SPEED, HUM): 0.15, (COGGING,): 0.042, (): 0.008}
 
 
 @pytest.fixture
 def drawn():
-    drawing = figure(diagnosed(SETS), verdict_of(**decision_of()))
+    drawing = figure(diagnosed(SETS), checked_verdict(**decision_of()))
     yield drawing
     plt.close(drawing)
 
@@ -79,6 +79,6 @@ def test_labels_do_not_overlap(drawn):
 def test_where_acquisition_is_at_fault_nothing_is_said_to_explain_it():
     d = diagnosed(SETS)
     d.selected = replace(d.selected, posterior=None)
-    drawing = figure(d, verdict_of(**decision_of() | {"posterior": None}))
+    drawing = figure(d, checked_verdict(**decision_of() | {"posterior": None}))
     assert "acquisition is at fault" in drawing.axes[2].texts[0].get_text()
     plt.close(drawing)

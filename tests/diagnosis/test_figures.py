@@ -7,6 +7,7 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.fitted_model import model_of_run
@@ -56,7 +57,7 @@ def diagnosed():
         if name not in results:
             diagnosis = diagnose(SESSIONS[name]())
             diagnosis = naming(diagnosis, NAMED[name]) if name in NAMED else diagnosis
-            results[name] = diagnosis, verdict(diagnosis)
+            results[name] = diagnosis, Verdict.model_validate(verdict(diagnosis))
         return results[name]
 
     return of
@@ -71,37 +72,35 @@ def no_figure_stays():
 @pytest.mark.parametrize("name", SESSIONS)
 def test_the_shares_of_the_error_add_up_to_the_baselines_mean_square(diagnosed, name):
     _, outcome = diagnosed(name)
-    for joint, shares in outcome["error_budget"].items():
-        assert sum(shares.values()) == pytest.approx(
-            outcome["baseline_rmse_nm"][joint] ** 2, rel=1e-9
-        )
+    for joint, shares in outcome.error_budget.items():
+        assert sum(shares.values()) == pytest.approx(outcome.baseline_rmse_nm[joint] ** 2, rel=1e-9)
         assert all(share >= 0 for key, share in shares.items() if "@" not in key)
 
 
 def test_a_spring_takes_the_error_at_its_joint_down_to_the_floor(diagnosed):
     diagnosis, outcome = diagnosed("explained")
     assert diagnosis.causes == ("parallel_spring@knee",)
-    knee = outcome["error_budget"]["knee"]
+    knee = outcome.error_budget["knee"]
     assert list(knee) == [
         "noise_floor",
         "parallel_spring@knee",
         "repeatable_unexplained",
         "not_repeatable",
     ]
-    assert knee["parallel_spring@knee"] > 0.9 * outcome["baseline_rmse_nm"]["knee"] ** 2
+    assert knee["parallel_spring@knee"] > 0.9 * outcome.baseline_rmse_nm["knee"] ** 2
     assert knee["repeatable_unexplained"] < 0.1 * knee["noise_floor"]
 
 
 def test_a_hum_between_the_harmonics_does_not_repeat(diagnosed):
     _, outcome = diagnosed("unknown")
-    assert outcome["status"] == "unknown_cause"
-    knee = outcome["error_budget"]["knee"]
+    assert outcome.status == "unknown_cause"
+    knee = outcome.error_budget["knee"]
     assert knee["not_repeatable"] > 3 * knee["repeatable_unexplained"]
     assert "tone of 7.6" in drawing.DRAWN_BY["verdict"](*diagnosed("unknown")).axes[1].get_xlabel()
 
 
 def test_without_periods_no_share_claims_to_repeat(diagnosed):
-    knee = diagnosed("one kind, no periods")[1]["error_budget"]["knee"]
+    knee = diagnosed("one kind, no periods")[1].error_budget["knee"]
     assert list(knee) == ["noise_floor", "parallel_spring@knee", "unexplained"]
 
 
@@ -143,7 +142,7 @@ def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
     drawn = [bar.get_width() for bar in bars]
     wanted = [
         100 * s / sum(shares.values())
-        for shares in outcome["error_budget"].values()
+        for shares in outcome.error_budget.values()
         for s in shares.values()
     ]
     np.testing.assert_allclose(drawn, wanted)
@@ -156,7 +155,7 @@ def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_pr
     diagnosis, outcome = diagnosed(name)
     shares, _, sets = drawing.DRAWN_BY["decision"](diagnosis, outcome).axes
     parts = [
-        outcome["router"][joint][part] or 0.0
+        getattr(outcome.router[joint], part) or 0.0
         for joint in diagnosis.baseline.joints
         for part in ("noise", "wanders", "between_runs", "unsplit", "repeats")
     ]
@@ -188,19 +187,17 @@ def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
 
 def test_what_the_residual_goes_with_most_is_drawn_first(diagnosed):
     diagnosis, outcome = diagnosed("explained")
-    ranking = outcome["depends_on"]["knee"]
+    ranking = outcome.depends_on["knee"]
     drawn = drawing.DRAWN_BY["dependence"](diagnosis, outcome)
     first = next(axis for axis in drawn.axes if axis.get_ylabel() == "knee residual, N·m")
-    assert first.get_xlabel().startswith(f"knee {ranking[0]['variable']}, ")
-    assert (
-        first.get_title() == f"{ranking[0]['share_before']:.0%} → {ranking[0]['share_after']:.0%}"
-    )
+    assert first.get_xlabel().startswith(f"knee {ranking[0].variable}, ")
+    assert first.get_title() == f"{ranking[0].share_before:.0%} → {ranking[0].share_after:.0%}"
 
 
 def test_a_named_cause_leaves_nothing_that_goes_with_its_variable(diagnosed):
-    ranking = {one["variable"]: one for one in diagnosed("explained")[1]["depends_on"]["knee"]}
-    assert ranking["angle"]["share_before"] > 0.5
-    assert ranking["angle"]["share_after"] < 0.1
+    ranking = {one.variable: one for one in diagnosed("explained")[1].depends_on["knee"]}
+    assert ranking["angle"].share_before > 0.5
+    assert ranking["angle"].share_after < 0.1
 
 
 def test_a_tone_is_folded_onto_its_crest(diagnosed):
@@ -243,7 +240,7 @@ def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypa
     monkeypatch.setattr(worst_stretch, "replay", impossible)
     nowhere = dict.fromkeys(diagnosis.baseline.joints)
     drawn = drawing.DRAWN_BY["simulation"](
-        diagnosis, outcome | {"baseline_simulation_rmse_rad": nowhere}
+        diagnosis, outcome.model_copy(update={"baseline_simulation_rmse_rad": nowhere})
     )
     words = [text.get_text() for text in drawn.legends[0].get_texts()]
     assert "rigid body and friction (cannot be simulated)" in words

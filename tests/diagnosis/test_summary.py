@@ -9,6 +9,7 @@ import pytest
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Table
+from pipelines.contracts.verdict import Cause, Tie
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnose import diagnose
@@ -29,13 +30,11 @@ from tests.diagnosis.naming import missing, naming
 from tests.diagnosis.sessions import recordings
 
 LABEL = "parallel_spring@knee"
-SPRING = {
-    "effect": "parallel_spring",
-    "joint": "knee",
-    "probability": 0.97,
-    "indistinguishable_from": [],
-}
-STRIBECK = SPRING | {"effect": "stribeck_friction", "joint": "hip"}
+SPRING = Cause.model_construct(
+    effect="parallel_spring", joint="knee", probability=0.97, indistinguishable_from=[]
+)
+TILT = Tie.model_construct(effect="base_tilt", joint=None)
+STRIBECK = SPRING.model_copy(update={"effect": "stribeck_friction", "joint": "hip"})
 
 
 @pytest.fixture(scope="module")
@@ -289,13 +288,13 @@ def test_an_error_that_grows_is_not_said_to_fall(stuck):
 
 
 def test_of_tied_causes_the_first_is_what_was_fitted(stuck):
-    tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
+    tied = SPRING.model_copy(update={"indistinguishable_from": [TILT]})
     d = with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.5, 0.3])
     assert "(together 0.97). With the first of them the knee's" in finding_in_words(d, [tied], None)
 
 
 def test_ties_are_one_answer_with_one_probability():
-    tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
+    tied = SPRING.model_copy(update={"indistinguishable_from": [TILT]})
     assert (
         _in_words(tied)
         == "parallel spring at the knee or base tilt, which these data cannot separate (together"

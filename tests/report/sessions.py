@@ -17,6 +17,7 @@ from pipelines.contracts import (
     Joint,
     describe,
 )
+from pipelines.contracts.verdict import Verdict
 
 LEG = HIP_AND_KNEE
 AXIS = (Joint("axis", "prismatic"),)
@@ -223,6 +224,10 @@ def verdict_of(joints=LEG, **changes):
         "noise_floor_from": "periods",
     }
     return told | changes
+
+
+def checked_verdict(joints=LEG, **changes):
+    return Verdict.model_validate(verdict_of(joints, **changes))
 
 
 def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):

@@ -4,22 +4,27 @@ import re
 
 import pytest
 
+from pipelines.contracts.verdict import OneRun, Tie
 from pipelines.report.html.report import report
 from pipelines.report.sections.key_figures import tiles
 from pipelines.report.session import find
 from pipelines.wording.causes import causes_in_words, labels_in_words
-from tests.report.sessions import AXIS, decision_of, verdict_of, write_session, write_verdict
+from tests.report.sessions import (
+    AXIS,
+    checked_verdict,
+    decision_of,
+    write_session,
+    write_verdict,
+)
 
 FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
 
 
 def cause(effect="cogging", joint="knee", ties=()):
-    first = verdict_of()["causes"][0]
-    rivals = [
-        {"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1}
-        for e, j in ties
-    ]
-    return first | {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
+    first = checked_verdict().causes[0]
+    rivals = [Tie(effect=e, joint=j, why="", how_to_separate="", probability=0.1) for e, j in ties]
+    update = {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
+    return first.model_copy(update=update)
 
 
 @pytest.mark.parametrize(
@@ -40,10 +45,9 @@ def test_the_headline_claims_no_cause_that_is_tied(ties, said):
 
 
 def test_a_tie_that_would_differ_from_run_to_run_is_called_so():
-    tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {
-        "each_run": [{"file": "a", "values": {}}]
-    }
-    tied["indistinguishable_from"][0]["per_run"] = True
+    tied = cause("torque_offset", ties=[("encoder_offset", "knee")])
+    tied.each_run = [OneRun(file="a", purpose="train", values={})]
+    tied.indistinguishable_from[0].per_run = True
     assert causes_in_words([tied]) == "per-run torque offset or per-run encoder offset at the knee"
 
 

@@ -23,6 +23,7 @@ from pipelines.report.session_charts import charts
 from tests.report.sessions import (
     AXIS,
     RUN,
+    checked_verdict,
     verdict_of,
     write_parameters,
     write_recording,
@@ -343,10 +344,10 @@ def test_a_verdict_without_causes_shows_the_model_without_them_alone(tmp_path, s
 def test_a_budget_below_the_floor_says_so_and_gives_no_second_floor(tmp_path):
     shares = {joint: {"noise_floor": 0.07, "unexplained": 0.0} for joint in ("hip", "knee")}
     floor = {joint: 0.3 for joint in shares}
-    below, _ = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    below, _ = budget(checked_verdict(error_budget=shares, noise_floor_nm=floor))
     assert below.segments[0].label == "noise, all of it below the floor"
     floor = {joint: 0.07**0.5 for joint in shares}
-    at, _ = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    at, _ = budget(checked_verdict(error_budget=shares, noise_floor_nm=floor))
     assert at.segments[0].label == "noise floor"
 
 

@@ -1,8 +1,7 @@
 """Write the summary: the verdict in one or two sentences, for the first look."""
 
-from typing import Any
-
 from pipelines.contracts.joints import the
+from pipelines.contracts.verdict import Cause, Finding
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import Diagnosis
@@ -10,7 +9,7 @@ from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.unexplained import Unexplained
-from pipelines.wording.label import amount, cause_label, effect_of_cause, in_words, label_in_words
+from pipelines.wording.label import amount, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import UNLISTED
 
 MENTIONED = 3
@@ -19,7 +18,7 @@ CLOSEST = 0.05
 """Least probability of a cause that is reported as the closest."""
 
 
-def summary(d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None) -> str:
+def summary(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) -> str:
     """Return the verdict's first sentences."""
     if d.data.spoilt:
         return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
@@ -66,9 +65,7 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
     return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 
-def finding_in_words(
-    d: Diagnosis, causes: list[dict[str, Any]], remainder: Unexplained | None
-) -> str:
+def finding_in_words(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) -> str:
     """Return the finding in words, without remarks on floor and faults."""
     described = f" {remainder.description}" if remainder and remainder.description else ""
     if d.status == "nothing_missing":
@@ -131,41 +128,43 @@ def _nearest(d: Diagnosis) -> str:
     return f" {words[:1].upper()}{words[1:]} ({p:.2f}) comes closest."
 
 
+def _findings(d: Diagnosis) -> list[Finding]:
+    return [Finding.model_validate(one) for one in findings(d)]
+
+
 def _unlisted(d: Diagnosis) -> str:
     """Return in words, at the known depth, the missing effect that no listed cause explains."""
-    results = findings(d)
+    results = _findings(d)
     if not results:
         return "Something is missing, and no listed cause is likely."
     first, *more = results
-    also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
+    also = "".join(f"; and {one.words} ({one.probability:.2f})" for one in more)
     which = (
         "that no listed cause explains"
         if d.selected.shows_unlisted
         else "and these data do not show which listed cause it is"
     )
     text = (
-        f"Something is missing {which}: {first['words']} (probability"
-        f" {first['probability']:.2f}){also}."
+        f"Something is missing {which}: {first.words} (probability {first.probability:.2f}){also}."
     )
-    laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
+    laws = [law for law in first.laws if law.probability >= CRITERIA.likely]
     # An unlisted effect that resembles a listed cause is described by that cause.
-    if laws and laws[0]["words"] != first["words"] and not laws[0]["law"].startswith(UNLISTED):
-        text += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
+    if laws and laws[0].words != first.words and not laws[0].law.startswith(UNLISTED):
+        text += f" Most likely it is {laws[0].words} ({laws[0].probability:.2f})."
     return f"{text}{_dropped(d) or _closest(d, first)}"
 
 
-def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
+def _closest(d: Diagnosis, finding: Finding) -> str:
     """Return in words the closest listed cause, if any, and why it is not named."""
-    close = [one for one in finding["causes"] if one["probability"] >= CLOSEST]
-    if not close:
+    closest = next((one for one in finding.causes if one.probability >= CLOSEST), None)
+    if closest is None:
         return ""
-    words, p = close[0]["words"], close[0]["probability"]
-    share = d.selected.removed.get(cause_label(close[0]), 1.0)
+    share = d.selected.removed.get(closest.label, 1.0)
     only = (
         f", but removes only {100.0 * share:.0f} % of the systematic error on the validation runs"
     )
     but = only if share < NEARLY_ALL else ""
-    return f" Of the listed causes {words} ({p:.2f}) comes closest{but}."
+    return f" Of the listed causes {closest.words} ({closest.probability:.2f}) comes closest{but}."
 
 
 def _dropped(d: Diagnosis) -> str:
@@ -189,9 +188,9 @@ def _dropped(d: Diagnosis) -> str:
     )
 
 
-def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
+def _named(d: Diagnosis, causes: list[Cause]) -> str:
     """Return in words the named causes and their gain."""
-    doubts = [doubt_of_gain(d, cause_label(cause)) for cause in causes]
+    doubts = [doubt_of_gain(d, cause.label) for cause in causes]
     named = "; and ".join(
         _in_words(cause) + (f", {doubt[0]}" if doubt else "")
         for cause, doubt in zip(causes, doubts, strict=True)
@@ -205,25 +204,25 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
         f" {amount(machine, joint, before[most])}, {before[most] / d.floor_rms[most]:.2f} times the"
         f" noise floor, to {amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
-    rest = [one for one in findings(d) if one["level"] != "cause"]
-    also = "".join(f" Also missing: {one['words']} ({one['probability']:.2f})." for one in rest)
+    rest = [one for one in _findings(d) if one.level != "cause"]
+    also = "".join(f" Also missing: {one.words} ({one.probability:.2f})." for one in rest)
     return (
         f"Missing from the simulation: {named}."
         f" {gain}{_no_gain_at_its_own(d, causes)}{also}{_dropped(d)}"
     )
 
 
-def _they(causes: list[dict[str, Any]]) -> str:
+def _they(causes: list[Cause]) -> str:
     """Return the pronoun of the fitted causes; of tied causes the first is fitted."""
     if len(causes) > 1:
         return "them"
-    return "the first of them" if causes[0]["indistinguishable_from"] else "it"
+    return "the first of them" if causes[0].indistinguishable_from else "it"
 
 
-def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
+def _no_gain_at_its_own(d: Diagnosis, causes: list[Cause]) -> str:
     """Report joints with a named cause whose error does not fall."""
     joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
-    with_one = {cause["joint"] for cause in causes}
+    with_one = {cause.joint for cause in causes}
     none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
     return "".join(
         f" At {the(joint)}, where a cause is named, the error does not fall." for joint in none
@@ -244,10 +243,10 @@ def _remains(d: Diagnosis, most: int) -> str:
     return (here if ratio[most] > CRITERIA.at_floor else "which is noise") + "".join(others)
 
 
-def _in_words(cause: dict[str, Any]) -> str:
+def _in_words(cause: Cause) -> str:
     """Return a cause, its ties, and their probability together, in words."""
-    alike = [in_words(effect_of_cause(one)) for one in (cause, *cause["indistinguishable_from"])]
-    likely = f"{cause['probability']:.2f}"
+    alike = [in_words(effect_of_cause(one)) for one in cause.alike]
+    likely = f"{cause.probability:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
     more = [f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else []

@@ -5,6 +5,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.contracts.verdict import Cause
 from pipelines.diagnosis.dependence.explained_share import Dependence, dependences
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import BuildUp
@@ -27,6 +28,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict as JSON objects, keys as in docs/contracts.md."""
     first, joints = d.validate[0], d.baseline.machine.joints
     causes = [_cause(d, named) for named in d.named]
+    named = [Cause.model_validate(cause) for cause in causes]
     before = dependences(d.validate, d.before.residuals)
     after = dependences(d.validate, d.after.residuals) if d.causes else before
     remainder = unexplained(d, after) if d.leaves_something else None
@@ -34,8 +36,8 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     return {
         "contract": "verdict/1",
         "status": d.status,
-        "summary": summary(d, causes, remainder),
-        "finding": None if d.data.spoilt else finding_in_words(d, causes, remainder),
+        "summary": summary(d, named, remainder),
+        "finding": None if d.data.spoilt else finding_in_words(d, named, remainder),
         "findings": findings(d),
         "sought_on": "train" if d.selected.by_all is None else "all",
         "router": {

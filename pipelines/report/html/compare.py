@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
+from pipelines.contracts.verdict import Cause
 from pipelines.errors import InputError
 from pipelines.report.html.page import render
 from pipelines.report.numbers import digits
@@ -14,7 +15,6 @@ from pipelines.report.sections.parameters import Estimate, estimates
 from pipelines.report.sections.settings_diff import SettingDifference, settings_diff
 from pipelines.report.session import Artifact, Session
 from pipelines.wording.causes import any_label_in_words, cause_in_words
-from pipelines.wording.label import cause_label
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,7 @@ def _verdict_change_in_words(pair: tuple[Session, Session]) -> str:
     first, second = (status(session.verdict)["words"] for session in pair)
     if first != second:
         return f"the verdict went from {first} to {second}"
-    one, other = (
-        {cause_label(cause) for cause in (session.verdict or {})["causes"]} for session in pair
-    )
+    one, other = ({cause.label for cause in session.causes} for session in pair)
     return "" if one == other else "other causes are named"
 
 
@@ -200,17 +198,17 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
     if not first or not second:
         return []
     kinds = [("rigid body and friction", "baseline_rmse_nm")]
-    if first["causes"] or second["causes"]:
+    if first.causes or second.causes:
         kinds.append(("with the causes that each names", "extended_rmse_nm"))
     return [
         ErrorAndFloor(
             joint,
             words,
             torque_unit(first, joint),
-            (first[key][joint], second[key][joint]),
-            (first["noise_floor_nm"][joint], second["noise_floor_nm"][joint]),
+            (getattr(first, key)[joint], getattr(second, key)[joint]),
+            (first.noise_floor_nm[joint], second.noise_floor_nm[joint]),
         )
-        for joint in first["baseline_rmse_nm"]
+        for joint in first.baseline_rmse_nm
         for words, key in kinds
     ]
 
@@ -289,7 +287,7 @@ def _model(
 
 def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
     """Return the parameters of one session only, in words, with its named causes."""
-    named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
+    named = {cause.label for cause in session.causes}
     return tuple(
         f"{one.words} of {any_label_in_words(_label(one))}, which it names"
         if _label(one) in named
@@ -304,10 +302,7 @@ def _label(estimate: Estimate) -> str:
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
     """Return the causes that either verdict names, with probability and gain in each."""
-    named = [
-        {cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])}
-        for session in pair
-    ]
+    named = [{cause.label: cause for cause in session.causes} for session in pair]
     return [
         {
             "words": " / ".join(
@@ -322,17 +317,17 @@ def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
     ]
 
 
-def _cause_cell(session: Session, cause: dict[str, Any] | None) -> dict[str, Any] | None:
+def _cause_cell(session: Session, cause: Cause | None) -> dict[str, Any] | None:
     if cause is None:
         return None
     assert session.verdict
-    low, high = cause["gain"]["ci95"]
+    low, high = cause.gain.ci95
     return {
-        "probability": cause["probability"],
-        "gain": cause["gain"]["rmse_reduction_nm"],
+        "probability": cause.probability,
+        "gain": cause.gain.rmse_reduction_nm,
         "low": low,
         "high": high,
-        "unit": torque_unit(session.verdict, cause["gain"].get("joint") or cause["joint"]),
+        "unit": torque_unit(session.verdict, cause.gain.joint),
     }
 
 

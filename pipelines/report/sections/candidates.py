@@ -35,7 +35,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     labels = {label for row in rows for label in row["causes"]}
     named = next((row for row in rows if row["verdict"] == "named"), None)
     # The table does not say whether another set's zeros are one for all runs or each run's own.
-    words = shares_in_words(session.verdict or {"causes": []})
+    words = shares_in_words(session.causes)
     shown = []
     for row in rows:
         extra = _beyond(row, named)

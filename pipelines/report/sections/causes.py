@@ -2,29 +2,29 @@
 
 from typing import Any
 
+from pipelines.contracts.verdict import Cause
 from pipelines.report.sections.per_run_values import per_run_values
 from pipelines.report.sections.section import Content
-from pipelines.wording.causes import cause_in_words, ties_of
+from pipelines.wording.causes import cause_in_words
 
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's cards of causes."""
-    causes = content.verdict["causes"] if content.verdict else []
-    return {"causes": [_cause(cause) for cause in causes]}
+    return {"causes": [_cause(cause) for cause in content.session.causes]}
 
 
-def _cause(cause: dict[str, Any]) -> dict[str, Any]:
+def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "words": cause_in_words(cause),
         "own": per_run_values(cause),
-        "evidence": cause["evidence"],
+        "evidence": cause.evidence,
         "ties": [
             {
                 "words": cause_in_words(tie),
-                "probability": tie.get("probability"),
-                "why": tie["why"],
-                "how": tie["how_to_separate"],
+                "probability": tie.probability,
+                "why": tie.why,
+                "how": tie.how_to_separate,
             }
-            for tie in ties_of(cause)
+            for tie in cause.indistinguishable_from
         ],
     }

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.contracts import Joint
+from pipelines.contracts.verdict import Verdict
 from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.sections.fit_quality import MODELS, models_of
 from pipelines.report.sections.section import Content
@@ -29,31 +30,29 @@ def context(content: Content) -> dict[str, Any]:
     }
 
 
-def _comparison(verdict: dict[str, Any]) -> dict[str, Any] | None:
+def _comparison(verdict: Verdict) -> dict[str, Any] | None:
     """Return the table of tracking errors and torques; None without a simulated loop."""
-    loop_of = verdict.get("control") or {}
-    words_of = {"without": "rigid body and friction"}
-    if verdict["causes"]:
-        words_of["with"] = "with the causes"
+    control = verdict.control
+    loops = [("without", "rigid body and friction", control.without)]
+    if verdict.causes:
+        loops.append(("with", "with the causes", control.with_))
     rows = [
         {
             "key": key,
             "words": words,
-            "error": {
-                joint: 1e3 * value for joint, value in loop_of[key]["tracking_rmse_rad"].items()
-            },
-            "torque": loop_of[key]["peak_torque_nm"],
+            "error": {joint: 1e3 * value for joint, value in loop.tracking_rmse_rad.items()},
+            "torque": loop.peak_torque_nm,
         }
-        for key, words in words_of.items()
-        if loop_of.get(key)
+        for key, words, loop in loops
+        if loop
     ]
     if not rows:
         return None
     return {
-        "run": loop_of["run"].replace("_", " "),
+        "run": control.run.replace("_", " "),
         "joints": list(rows[0]["torque"]),
         "rows": rows,
-        "settled_s": (loop_of.get("controller") or {}).get("settled_after_s"),
+        "settled_s": control.controller.get("settled_after_s"),
     }
 
 

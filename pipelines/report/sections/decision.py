@@ -1,9 +1,9 @@
 """The two cards of the decision: whether something is missing, and how the residual splits."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.report.sections.error_budget import torque_unit
 from pipelines.report.sections.section import Content
 from pipelines.wording.findings import PARTS, Row, Shares, outcomes, rows, searched_runs, shares
@@ -60,7 +60,7 @@ def context(content: Content) -> dict[str, Any]:
     return {"decision": decision(content.verdict) if content.verdict else None}
 
 
-def decision(verdict: Mapping[str, Any]) -> Decision | None:
+def decision(verdict: Verdict) -> Decision | None:
     """Return a verdict's decision; None in files of older versions."""
     cases = outcomes(verdict)
     if not cases:
@@ -73,11 +73,11 @@ def decision(verdict: Mapping[str, Any]) -> Decision | None:
     )
 
 
-def _split(verdict: Mapping[str, Any], one: Shares) -> Split:
+def _split(verdict: Verdict, one: Shares) -> Split:
     parts = [(PARTS[name], tone, one.parts[name]) for name, tone in TONES.items()]
     return Split(
         one.joint,
-        torque_unit(dict(verdict), one.joint),
+        torque_unit(verdict, one.joint),
         one.rms,
         _end_to_end(parts),
         one.with_person_only,

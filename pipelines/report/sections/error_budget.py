@@ -2,9 +2,10 @@
 
 from typing import Any
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.report.charts.bars import Bar, Fall, Segment
 from pipelines.report.sections.section import Content
-from pipelines.wording.causes import any_label_in_words, shares_in_words, ties_of
+from pipelines.wording.causes import any_label_in_words, shares_in_words
 from pipelines.wording.label import SHARES
 
 TONES = {
@@ -24,19 +25,21 @@ def context(content: Content) -> dict[str, Any]:
     if not verdict:
         return {"falls": [], "budget": [], "with_causes": ""}
     # Of tied causes the model holds the most probable one.
-    which = "likeliest" if any(map(ties_of, verdict["causes"])) else "named"
+    which = (
+        "likeliest" if any(cause.indistinguishable_from for cause in verdict.causes) else "named"
+    )
     return {
         "falls": falls(verdict),
         "budget": budget(verdict),
-        "with_causes": f"with the {which} cause{'s' * (len(verdict['causes']) > 1)}",
+        "with_causes": f"with the {which} cause{'s' * (len(verdict.causes) > 1)}",
     }
 
 
-def budget(verdict: dict[str, Any]) -> list[Bar]:
+def budget(verdict: Verdict) -> list[Bar]:
     """Return a bar for each joint; causes that raise its error lie left of zero."""
     bars = []
-    words_of = shares_in_words(verdict)
-    for joint, shares in verdict["error_budget"].items():
+    words_of = shares_in_words(verdict.causes)
+    for joint, shares in verdict.error_budget.items():
         low = high = 0.0
         segments = []
         causes = [key for key in shares if key not in SHARES]
@@ -44,7 +47,7 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
             start = high if share >= 0 else low
             tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
             words = SHARES.get(key) or words_of.get(key) or any_label_in_words(key)
-            if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
+            if key == "noise_floor" and share < 0.999 * verdict.noise_floor_nm[joint] ** 2:
                 words = "noise, all of it below the floor"
             end = start + share
             segments.append(Segment(key, words, tone, min(start, end), max(start, end), share))
@@ -56,23 +59,23 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
     return bars
 
 
-def falls(verdict: dict[str, Any]) -> list[Fall]:
+def falls(verdict: Verdict) -> list[Fall]:
     """Return each joint's error without and with the causes."""
-    named = bool(verdict["causes"])
+    named = bool(verdict.causes)
     return [
         Fall(
             joint,
             torque_unit(verdict, joint),
             before,
-            verdict["extended_rmse_nm"][joint] if named else None,
-            verdict["noise_floor_nm"][joint],
-            verdict["unexplained"][joint],
-            (verdict.get("torque_rms_nm") or {}).get(joint),
+            verdict.extended_rmse_nm[joint] if named else None,
+            verdict.noise_floor_nm[joint],
+            verdict.unexplained[joint],
+            (verdict.torque_rms_nm or {}).get(joint),
         )
-        for joint, before in verdict["baseline_rmse_nm"].items()
+        for joint, before in verdict.baseline_rmse_nm.items()
     ]
 
 
-def torque_unit(verdict: dict[str, Any], joint: str) -> str:
+def torque_unit(verdict: Verdict, joint: str) -> str:
     """Return the unit of a joint's torque or force."""
-    return verdict.get("units", {}).get(joint, {}).get("torque", "N·m")
+    return verdict.units[joint].get("torque", "N·m")

@@ -29,7 +29,7 @@ def run_names(session: Session) -> list[str]:
 
 def models_of(session: Session) -> dict[str, tuple[Role, str]]:
     """Return the models to draw: without a named cause, the baseline only."""
-    named = session.verdict is None or bool(session.verdict["causes"])
+    named = session.verdict is None or bool(session.causes)
     return {name: title for name, title in MODELS.items() if named or name == "baseline"}
 
 
@@ -37,11 +37,11 @@ def torque_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each run and joint: torque, and the residual of each model."""
     if session.residuals is None:
         return
-    frame, floors = session.residuals.frame, (session.verdict or {}).get("noise_floor_nm", {})
+    frame = session.residuals.frame
     for run in run_names(session):
         of_run = frame[frame["file"] == run]
         for joint in session.joints:
-            yield _torque_chart(session, run, joint, of_run, floors.get(joint.name))
+            yield _torque_chart(session, run, joint, of_run, session.noise_floor(joint))
 
 
 def _torque_chart(
@@ -153,7 +153,7 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         return
     rows = session.residuals.frame
     rows = rows[rows["file"] == run]
-    floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
+    floor = session.noise_floor(joint)
     grew_away_from_reversals = False
     for words, chosen in (
         ("away from reversals", rows[rows["scored"]]),

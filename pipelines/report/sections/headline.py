@@ -3,6 +3,7 @@
 from typing import Any
 
 from pipelines.contracts.joints import either
+from pipelines.contracts.verdict import Verdict
 from pipelines.report.sections.recordings import origin
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
@@ -46,13 +47,13 @@ def machine(session: Session) -> str:
     return " · ".join(filter(None, (joints, "; ".join(about[:3]))))
 
 
-def status(verdict: dict[str, Any] | None) -> dict[str, str]:
+def status(verdict: Verdict | None) -> dict[str, str]:
     """Return a verdict's status in words, and the tone of its badge."""
     if not verdict:
         return {"words": "not diagnosed", "tone": ""}
-    if verdict.get("acquisition_at_fault"):
+    if verdict.acquisition_at_fault:
         return {"words": "acquisition, not physics", "tone": "bad"}
-    words, tone = STATUS.get(verdict["status"], (verdict["status"].replace("_", " "), ""))
+    words, tone = STATUS.get(verdict.status, (verdict.status.replace("_", " "), ""))
     return {"words": words, "tone": tone}
 
 
@@ -61,25 +62,24 @@ def headline(session: Session) -> str:
     verdict = session.verdict
     if not verdict:
         return "The verdict cannot be read" if session.has_damaged_verdict else "Not diagnosed yet"
-    if verdict.get("acquisition_at_fault"):
+    if verdict.acquisition_at_fault:
         return "The recordings are at fault, not the model"
-    if verdict["causes"]:
-        return f"The simulation misses {causes_in_words(verdict['causes'])}"
-    findings = verdict.get("findings")
-    if verdict["status"] == "unknown_cause" and findings:
-        return f"The simulation misses {findings[0]['words']}, and no listed cause explains it"
-    return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
+    if verdict.causes:
+        return f"The simulation misses {causes_in_words(verdict.causes)}"
+    if verdict.status == "unknown_cause" and verdict.findings:
+        missing = verdict.findings[0].words
+        return f"The simulation misses {missing}, and no listed cause explains it"
+    return HEADLINES.get(verdict.status, verdict.status.replace("_", " "))
 
 
-def lead(verdict: dict[str, Any]) -> str:
+def lead(verdict: Verdict) -> str:
     """Return the finding in two sentences; the whole summary in files of older versions."""
-    return str(verdict.get("finding") or verdict["summary"])
+    return verdict.finding or verdict.summary
 
 
-def _first_fault(verdict: dict[str, Any]) -> tuple[str, int]:
+def _first_fault(verdict: Verdict) -> tuple[str, int]:
     """Return the first data fault next to a finding, and the number of others; empty if none."""
-    faults = verdict["data_faults"]
-    if not faults or not verdict.get("finding"):
+    if not verdict.data_faults or not verdict.finding:
         return "", 0
-    first = faults[0]
-    return f"{first['file']}, {first['channel']}: {first['what']}", len(faults) - 1
+    first, *others = verdict.data_faults
+    return f"{first.file}, {first.channel}: {first.what}", len(others)

@@ -5,13 +5,14 @@ from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
+from pipelines.contracts.verdict import Cause, Verdict
 from pipelines.report.numbers import digits
 from pipelines.report.sections.error_budget import falls, torque_unit
 from pipelines.report.sections.fit_quality import replayed
 from pipelines.report.sections.section import Content
 from pipelines.report.sections.standstill import simulation_error_grew
 from pipelines.report.session import Session
-from pipelines.wording.causes import cause_in_words, ties_of
+from pipelines.wording.causes import cause_in_words
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,9 @@ def tiles(session: Session) -> list[Tile]:
     if not verdict:
         return []
     # The tree of findings shows each probability; verdicts of older versions have no tree.
-    skipped = bool(verdict.get("findings"))
+    skipped = bool(verdict.findings)
     results = [
-        tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]
+        tile for cause in verdict.causes[:2] for tile in _cause_tiles(verdict, cause)[skipped:]
     ]
     for fall in falls(verdict):
         if fall.unexplained is not None:
@@ -54,23 +55,25 @@ def worst_joint(session: Session) -> Joint | None:
     verdict = session.verdict
     if not verdict:
         return None
-    before, floor = verdict["baseline_rmse_nm"], verdict["noise_floor_nm"]
-    name = verdict["causes"][0]["gain"]["joint"] if verdict["causes"] else None
-    name = name or max(before, key=lambda joint: before[joint] / floor[joint])
+    before, floor = verdict.baseline_rmse_nm, verdict.noise_floor_nm
+    if verdict.causes:
+        name = verdict.causes[0].gain.joint
+    else:
+        name = max(before, key=lambda joint: before[joint] / floor[joint])
     return next((joint for joint in session.joints if joint.name == name), None)
 
 
-def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
-    gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
-    joint = cause["gain"]["joint"]
-    remaining = verdict["extended_rmse_nm"][joint]
-    qualifier = ", given the other causes" if len(verdict["causes"]) > 1 else ""
-    unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
+def _cause_tiles(verdict: Verdict, cause: Cause) -> list[Tile]:
+    gain, (low, high) = cause.gain.rmse_reduction_nm, cause.gain.ci95
+    joint = cause.gain.joint
+    remaining = verdict.extended_rmse_nm[joint]
+    qualifier = ", given the other causes" if len(verdict.causes) > 1 else ""
+    unit, ties = torque_unit(verdict, joint), len(cause.indistinguishable_from)
     words = cause_in_words(cause)
     return [
         Tile(
             "probability" + (", with its ties" if ties else ""),
-            f"{100 * cause['probability']:.0f}",
+            f"{100 * cause.probability:.0f}",
             "%",
             words + (f", or one of {ties} that these data cannot separate from it" if ties else ""),
         ),
@@ -84,17 +87,17 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     ]
 
 
-def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
+def _simulation_tiles(session: Session, verdict: Verdict) -> list[Tile]:
     """Return the error of simulations of one second, at the worst joint."""
     joint = worst_joint(session)
-    before = verdict["baseline_simulation_rmse_rad"].get(joint.name) if joint else None
+    before = verdict.baseline_simulation_rmse_rad.get(joint.name) if joint else None
     if not joint or before is None:
         return []
-    after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
+    after = verdict.extended_simulation_rmse_rad[joint.name] if verdict.causes else None
     big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
     is_worse = simulation_error_grew(before, after)
     small = "rms of all runs, as the diagnosis fits them"
-    if verdict["causes"] and after is None:
+    if verdict.causes and after is None:
         small = "without the causes; with them it cannot be simulated"
     elif is_worse:
         small = "worse with the causes; the reason is below"

@@ -5,7 +5,6 @@ from pipelines.errors import ExoidError
 from pipelines.report.sections.fit_quality import models_of, replayed
 from pipelines.report.session import Session
 from pipelines.wording.causes import labels_in_words
-from pipelines.wording.label import cause_label
 
 
 def lacks_causes(session: Session, run: str) -> bool:
@@ -27,6 +26,5 @@ def refusal(session: Session, run: str) -> str:
     except ExoidError as error:
         # The rest of the message advises the user of `exoid simulate`.
         reason, _, _ = str(error).partition("; ")
-        causes = (session.verdict or {}).get("causes", [])
-        return labels_in_words(reason, [cause_label(cause) for cause in causes])
+        return labels_in_words(reason, [cause.label for cause in session.causes])
     return ""

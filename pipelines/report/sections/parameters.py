@@ -90,11 +90,10 @@ def models(session: Session) -> list[Model]:
         for one in session.identified
     ]
     if session.extended:
-        named = bool(session.verdict and session.verdict["causes"])
         results.append(
             (
                 session.extended,
-                "Extended by the named causes" if named else "As the diagnosis fitted it",
+                "Extended by the named causes" if session.causes else "As the diagnosis fitted it",
             )
         )
     return [_model(session, one, title) for one, title in results]

@@ -1,8 +1,8 @@
 """Values of a named cause that differ from run to run: a zero, an onset, a phase."""
 
 from dataclasses import dataclass
-from typing import Any
 
+from pipelines.contracts.verdict import Cause, OneRun
 from pipelines.report.sections.parameters import Estimate
 
 
@@ -25,41 +25,38 @@ class PerRunValues:
     runs: tuple[RunValues, ...]
 
 
-def per_run_values(cause: dict[str, Any]) -> PerRunValues | None:
+def per_run_values(cause: Cause) -> PerRunValues | None:
     """Return a cause's values in each run; None if all runs share them."""
-    runs = cause.get("each_run") or []
-    if not runs:
+    if not cause.each_run:
         return None
-    units = {one["name"]: "" if one["unit"] == "1" else one["unit"] for one in cause["parameters"]}
-    names = tuple(runs[0]["values"])
+    units = {one.name: "" if one.unit == "1" else one.unit for one in cause.parameters}
+    names = tuple(cause.each_run[0].values)
     return PerRunValues(
         tuple(
             ", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names
         ),
         tuple(
             RunValues(
-                run["file"],
-                run["purpose"],
+                run.file,
+                run.purpose,
                 tuple(_estimate(cause, run, name, units) for name in names),
             )
-            for run in runs
+            for run in cause.each_run
         ),
     )
 
 
-def _estimate(
-    cause: dict[str, Any], run: dict[str, Any], name: str, units: dict[str, str]
-) -> Estimate | None:
-    value = run["values"].get(name)
-    low, high = run.get("ci95", {}).get(name) or (None, None)
+def _estimate(cause: Cause, run: OneRun, name: str, units: dict[str, str]) -> Estimate | None:
+    value = run.values.get(name)
+    low, high = run.ci95.get(name) or (None, None)
     if value is None:
         return None
     return Estimate(
-        cause["effect"],
+        cause.effect,
         name,
         name,
-        cause["joint"] or "",
-        run["file"],
+        cause.joint or "",
+        run.file,
         units.get(name, ""),
         value,
         low,

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.contracts.verdict import Dependence
 from pipelines.report.charts.chart import Chart, Mark, Panel, Series
 from pipelines.report.sections.fit_quality import MODELS, models_of
 from pipelines.report.sections.section import Content
@@ -71,16 +72,14 @@ def context(content: Content) -> dict[str, Any]:
 
 
 def _predicted(session: Session, joint: Joint) -> list[Predicted]:
-    verdict = session.verdict or {}
     words = {one.variable: one.title for one in _against(session, joint)}
-    named = bool(verdict.get("causes"))
     return [
         Predicted(
-            words.get(one["variable"], one["variable"].replace("_", " ")),
-            one["share_before"],
-            one["share_after"] if named else None,
+            words.get(one.variable, one.variable.replace("_", " ")),
+            one.share_before,
+            one.share_after if session.causes else None,
         )
-        for one in verdict.get("depends_on", {}).get(joint.name, [])
+        for one in session.dependences(joint)
     ]
 
 
@@ -147,7 +146,7 @@ def _chart(
         clouds.append(Series("", dots[order], role, Mark.DOTS))
         means.append(Series(words, line[order], role, Mark.MEAN))
     quantity = joint.effort
-    floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
+    floor = session.noise_floor(joint)
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
         title=f"{joint.name} error against {one.title}",
@@ -183,19 +182,15 @@ def most_explained_variable(session: Session, joint: Joint) -> str:
     Without a cause it is the variable that predicts most of the error. Shares are relative to each
     model's residual variance, so they are weighted by its mean square.
     """
-    verdict = session.verdict or {}
+    verdict = session.verdict
     known = {one.variable for one in _against(session, joint)}
-    ranking = [
-        one for one in verdict.get("depends_on", {}).get(joint.name, []) if one["variable"] in known
-    ]
-    if not ranking:
+    ranking = [one for one in session.dependences(joint) if one.variable in known]
+    if verdict is None or not ranking:
         return "angle"
-    before, after = (
-        verdict[f"{model}_rmse_nm"][joint.name] ** 2 for model in ("baseline", "extended")
-    )
-    remaining = after if verdict["causes"] else 0.0
+    before = verdict.baseline_rmse_nm[joint.name] ** 2
+    remaining = verdict.extended_rmse_nm[joint.name] ** 2 if verdict.causes else 0.0
 
-    def explained(one: dict[str, Any]) -> float:
-        return float(one["share_before"] * before - one["share_after"] * remaining)
+    def explained(one: Dependence) -> float:
+        return one.share_before * before - one.share_after * remaining
 
-    return str(max(ranking, key=explained)["variable"])
+    return max(ranking, key=explained).variable

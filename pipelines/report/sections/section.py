@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.report.charts.chart import Chart
 from pipelines.report.session import Session
 
@@ -36,6 +36,6 @@ class Content:
     """Where the page is written, for the command line that repeats it."""
 
     @property
-    def verdict(self) -> dict[str, Any] | None:
+    def verdict(self) -> Verdict | None:
         """The session's verdict; None without a diagnosis."""
         return self.session.verdict

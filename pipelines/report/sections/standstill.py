@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
+from pipelines.contracts.verdict import Verdict
 from pipelines.model import BY_NAME
 from pipelines.report.numbers import digits
 from pipelines.report.sections.section import Content
@@ -51,7 +52,7 @@ def context(content: Content) -> dict[str, Any]:
 def _increased_errors(session: Session) -> list[str]:
     """Return a sentence for each error that the causes increase, with the reason if known."""
     verdict = session.verdict
-    if not verdict or not verdict["causes"]:
+    if not verdict or not verdict.causes:
         return []
     return [sentence for joint in session.joints for sentence in _at(joint, verdict)]
 
@@ -74,21 +75,21 @@ def simulation_error_grew(before: float | None, after: float | None = None) -> b
     return before is not None and after is not None and after > NOTABLE * before
 
 
-def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
+def _at(joint: Joint, verdict: Verdict) -> Iterator[str]:
     name, effort = joint.name, joint.effort
-    if name not in verdict["noise_floor_nm"]:
+    if name not in verdict.noise_floor_nm:
         return
     (before, after), (all_before, all_after), (simulated_before, simulated_after) = (
-        (verdict[f"baseline_{key}"][name], verdict[f"extended_{key}"][name])
+        (getattr(verdict, f"baseline_{key}")[name], getattr(verdict, f"extended_{key}")[name])
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
     known = [
-        BY_NAME[cause["effect"]]
-        for cause in verdict["causes"]
-        if cause["joint"] == name and cause["effect"] in BY_NAME
+        BY_NAME[cause.effect]
+        for cause in verdict.causes
+        if cause.joint == name and cause.effect in BY_NAME
     ]
     holds = any(effect.holds for effect in known)
-    grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])
+    grew = torque_error_grew(all_before, all_after, floor=verdict.noise_floor_nm[name])
     if grew:
         yield (
             f"Reversals included, {the(name)}'s {effort} error is {digits(all_before)} →"

@@ -32,11 +32,8 @@ class ShownRun:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's part on measured and simulated motion."""
-    verdict = content.verdict or {}
-    return {
-        "runs": _runs(content),
-        "mask": verdict.get("scoring", {}).get("mask") or "slow motion",
-    }
+    scoring = content.verdict.scoring if content.verdict else {}
+    return {"runs": _runs(content), "mask": scoring.get("mask") or "slow motion"}
 
 
 def _runs(content: Content) -> list[ShownRun]:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from pipelines.contracts.verdict import Named
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.look_alikes import kept_share
 from pipelines.model import effect_named
-from pipelines.wording.label import cause_label
 from pipelines.wording.law import UNLISTED, family_of_kind, kind_and_joint
 from tests.campaigns.blind.scoring import names_of
 from tests.campaigns.blind.statistics import brier, calibration_error
@@ -46,7 +46,7 @@ def judged_causes(root: Path) -> Iterator[Judged]:
 def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[Judged]:
     there = {(name, h["joint"]) for h in truth["hidden"] for name in (h["effect"], *h["kin"])}
     named, posterior = (
-        {cause_label(cause): cause for cause in verdict["causes"]},
+        {Named.model_validate(cause).label: cause for cause in verdict["causes"]},
         verdict["posterior"],
     )
     for label, removed in posterior["systematic_error_removed"].items():

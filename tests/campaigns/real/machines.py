@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS, RESIDUALS
+from pipelines.contracts.verdict import Named
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.mechanics.geometry import Geometry
@@ -22,7 +23,6 @@ from pipelines.model.per_run import with_own_values
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.low_pass import ORDER
-from pipelines.wording.label import cause_label
 from tests.campaigns.real.relative_error import TorqueError, slow_error, slow_values
 
 
@@ -111,7 +111,7 @@ class Diagnosed:
     def model_of(self, motion: Motion) -> Model:
         """Return the extended model with what a run has for itself."""
         own = {
-            cause_label(cause): {
+            Named.model_validate(cause).label: {
                 name: value for name, value in one["values"].items() if value is not None
             }
             for cause in self.verdict["causes"]
@@ -169,7 +169,11 @@ class Diagnosed:
         What a run has for itself stays what the diagnosis found.
         """
         of_runs = {motion.file: self.model_of(motion) for motion in self.motions}
-        own = {cause_label(cause) for cause in self.verdict["causes"] if cause["each_run"]}
+        own = {
+            Named.model_validate(cause).label
+            for cause in self.verdict["causes"]
+            if cause["each_run"]
+        }
         free = [effect.label not in own for effect, _ in self.model.linear_parameters]
         trained = of_purpose(self.motions, "train")
         values = slow_values([of_runs[motion.file] for motion in trained], trained, free, order)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.verdict import Cause, Named
 from pipelines.mechanics.motion import Motion
-from pipelines.wording.label import cause_label, effect_of_cause
+from pipelines.wording.label import effect_of_cause
 from tests.campaigns.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.campaigns.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.campaigns.real.relative_error import (
@@ -64,7 +65,7 @@ def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
 
 def _label(cause: Mapping[str, Any]) -> str:
     """Return a cause's label and those of what could stand in its place."""
-    effects = [effect_of_cause(one) for one in (cause, *cause["indistinguishable_from"])]
+    effects = [effect_of_cause(one) for one in Cause.model_validate(cause).alike]
     return " or ".join("per-run " * effect.each_run + effect.label for effect in effects)
 
 
@@ -152,7 +153,7 @@ def sizes(d: Diagnosed, of: str) -> str:
     """Return the parameters of the ``known`` effects or the named ``causes``."""
     rows = [
         (
-            cause_label(one),
+            Named.model_validate(one).label,
             p["name"],
             _sized(p, ".3g"),
             " … ".join(f"{end:.3g}" for end in p["ci95"]),
@@ -206,7 +207,7 @@ def of_each_run(d: Diagnosed) -> str:
     """Return each run's own values of the named causes."""
     own = [cause for cause in d.verdict["causes"] if cause["each_run"]]
     headings = [
-        f"{name} of {cause_label(cause)}, {unit}"
+        f"{name} of {Named.model_validate(cause).label}, {unit}"
         for cause in own
         for name in cause["each_run"][0]["values"]
         for unit in [p["unit"] for p in cause["parameters"] if p["name"] == name]

@@ -4,7 +4,7 @@ by these."""
 import numpy as np
 import pytest
 
-from pipelines.wording.label import effect_of_cause
+from pipelines.contracts.verdict import Cause
 from tests.campaigns.real.machines import LOGS, diagnosed, of_purpose, with_rotor
 from tests.campaigns.real.published import double_pendulum, their_torque
 from tests.campaigns.real.relative_error import slow_error, slow_fit
@@ -115,7 +115,7 @@ def test_free_swings_show_rotor_and_zeros_and_every_run_is_predicted_better_than
 ):
     swings = diagnosed(LOGS["A0-swings"], real_data, tmp_path_factory.mktemp("A0-swings"))
     alike = [
-        {effect_of_cause(one).label for one in (cause, *cause["indistinguishable_from"])}
+        {one.label for one in Cause.model_validate(cause).alike}
         for cause in swings.verdict["causes"]
     ]
     # The first link hardly leaves the vertical: there a zero is an offset of the torque.

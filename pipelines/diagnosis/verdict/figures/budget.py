@@ -1,7 +1,6 @@
 """Draw the error budget: a bar for each joint, as long as its mean square error, in shares."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
@@ -9,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.error_budget import FLOOR, REPEATS, UNEXPLAINED, WANDERS
 from pipelines.plotting.style import BLUE, CAUSES, NOISE
@@ -24,12 +24,10 @@ NEGLIGIBLE = 0.005
 """Share of a bar below which its line reads "none"."""
 
 
-def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw a bar for each joint, next to it every share in N·m, at a prismatic joint in N."""
-    budget, units = (
-        verdict["error_budget"],
-        {joint: of["torque"] for joint, of in verdict["units"].items()},
-    )
+    budget = verdict.error_budget
+    units = {joint: of["torque"] for joint, of in verdict.units.items()}
     drawn, axes = plt.subplots(len(budget), 1, figsize=(9, 0.6 + 1.5 * len(budget)), squeeze=False)
     colours = colours_of(budget)
     for axis, (joint, shares) in zip(axes[:, 0], budget.items(), strict=True):

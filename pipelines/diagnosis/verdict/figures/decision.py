@@ -12,6 +12,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.findings_in_words import family_of
 from pipelines.plotting.style import BLUE, GREY, NOISE, WANDERS
@@ -68,7 +69,7 @@ BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
 AGAINST = " (validation runs against it)"
 
 
-def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw the residual's shares on the left, and the posterior over sets on the right."""
     bars = _bars(d)
     lines = sum(_height(bar) for bar in bars)
@@ -81,21 +82,21 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _shares(axis: Axes, verdict: Mapping[str, Any]) -> None:
+def _shares(axis: Axes, verdict: Verdict) -> None:
     """Draw a bar for each joint, split into the parts of its residual."""
     seen: dict[str, Patch] = {}
-    router = verdict["router"]
+    router = verdict.router
     for row, shares in enumerate(router.values()):
         start = 0.0
         for part in ORDER:
-            share = shares[part] or 0.0
+            share = getattr(shares, part) or 0.0
             axis.barh(row, share, left=start, color=COLOURS[part], **BAR)
             if share > TEXT:
                 _number(axis, row, start, share, part)
             if share > NEGLIGIBLE:
                 seen[PARTS[part]] = Patch(color=COLOURS[part])
             start += share
-            person = min(shares["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
+            person = min(shares.with_person_only or 0.0, share) if part == "repeats" else 0.0
             if person > NEGLIGIBLE:
                 axis.barh(
                     row,
@@ -108,8 +109,8 @@ def _shares(axis: Axes, verdict: Mapping[str, Any]) -> None:
                     lw=0,
                 )
                 seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
-    units = {joint: of["torque"] for joint, of in verdict["units"].items()}
-    names = [f"{j}\n{router[j]['rms_nm']:.3g} {units[j]} rms" for j in router]
+    units = {joint: of["torque"] for joint, of in verdict.units.items()}
+    names = [f"{j}\n{router[j].rms_nm:.3g} {units[j]} rms" for j in router]
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlim(0.0, 1.0)
@@ -144,11 +145,11 @@ def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None
     )
 
 
-def _dependence(axis: Axes, verdict: Mapping[str, Any]) -> None:
+def _dependence(axis: Axes, verdict: Verdict) -> None:
     """Draw a field for each joint and variable: the share of the error that its curve predicts."""
     ranked = {
-        joint: {one["variable"]: one["share_before"] for one in ranking}
-        for joint, ranking in verdict["depends_on"].items()
+        joint: {one.variable: one.share_before for one in ranking}
+        for joint, ranking in verdict.depends_on.items()
     }
     variables = _variables(ranked)
     shares = np.array([[of.get(name, np.nan) for name in variables] for of in ranked.values()])

@@ -1,11 +1,10 @@
 """Draw the residual against the variables of the runs, the most predictive first."""
 
-from typing import Any
-
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from pipelines.contracts.verdict import Dependence, Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
@@ -20,9 +19,9 @@ EXPLAINED = (
 )
 
 
-def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw a row for each joint and a column for each rank."""
-    ranked = {joint: _shown(ranking) for joint, ranking in verdict["depends_on"].items()}
+    ranked = {joint: _shown(ranking) for joint, ranking in verdict.depends_on.items()}
     columns = max(len(ranking) for ranking in ranked.values())
     drawn, axes = plt.subplots(
         len(ranked),
@@ -32,14 +31,14 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
         sharey="row",
     )
     for j, (row, (joint, ranking)) in enumerate(zip(axes, ranked.items(), strict=True)):
-        seen = [against(one["variable"], d, joint, verdict["runs"]) for one in ranking]
+        seen = [against(one.variable, d, joint, verdict.runs) for one in ranking]
         height = max(reach(s.before, s.after) for s in seen)
         for axis, one, values in zip(row, ranking, seen, strict=False):
             draw(axis, values, float(d.floor.rms[j]), height, bool(d.causes))
             axis.set_title(_predicted(one, bool(d.causes)), fontsize=8)
         for axis in row[len(ranking) :]:
             axis.set_axis_off()
-        row[0].set_ylabel(f"{joint} residual, {verdict['units'][joint]['torque']}")
+        row[0].set_ylabel(f"{joint} residual, {verdict.units[joint]['torque']}")
     names = ["before"] + ["after"] * bool(d.causes)
     lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
@@ -54,14 +53,14 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _shown(ranking: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _shown(ranking: list[Dependence]) -> list[Dependence]:
     """Return the variables to draw, the phase last: it can imitate everything that repeats."""
-    chosen = [one for one in ranking if one["share_before"] > SOMETHING or one["variable"] in SHOWN]
-    phase = [one for one in chosen if one["variable"] == "phase"]
-    others = [one for one in chosen if one["variable"] != "phase"]
-    kept = sorted(others, key=lambda one: -one["share_before"])[:MOST]
+    chosen = [one for one in ranking if one.share_before > SOMETHING or one.variable in SHOWN]
+    phase = [one for one in chosen if one.variable == "phase"]
+    others = [one for one in chosen if one.variable != "phase"]
+    kept = sorted(others, key=lambda one: -one.share_before)[:MOST]
     return kept + phase
 
 
-def _predicted(one: dict[str, Any], changed: bool) -> str:
-    return f"{one['share_before']:.0%}" + (f" → {one['share_after']:.0%}" if changed else "")
+def _predicted(one: Dependence, changed: bool) -> str:
+    return f"{one.share_before:.0%}" + (f" → {one.share_after:.0%}" if changed else "")

@@ -1,10 +1,10 @@
 """Draw all figures of a diagnosis."""
 
 from pathlib import Path
-from typing import Any
 
 from matplotlib import pyplot as plt
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures import budget, decision, dependence, simulation, verdict
 from pipelines.plotting.style import STYLE, save
@@ -21,10 +21,10 @@ ON_SCREEN = ("simulation", "dependence")
 """Figures of many panels for the screen: a PDF of each takes as long as all others."""
 
 
-def draw(d: Diagnosis, verdict: dict[str, Any], folder: Path) -> None:
+def draw(d: Diagnosis, checked: Verdict, folder: Path) -> None:
     """Write every figure as PNG, and those to print as PDF too."""
     with plt.rc_context(STYLE):
         for name, figure in DRAWN_BY.items():
             save(
-                figure(d, verdict), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf")
+                figure(d, checked), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf")
             )

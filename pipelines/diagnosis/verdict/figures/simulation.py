@@ -1,13 +1,12 @@
 """Draw replayed simulation and measurement where the baseline is worst."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import either
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
@@ -21,7 +20,7 @@ FAR_MRAD = 500.0
 """Largest error that is shown, mrad."""
 
 
-def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw angle, angle error, torque and torque error of each joint, a column each."""
     joints, stretch = d.baseline.joints, worst_stretch(d)
     drawn, axes = plt.subplots(
@@ -57,7 +56,7 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
     angle, torque = (
-        either(verdict["units"][joint][quantity] for joint in joints)
+        either(verdict.units[joint][quantity] for joint in joints)
         for quantity in ("angle", "torque")
     )
     where = either(joint.place for joint in d.baseline.machine.joints)
@@ -91,26 +90,25 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _drift(verdict: dict[str, Any], joint: str) -> str:
-    before, after = (
-        verdict[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended")
-    )
+def _drift(verdict: Verdict, joint: str) -> str:
+    before = verdict.baseline_simulation_rmse_rad[joint]
+    after = verdict.extended_simulation_rmse_rad[joint]
     if before is None:
         return "(cannot be simulated)"
-    unit = f"m{verdict['units'][joint]['angle']} rms"
-    if not verdict["causes"]:
+    unit = f"m{verdict.units[joint]['angle']} rms"
+    if not verdict.causes:
         return f"{1e3 * before:.1f} {unit}"
     if after is None:
         return f"{1e3 * before:.1f} {unit} → cannot be simulated"
     return f"{1e3 * before:.1f} → {1e3 * after:.1f} {unit}"
 
 
-def _off(d: Diagnosis, verdict: dict[str, Any], joint: str) -> str:
+def _off(d: Diagnosis, verdict: Verdict, joint: str) -> str:
     machine = d.baseline.machine
-    words = number(machine, verdict["baseline_rmse_nm"][joint])
-    if verdict["causes"]:
-        words += f" → {number(machine, verdict['extended_rmse_nm'][joint])}"
-    floor = number(machine, verdict["noise_floor_nm"][joint])
+    words = number(machine, verdict.baseline_rmse_nm[joint])
+    if verdict.causes:
+        words += f" → {number(machine, verdict.extended_rmse_nm[joint])}"
+    floor = number(machine, verdict.noise_floor_nm[joint])
     return f"{words} {machine.joint(joint).unit('torque')} rms, noise floor {floor}"
 
 

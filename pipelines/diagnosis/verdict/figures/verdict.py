@@ -1,7 +1,6 @@
 """Draw the figure of the summary: parts of the torque error, and the effect of the causes."""
 
 import textwrap
-from typing import Any
 
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
@@ -9,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, knows, tone, variable_share
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
@@ -32,9 +32,9 @@ LINE_IN, BODY_IN = 0.19, 3.5
 """Heights of a line of the summary and of the panels below it."""
 
 
-def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
+def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw the error budget, and the residual against the variable that shows the cause best."""
-    summary = textwrap.wrap(verdict["summary"], WIDTH)
+    summary = textwrap.wrap(verdict.summary, WIDTH)
     head = 0.1 + LINE_IN * len(summary)
     height = head + BODY_IN
     drawn, (left, right) = plt.subplots(1, 2, figsize=(10, height), width_ratios=[1, 1.1])
@@ -45,9 +45,9 @@ def figure(d: Diagnosis, verdict: dict[str, Any]) -> Figure:
     return drawn
 
 
-def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
+def _budget(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
     """Draw each joint's bar to its own scale: its baseline's mean square is 100 %."""
-    budget = verdict["error_budget"]
+    budget = verdict.error_budget
     colours = colours_of(budget)
     totals = {joint: sum(shares.values()) for joint, shares in budget.items()}
     for row, (joint, shares) in enumerate(budget.items()):
@@ -55,7 +55,7 @@ def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     axis.set_yticks(
         range(len(budget)),
         [
-            f"{joint}\n{rms(total)} {verdict['units'][joint]['torque']}"
+            f"{joint}\n{rms(total)} {verdict.units[joint]['torque']}"
             for joint, total in totals.items()
         ],
         fontsize=9,
@@ -66,7 +66,7 @@ def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
         for joint, shares in budget.items()
     ]
     axis.set_xlim(min(low for low, _ in ends), max(high for _, high in ends))
-    units = " and ".join(dict.fromkeys(of["torque"] for of in verdict["units"].values()))
+    units = " and ".join(dict.fromkeys(of["torque"] for of in verdict.units.values()))
     axis.set_xlabel(f"share of the mean square error, %; numbers: {units} rms")
     there = [
         key
@@ -83,18 +83,18 @@ def _budget(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     )
 
 
-def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
+def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
     """Draw the residual where the first cause, or the unexplained part, shows best."""
     if d.causes:
         joint, variable, kinds = _shown_best(d, verdict)
     else:
         joint = max(
-            verdict["noise_floor_nm"],
-            key=lambda j: verdict["baseline_rmse_nm"][j] / verdict["noise_floor_nm"][j],
+            verdict.noise_floor_nm,
+            key=lambda j: verdict.baseline_rmse_nm[j] / verdict.noise_floor_nm[j],
         )
         # The time at which a fault of acquisition begins is its best description.
         variable, kinds = (
-            "time" if d.data.spoilt else verdict["depends_on"][joint][0]["variable"],
+            "time" if d.data.spoilt else verdict.depends_on[joint][0].variable,
             RUNS,
         )
     j = d.baseline.joints.index(joint)
@@ -102,8 +102,7 @@ def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(
-        f"{joint} {d.baseline.machine.joint(joint).effort} error,"
-        f" {verdict['units'][joint]['torque']}"
+        f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict.units[joint]['torque']}"
     )
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
@@ -120,10 +119,10 @@ def _shape(axis: Axes, d: Diagnosis, verdict: dict[str, Any]) -> None:
     )
 
 
-def _shown_best(d: Diagnosis, verdict: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
+def _shown_best(d: Diagnosis, verdict: Verdict) -> tuple[str, str, tuple[str, ...]]:
     """Return joint, variable and kinds of run that show the first cause's torque best."""
-    first = verdict["causes"][0]
-    joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
+    first = verdict.causes[0]
+    joint, effect = first.gain.joint, effect_named(first.effect)(joint=first.joint)
     runs = [
         (run, b - a)
         for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
