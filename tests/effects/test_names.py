@@ -46,6 +46,16 @@ def test_no_other_package_names_an_effect():
     assert named == set(EXCEPTIONS)
 
 
+def test_no_template_names_an_effect():
+    words = {
+        word
+        for path in (ROOT / "pipelines").rglob("*.html")
+        for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))
+    }
+    # Friction is a word of the page's text too.
+    assert words & NAMES == {"friction"}
+
+
 @pytest.mark.parametrize(
     ("source", "expected"),
     [

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.contracts import Table
+from pipelines.model import BASELINE
 from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
@@ -43,6 +44,11 @@ class Estimate:
         run = f"({self.run})" if self.run else ""
         per_run = "(per run: the first training run's)" if self.each_run else ""
         return " ".join(filter(None, (self.joint, self.symbol, run, per_run)))
+
+    @property
+    def addition(self) -> str:
+        """Its effect in words; empty for rigid body and friction."""
+        return "" if self.effect in BASELINE else self.effect.replace("_", " ")
 
     @property
     def half(self) -> float | None:
