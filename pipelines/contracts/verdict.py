@@ -179,9 +179,8 @@ class Control(_Object):
     """The adaptive loop on both models, or the reason why there is none."""
 
     reason: str | None
-    run: str = ""
-    """Kind of run; empty if there is no loop."""
-    controller: dict[str, Any] = {}
+    run: str | None = None
+    controller: dict[str, Any] | None = None
     without: Loop | None = None
     with_: Loop | None = Field(None, alias="with")
 

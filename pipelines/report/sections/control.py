@@ -49,10 +49,10 @@ def _comparison(verdict: Verdict) -> dict[str, Any] | None:
     if not rows:
         return None
     return {
-        "run": control.run.replace("_", " "),
+        "run": (control.run or "").replace("_", " "),
         "joints": list(rows[0]["torque"]),
         "rows": rows,
-        "settled_s": control.controller.get("settled_after_s"),
+        "settled_s": (control.controller or {}).get("settled_after_s"),
     }
 
 
