@@ -33,7 +33,7 @@ def cause_in_words(cause: "Cause | Tie") -> str:
 
 def shares_in_words(causes: Iterable["Cause"]) -> dict[str, str]:
     """Return a verdict's causes and their ties in words, by label."""
-    # A cause may be tied with itself as it would be if each run had its own: its own words count.
+    # The per-run variant of a cause may be its tie, and has its label: the cause comes last.
     return {one.label: cause_in_words(one) for cause in causes for one in reversed(cause.alike)}
 
 

@@ -180,7 +180,7 @@ def test_it_is_exported_where_no_bodies_are_asked_for(exoid_with_it, identified,
     done = exoid_with_it("export", identified, "--to", "urdf", "-o", tmp_path / "stage.urdf")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert (
-        "stage (two level prismatic joints, the second carried by the first) has no bodies that"
+        "stage (two level prismatic joints, the second carried by the first) has no rule for"
         in done.stderr
     )
     assert not (tmp_path / "stage.urdf").exists()
