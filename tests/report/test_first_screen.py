@@ -4,27 +4,27 @@ import re
 
 import pytest
 
-from pipelines.contracts.verdict import OneRun, Tie
+from pipelines.contracts.verdict import Cause
 from pipelines.report.html.report import report
 from pipelines.report.sections.key_figures import tiles
 from pipelines.report.session import find
 from pipelines.wording.causes import causes_in_words, labels_in_words
-from tests.report.sessions import (
-    AXIS,
-    checked_verdict,
-    decision_of,
-    write_session,
-    write_verdict,
-)
+from tests.report.sessions import AXIS, decision_of, verdict_of, write_session, write_verdict
 
 FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
 
 
 def cause(effect="cogging", joint="knee", ties=()):
-    first = checked_verdict().causes[0]
-    rivals = [Tie(effect=e, joint=j, why="", how_to_separate="", probability=0.1) for e, j in ties]
-    update = {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
-    return first.model_copy(update=update)
+    first = verdict_of()["causes"][0]
+    rivals = [
+        {"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1}
+        for e, j in ties
+    ]
+    return first | {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
+
+
+def checked(cause):
+    return Cause.model_validate(cause)
 
 
 @pytest.mark.parametrize(
@@ -41,20 +41,24 @@ def cause(effect="cogging", joint="knee", ties=()):
     ],
 )
 def test_the_headline_claims_no_cause_that_is_tied(ties, said):
-    assert causes_in_words([cause(ties=ties)]).startswith(said)
+    assert causes_in_words([checked(cause(ties=ties))]).startswith(said)
 
 
 def test_a_tie_that_would_differ_from_run_to_run_is_called_so():
-    tied = cause("torque_offset", ties=[("encoder_offset", "knee")])
-    tied.each_run = [OneRun(file="a", purpose="train", values={})]
-    tied.indistinguishable_from[0].per_run = True
-    assert causes_in_words([tied]) == "per-run torque offset or per-run encoder offset at the knee"
+    tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {
+        "each_run": [{"file": "a", "purpose": "train", "values": {}}]
+    }
+    tied["indistinguishable_from"][0]["per_run"] = True
+    assert (
+        causes_in_words([checked(tied)])
+        == "per-run torque offset or per-run encoder offset at the knee"
+    )
 
 
 def test_two_causes_are_parted_by_a_comma_where_one_of_them_is_tied():
-    both = cause(), cause("backlash", "hip")
+    both = checked(cause()), checked(cause("backlash", "hip"))
     assert causes_in_words(both) == "cogging at the knee and backlash at the hip"
-    tied = cause(), cause("backlash", "hip", [("torque_offset", "hip")])
+    tied = both[0], checked(cause("backlash", "hip", [("torque_offset", "hip")]))
     assert causes_in_words(tied) == "cogging at the knee, and backlash or torque offset at the hip"
 
 
