@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.effects.element import Element
+from pipelines.effects import Element
 from pipelines.errors import InputError
 from pipelines.export.exported import Exported
 from pipelines.mechanics.mechanism import Mechanism

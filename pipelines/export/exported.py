@@ -13,9 +13,8 @@ from pipelines.contracts.provenance import sha256
 from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import cuffed
 from pipelines.dynamics.plant import make_plant
-from pipelines.effects import Side
+from pipelines.effects import Element, Side
 from pipelines.effects.baseline import Friction, RigidBody
-from pipelines.effects.element import Element
 from pipelines.errors import InputError, about
 from pipelines.export.format import Degree, Format, Holding, left_out
 from pipelines.mechanics.geometry import Geometry

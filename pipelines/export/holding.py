@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from pipelines.effects.element import Element
+from pipelines.effects import Element
 from pipelines.export.exported import shift_of
 from pipelines.export.format import Holding, approximate, exact, left_out
 from pipelines.model import Term

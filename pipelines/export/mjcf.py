@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import motor_inertia
-from pipelines.effects.element import Element
+from pipelines.effects import Element
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, approximate, exact

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from pipelines.effects.element import Element
+from pipelines.effects import Element
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, exact

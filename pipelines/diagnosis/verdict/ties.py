@@ -1,7 +1,6 @@
 """Explain why two causes are not separated, and how to separate them."""
 
-from pipelines.effects import Effect
-from pipelines.effects.tie import Tie
+from pipelines.effects import Effect, Tie
 
 
 def tie_between(named: Effect, other: Effect) -> Tie:
