@@ -78,7 +78,7 @@ def test_show_knows_the_json_document(exoid, model, tmp_path):
             ("--to", "urdf", "--run", "human"),
             "holds no rigid body for run 'human', only for with_human; set --run",
         ),
-        (("--to", "c", "-o", "my leg.c"), "my leg.c: its functions are called as the file is"),
+        (("--to", "c", "-o", "my leg.c"), "my leg.c: its functions have the file's name"),
         (
             ("--to", "c", "-o", "x.xml"),
             "-o x.xml: is a file name of --to mjcf, expected .c with --to c",
