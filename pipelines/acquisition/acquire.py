@@ -14,7 +14,6 @@ from pipelines.acquisition.machine.embedded_rig import embedded
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.sampling import sampling_of
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
-from pipelines.acquisition.pacing import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.preconditions.feasible_rate import rate_checks
 from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded
@@ -35,6 +34,7 @@ from pipelines.contracts.provenance import describe
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
+from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig

@@ -1,11 +1,8 @@
 """When to exchange: at once in lockstep; in step with the devices' own clock in real time."""
 
 import asyncio
-import gc
-import os
 import time
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Awaitable, Callable
 
 LEAN = 0.005
 """Share of a sample period by which a look at the counter comes earlier than one period after the
@@ -15,26 +12,6 @@ STEP_BACK = 0.1
 SLOW = 0.3
 """Share of a sample period after which an answer is too old to build on, where nobody knows when
 the next sample is latched."""
-
-
-@contextmanager
-def urgent() -> Iterator[None]:
-    """Ask the system to run this process first for the duration of the block.
-
-    A sample that is not fetched within its period is lost. Linux grants that to privileged users;
-    others share the computer with its other processes.
-    """
-    # Else looking through all that was imported would cost several samples now and then.
-    gc.freeze()
-    granted = False
-    with suppress(PermissionError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
-        granted = True
-    try:
-        yield
-    finally:
-        if granted:
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 class Lockstep:

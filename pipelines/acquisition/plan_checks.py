@@ -1,5 +1,7 @@
 """Refuses plans that leave a rig's limits, before anything moves."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,25 +28,15 @@ def refuse_run_outside(rig: RigSettings, run: NDArray, first: int, rate: float) 
     rate : float
         Set-points a second.
     """
+
+    def when(k: int) -> str:
+        return f"at {(first + k + 0.5) / rate:.3f} s"
+
     margin = rig.safety.angle_margin_rad
-    speed = np.diff(run, axis=0) * rate
-    for j, drive in enumerate(rig.drive):
-        low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
-        k = _first_outside(run[:, j], low, high)
-        if k is not None:
-            raise InputError(
-                f"the {drive.joint} would be at {run[k, j]:.3f} rad at"
-                f" {(first + k + 0.5) / rate:.3f} s, but the rig allows {low:g} to {high:g} rad"
-                " (its limits less angle_margin_rad); make the excitation smaller, or design it"
-                " within the rig's limits"
-            )
-        k = _first_outside(speed[:, j], -drive.speed_rad_s, drive.speed_rad_s)
-        if k is not None:
-            raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at"
-                f" {(first + k + 0.5) / rate:.3f} s, but the rig allows {drive.speed_rad_s:g}"
-                " rad/s; make the excitation slower or smaller"
-            )
+    limits = [(drive.angle_rad[0] + margin, drive.angle_rad[1] - margin) for drive in rig.drive]
+    remedy = " (its limits less angle_margin_rad); make the excitation smaller"
+    _refuse_beyond(rig, run, limits, "be at", "rad", when, remedy)
+    _refuse_fast(rig, np.diff(run, axis=0) * rate, 1.0, when)
 
 
 def refuse_fast_between_set_points(
@@ -66,17 +58,12 @@ def refuse_fast_between_set_points(
         Set-points a second.
     """
     for share in (0.5, 0.75):  # where the one shows a standstill, the other does not
-        speed = trajectory.at((np.arange(begin, end) + share) / rate)[1]
-        for j, drive in enumerate(rig.drive):
-            fastest = TOO_FAST * drive.speed_rad_s
-            k = _first_outside(speed[:, j], -fastest, fastest)
-            if k is not None:
-                raise InputError(
-                    f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at"
-                    f" {(begin + k + share) / rate:.3f} s, which {rate:g} set-points a second do"
-                    f" not show, but the rig allows {drive.speed_rad_s:g} rad/s; make the"
-                    " excitation slower: is its omega_rad_s in rad/s?"
-                )
+        instants = (np.arange(begin, end) + share) / rate
+
+        def when(k: int, instants: NDArray = instants) -> str:
+            return f"at {instants[k]:.3f} s, which {rate:g} set-points a second do not show"
+
+        _refuse_fast(rig, trajectory.at(instants)[1], TOO_FAST, when)
 
 
 def refuse_path_outside(rig: RigSettings, reference: SetPoints, rest: NDArray, rate: float) -> None:
@@ -96,39 +83,45 @@ def refuse_path_outside(rig: RigSettings, reference: SetPoints, rest: NDArray, r
     rate : float
         Set-points a second.
     """
+    limits = [drive.angle_rad for drive in rig.drive]
     for first, piece in reference.pieces():
         begins, ends = first == 0, first + len(piece) == len(reference)
         path = np.vstack([*([rest] if begins else []), piece, *([rest] if ends else [])])
-        # Index 0 of the path is where the leg stands.
-        _refuse_piece_outside(rig, reference, path, first + (0 if begins else 1), rate)
+        # Index 0 of the whole path is where the leg stands.
+        start = 0 if begins else first + 1
+
+        def when(k: int, start: int = start) -> str:
+            return f"on the way {'into' if start + k <= reference.first else 'out of'} the run"
+
+        remedy = "; make the excitation smaller, or record a whole period of it"
+        _refuse_beyond(rig, path, limits, "be at", "rad", when, remedy)
+        _refuse_fast(rig, np.diff(path, axis=0) * rate, 1.0 + 1e-9, when)
 
 
-def _refuse_piece_outside(
-    rig: RigSettings, reference: SetPoints, path: NDArray, first: int, rate: float
+def _refuse_fast(
+    rig: RigSettings, speed: NDArray, share: float, when: Callable[[int], str]
 ) -> None:
-    """Refuse a piece (n, J) of the path, whose first set-point has the index ``first`` in it."""
-    speed = np.diff(path, axis=0) * rate
-    for j, drive in enumerate(rig.drive):
-        low, high = drive.angle_rad
-        k = _first_outside(path[:, j], low, high)
-        if k is not None:
-            way = "into" if first + k <= reference.first else "out of"
-            raise InputError(
-                f"the {drive.joint} would be at {path[k, j]:.3f} rad on the way {way} the run, but"
-                f" the rig allows {low:g} to {high:g} rad; make the excitation smaller, or record a"
-                " whole period of it to see where it leaves the limits"
-            )
-        fastest = drive.speed_rad_s * (1.0 + 1e-9)
-        k = _first_outside(speed[:, j], -fastest, fastest)
-        if k is not None:
-            raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s"
-                f" {(first + k - reference.first) / rate:.3f} s after the run's beginning, but the"
-                f" rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
-            )
+    """Refuse speeds (n, J), rad/s, beyond a share of the drives' limits."""
+    limits = [(-share * drive.speed_rad_s, share * drive.speed_rad_s) for drive in rig.drive]
+    remedy = "; make the excitation slower or smaller: is its omega_rad_s in rad/s?"
+    _refuse_beyond(rig, speed, limits, "move at", "rad/s", when, remedy)
 
 
-def _first_outside(values: NDArray, low: float, high: float) -> int | None:
-    """Return where values (n,) first leave a range, or are no numbers; None where all keep it."""
-    outside = ~((values >= low) & (values <= high))
-    return int(np.argmax(outside)) if outside.any() else None
+def _refuse_beyond(
+    rig: RigSettings,
+    values: NDArray,
+    limits: Sequence[tuple[float, float]],
+    verb: str,
+    unit: str,
+    when: Callable[[int], str],
+    remedy: str,
+) -> None:
+    """Refuse values (n, J) outside each joint's limits, or that are no numbers."""
+    for j, (drive, (low, high)) in enumerate(zip(rig.drive, limits, strict=True)):
+        outside = ~((values[:, j] >= low) & (values[:, j] <= high))
+        if outside.any():
+            k = int(np.argmax(outside))
+            raise InputError(
+                f"the {drive.joint} would {verb} {values[k, j]:.3f} {unit} {when(k)}, but the rig"
+                f" allows {low:g} to {high:g} {unit}{remedy}"
+            )

@@ -38,37 +38,20 @@ class Conditions:
 Guard = Callable[[Conditions], bool]
 
 
-def _always(conditions: Conditions) -> bool:
-    return True
-
-
-def _drives_are_enabled(conditions: Conditions) -> bool:
-    return conditions.all_enabled
-
-
-def _recording_has_begun(conditions: Conditions) -> bool:
-    return conditions.due is not State.RAMP
-
-
-def _recording_is_over(conditions: Conditions) -> bool:
-    return conditions.due is State.RAMP_DOWN
-
-
-def _has_reason(conditions: Conditions) -> bool:
-    return conditions.reason is not None
-
-
-def _drives_are_disabled(conditions: Conditions) -> bool:
-    return conditions.all_disabled
+def _has_reason(now: Conditions) -> bool:
+    return now.reason is not None
 
 
 TRANSITIONS: Mapping[State, Mapping[State, Guard]] = {
-    State.IDLE: {State.CHECK: _always},
-    State.CHECK: {State.RAMP: _drives_are_enabled, State.ABORT: _has_reason},
-    State.RAMP: {State.RUN: _recording_has_begun, State.ABORT: _has_reason},
-    State.RUN: {State.RAMP_DOWN: _recording_is_over, State.ABORT: _has_reason},
-    State.RAMP_DOWN: {State.DISABLED: _drives_are_disabled, State.ABORT: _has_reason},
-    State.ABORT: {State.DISABLED: _drives_are_disabled},
+    State.IDLE: {State.CHECK: lambda now: True},
+    State.CHECK: {State.RAMP: lambda now: now.all_enabled, State.ABORT: _has_reason},
+    State.RAMP: {State.RUN: lambda now: now.due is not State.RAMP, State.ABORT: _has_reason},
+    State.RUN: {
+        State.RAMP_DOWN: lambda now: now.due is State.RAMP_DOWN,
+        State.ABORT: _has_reason,
+    },
+    State.RAMP_DOWN: {State.DISABLED: lambda now: now.all_disabled, State.ABORT: _has_reason},
+    State.ABORT: {State.DISABLED: lambda now: now.all_disabled},
     State.DISABLED: {},
 }
 """Where each state may lead, and the guard of each transition.

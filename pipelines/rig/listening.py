@@ -111,7 +111,8 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         link.symlink_to(port)
     except FileExistsError as error:
         raise DeviceError(
-            f"{link}: {_what_is_there(link)}, or name another path in serial_port"
+            f"{link}: exists already, where a virtual rig's link was to be. End the rig that made"
+            " it, remove it, or name another path in serial_port"
         ) from error
     except OSError as error:
         raise DeviceError(
@@ -122,18 +123,6 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         yield wanted
     finally:
         link.unlink(missing_ok=True)
-
-
-def _what_is_there(link: Path) -> str:
-    # A killed rig's port may now be another process's, so a valid link may still be a leftover.
-    if link.is_symlink():
-        return (
-            f"is a link to {link.readlink()} already, as a virtual rig makes one; end that rig"
-            " or, if a killed one left the link, delete it"
-        )
-    return (
-        "is there already, where the link to the virtual rig's pseudo-terminal was to be; remove it"
-    )
 
 
 def _tls_context(line: TlsLine) -> ssl.SSLContext:

@@ -20,9 +20,7 @@ class Possibility(Settings):
     """An effect that may be hidden in the rig."""
 
     effect: str = Field(description="Its name.")
-    joints: tuple[Literal["hip", "knee"], ...] = Field(
-        (), description="Where it may act; none for the whole leg."
-    )
+    joints: tuple[Literal["hip", "knee"], ...] = Field((), description="Joints; none for the leg.")
     values: dict[str, tuple[float, float]] = Field(description="Range of each of its values.")
     either_sign: bool = Field(False, description="Whether all values may be turned negative.")
 

@@ -1,27 +1,27 @@
 """The virtual rig behind Modbus servers, one for each line."""
 
 import asyncio
-import gc
 import logging
-import os
 import signal
 import sys
 import threading
 from collections import defaultdict
 from collections.abc import Callable
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack, nullcontext
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 from pymodbus.simulator import SimDevice
 
 from pipelines.errors import SettingsError
 from pipelines.process.event_loop import exact_event_loop
+from pipelines.process.priority import urgent
+from pipelines.process.termination import ENDING, handled, known, not_ignored
 from pipelines.rig.device import Drive
 from pipelines.rig.listening import listening
 from pipelines.rig.plant import JOINTS, Plant
 from pipelines.rig.ring import fifo_request
-from pipelines.rig.stop_signals import set_on_signals
 from pipelines.rig.virtual_rig import VirtualRig, build_plant
 from pipelines.settings.rig import RigSettings, load_rig
 from pipelines.settings.rig.line import LineSettings, RtuLine, TcpLine
@@ -130,28 +130,31 @@ def serve_file(
     )
     plant = build_plant(rig, path, run, seed, sample_rate_hz)
 
-    async def until_stopped() -> list[int]:
-        until = asyncio.Event()
+    async def until_stopped() -> None:
+        until, loop = asyncio.Event(), asyncio.get_running_loop()
         if until_input_ends:
-            loop = asyncio.get_running_loop()
 
             def wait() -> None:
                 sys.stdin.buffer.read()
                 loop.call_soon_threadsafe(until.set)
 
             threading.Thread(target=wait, daemon=True).start()
-        with set_on_signals(until) as came:
-            await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
-        return came
 
-    if rig.clock == "real_time":
-        # A garbage collection through all imported modules would cost several samples.
-        gc.freeze()
-        with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
-            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+        # Noted, not raised as exceptions, which compiled code could swallow.
+        def note(number: int, frame: FrameType | None) -> None:
+            came.append(number)
+            loop.call_soon_threadsafe(until.set)  # this wakes a loop that waits
+
+        with handled(not_ignored(known(ENDING)), note):
+            await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
+
+    came: list[int] = []
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-    with asyncio.Runner(loop_factory=exact_event_loop) as runner:
-        came = runner.run(until_stopped())
+    with (
+        nullcontext() if rig.clock == "lockstep" else urgent(),
+        asyncio.Runner(loop_factory=exact_event_loop) as runner,
+    ):
+        runner.run(until_stopped())
     for number in came:
         # Ctrl-C is the normal end; for other signals the process must end by that signal.
         if number != signal.SIGINT:

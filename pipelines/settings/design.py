@@ -5,17 +5,15 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
+from pipelines.settings.base import NotNegative, Positive, Settings
 
 
 class Bounds(Settings):
     """Bounds of the excitation at one joint."""
 
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
-    velocity_rad_s: float = Field(1.6449, gt=0.0, description="Highest speed, either way.")
-    acceleration_rad_s2: float = Field(
-        5.1677, gt=0.0, description="Highest acceleration, either way."
-    )
+    velocity_rad_s: Positive = Field(1.6449, description="Highest speed, either way.")
+    acceleration_rad_s2: Positive = Field(5.1677, description="Highest acceleration, either way.")
 
     @model_validator(mode="after")
     def _low_is_below_high(self) -> Self:
@@ -44,26 +42,16 @@ class JointBounds(Settings):
 class NoiseSettings(Settings):
     """Torque noise and length of a record, for the expected standard errors."""
 
-    hip_nm: float = Field(0.6, gt=0.0, description="Standard deviation of the hip's torque noise.")
-    knee_nm: float = Field(
-        0.4, gt=0.0, description="Standard deviation of the knee's torque noise."
-    )
-    correlation_s: float = Field(
-        0.02,
-        ge=0.0,
-        description=(
-            "Time after which the noise's correlation has fallen to 1/e; 0 for white noise."
-        ),
-    )
-    duration_s: float = Field(40.0, gt=0.0, description="Length of the record that will be fitted.")
+    hip_nm: Positive = Field(0.6, description="Standard deviation of the hip's torque noise.")
+    knee_nm: Positive = Field(0.4, description="Standard deviation of the knee's torque noise.")
+    correlation_s: NotNegative = Field(0.02, description="Time constant of the noise; 0: white.")
+    duration_s: Positive = Field(40.0, description="Length of the record that will be fitted.")
 
 
 class DesignSettings(Settings):
     """The excitation, a Fourier series, and the particle swarm that searches it."""
 
-    base_frequency_hz: float = Field(
-        0.1, gt=0.0, description="Frequency of the first harmonic; its period repeats."
-    )
+    base_frequency_hz: Positive = Field(0.1, description="Frequency of the first harmonic.")
     harmonics: int = Field(5, ge=1, le=20, description="How many harmonics each joint has.")
     theta0_rad: Literal["free"] | tuple[float, float] = Field(
         "free", description='Mean angle of hip and knee, or "free" to search it too.'
@@ -76,27 +64,15 @@ class DesignSettings(Settings):
         ),
     )
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
-    bounds: JointBounds = Field(
-        JointBounds(), description="Angle, speed and acceleration, kept between samples too."
-    )
+    bounds: JointBounds = Field(JointBounds(), description="Of angle, speed and acceleration.")
     topology: Literal["ring", "global"] = Field(
         "ring", description="Neighbours whose best a particle follows: those on a ring, or all."
     )
     particles: int = Field(128, ge=4, description="Size of the swarm.")
-    iterations: int = Field(
-        800, ge=1, description="Most moves of the swarm; it stops earlier where nothing is gained."
-    )
-    seconds: float = Field(
-        60.0,
-        gt=0.0,
-        description=(
-            "Longest search, wall time; a search it cuts short depends on the machine's speed."
-        ),
-    )
+    iterations: int = Field(800, ge=1, description="Most moves of the swarm.")
+    seconds: Positive = Field(60.0, description="Longest search, by this computer's clock.")
     seed: int = Field(1, ge=0, description="Seed of the search; equal seeds give equal designs.")
-    sample_rate_hz: float = Field(
-        200.0, gt=0.0, description="Rows a second in the file, samples a second of a record."
-    )
+    sample_rate_hz: Positive = Field(200.0, description="Rows a second, in file and record.")
     noise: NoiseSettings = Field(NoiseSettings(), description="For the standard errors to expect.")
 
     @model_validator(mode="after")

@@ -13,12 +13,5 @@ class FilterSettings(Settings):
     cutoff_hz: Literal["auto"] | Annotated[float, Field(gt=0.0)] = Field(
         "auto", description='Cut-off, or "auto": where the angle\'s spectrum meets its noise floor.'
     )
-    order: int = Field(
-        4, ge=1, le=10, description="Order of the Butterworth filter, before it runs both ways."
-    )
-    block_s: float = Field(
-        0.025,
-        gt=0.0,
-        le=0.5,
-        description="Blocks that a fit averages torque and regressor over, both alike.",
-    )
+    order: int = Field(4, ge=1, le=10, description="Order of the Butterworth filter, of each pass.")
+    block_s: float = Field(0.025, gt=0.0, le=0.5, description="Blocks over which a fit averages.")

@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from pipelines.contracts.joints import Joint, Kind
 from pipelines.errors import SettingsError
 from pipelines.settings import transmission
-from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.base import Positive, Settings, load_toml
 from pipelines.settings.rig.geometry import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
 from pipelines.validation.suggestion import closest, similar_file
@@ -23,23 +23,20 @@ LARGEST = 1e12
 PLACEHOLDERS = {"file", "folder", "purpose"}
 """Words in braces that a recording's name may have."""
 
+Factor = Annotated[float, Field(gt=0.0, le=LARGEST)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class SourceSettings(Settings):
     """The format of the log; keys that are left out are derived from the file."""
 
-    delimiter: str | None = Field(
-        None, description="The one character between the fields of a text file."
-    )
+    delimiter: str | None = Field(None, description="The character between fields of a text file.")
     decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
     comment: str | None = Field(
         None, min_length=1, max_length=1, description="First character of lines to be skipped."
     )
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
-    columns: tuple[str, ...] | None = Field(
-        None, description="Names of the columns, of a text file without a header."
-    )
+    columns: tuple[str, ...] | None = Field(None, description="Columns of a text without a header.")
     encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
     table: str | None = Field(
         None,
@@ -65,14 +62,11 @@ class TimeSettings(Settings):
 
     column: str | None = Field(None, description="The column with the time stamps.")
     unit: str = Field("s", description="s, ms, us, ns, min, or iso8601 for dates written out.")
-    wraps_at: float | None = Field(
+    wraps_at: Positive | None = Field(
         None,
-        gt=0.0,
         description="Reading at which the clock wraps around to 0, such as 4294967296 (32 bits).",
     )
-    rate_hz: float | None = Field(
-        None, gt=0.0, description="In place of a column: rows a second, where no clock was logged."
-    )
+    rate_hz: Positive | None = Field(None, description="In place of a column: rows a second.")
     restarts: Literal["longest", "split"] = Field(
         "longest",
         description=(
@@ -105,12 +99,7 @@ class ReadingSettings(Settings):
         1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths."
     )
     sign: Literal[1, -1] = Field(1, description="-1 where the log counts the other way.")
-    zero: float = Field(
-        0.0,
-        ge=-LARGEST,
-        le=LARGEST,
-        description="Reading where the joint is at zero, in `unit`.",
-    )
+    zero: float = Field(0.0, ge=-LARGEST, le=LARGEST, description="Reading at the joint's zero.")
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
         None,
         description=(
@@ -118,10 +107,8 @@ class ReadingSettings(Settings):
             " is -1."
         ),
     )
-    wraps_at: float | None = Field(
+    wraps_at: Factor | None = Field(
         None,
-        gt=0.0,
-        le=LARGEST,
         description=(
             "Raw reading at which a counter wraps around to 0 (65536, 360). Turns are counted"
             " from the one in which the log begins nearest to `zero`. With it `signed_bits` has no"
@@ -137,16 +124,8 @@ class ReadingSettings(Settings):
             " near `zero`."
         ),
     )
-    range: tuple[float, float] | None = Field(
-        None,
-        description="Lowest and highest valid raw reading; rows with others are left out.",
-    )
-    time: str | None = Field(
-        None,
-        description=(
-            "Column with this channel's own time stamps, where it was sampled at other instants."
-        ),
-    )
+    range: tuple[float, float] | None = Field(None, description="Lowest and highest raw reading.")
+    time: str | None = Field(None, description="Column with this channel's own time stamps.")
 
     @model_validator(mode="after")
     def _is_one_reading(self) -> Self:
@@ -169,9 +148,7 @@ class ForceSettings(ReadingSettings):
     at: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(
         description="Which cuff."
     )
-    axis: Literal["x", "y", "z"] = Field(
-        description="x along the segment (distal), y forward, z lateral."
-    )
+    axis: Literal["x", "y", "z"] = Field(description="x along the segment, y forward, z lateral.")
 
     @field_validator("unit")
     @classmethod
@@ -188,35 +165,16 @@ class ForceSettings(ReadingSettings):
 class JointReadingSettings(ReadingSettings):
     """A quantity of a joint, measured there or at its motor."""
 
-    gear_ratio: float = Field(
-        1.0,
-        gt=0.0,
-        le=LARGEST,
-        description="Turns of the motor for one of the joint, where the reading is the motor's.",
-    )
-    counts_per_turn: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="Encoder counts in a turn of its shaft."
-    )
-    counts_per_m: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="Counts in a metre of a linear encoder."
-    )
-    lead_m: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="Travel of a prismatic joint for a turn of its screw."
-    )
-    torque_constant_nm_a: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="The motor's torque for its current."
-    )
-    force_constant_n_a: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="The same of a linear motor."
-    )
-    gain_nm_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Torque for a voltage.")
-    gain_n_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Force for a voltage.")
-    rated_torque_nm: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="Value of 100 % or 1000 permille."
-    )
-    rated_force_n: float | None = Field(
-        None, gt=0.0, le=LARGEST, description="The same of a linear motor."
-    )
+    gear_ratio: Factor = Field(1.0, description="Turns of the motor for one of the joint.")
+    counts_per_turn: Factor | None = Field(None, description="Encoder's counts in a turn.")
+    counts_per_m: Factor | None = Field(None, description="Counts in a metre of a linear encoder.")
+    lead_m: Factor | None = Field(None, description="Travel for a turn of the screw.")
+    torque_constant_nm_a: Factor | None = Field(None, description="Torque of the motor per ampere.")
+    force_constant_n_a: Factor | None = Field(None, description="The same of a linear motor.")
+    gain_nm_v: Factor | None = Field(None, description="Torque for a voltage.")
+    gain_n_v: Factor | None = Field(None, description="Force for a voltage.")
+    rated_torque_nm: Factor | None = Field(None, description="Value of 100 % or 1000 permille.")
+    rated_force_n: Factor | None = Field(None, description="The same of a linear motor.")
 
     def gain(self, target: str) -> float:
         """Return the factor from a reading in SI to the quantity at the joint.
@@ -240,24 +198,13 @@ class JointSettings(Settings):
         description="Its name; a leg's are hip and knee, in this order."
     )
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
-    enabled: str | None = Field(
-        None,
-        description=("Column that is 0 (false) while the drive is off; these rows are left out."),
-    )
-    angle: JointReadingSettings = Field(
-        description="Measured angle, or position of a prismatic joint."
-    )
-    torque: JointReadingSettings = Field(
-        description="Torque, or force, that the drive delivers at the joint."
-    )
+    enabled: str | None = Field(None, description="Column that is 0 while the drive is off.")
+    angle: JointReadingSettings = Field(description="Measured angle, or position of a slide.")
+    torque: JointReadingSettings = Field(description="Torque, or force, of the drive at the joint.")
     reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
-    velocity: JointReadingSettings | None = Field(
-        None, description="The drive's own velocity estimate."
-    )
+    velocity: JointReadingSettings | None = Field(None, description="The drive's own velocity.")
     current: JointReadingSettings | None = Field(None, description="Motor current.")
-    temperature: JointReadingSettings | None = Field(
-        None, description="Temperature of drive or motor."
-    )
+    temperature: JointReadingSettings | None = Field(None, description="Of the drive or its motor.")
 
     @model_validator(mode="after")
     def _units_lead_to_the_joint(self) -> Self:
@@ -302,15 +249,9 @@ class RecordingSettings(Settings):
     run: Literal["exo_alone", "with_human"] = Field(
         "exo_alone", description="exo_alone is any machine without a wearer."
     )
-    span_s: tuple[float, float] | None = Field(
-        None, description="Seconds of the run to take, from its start."
-    )
-    span: tuple[Fraction, Fraction] | None = Field(
-        None, description="The same as a share of the run, 0 to 1."
-    )
-    period_s: float | None = Field(
-        None, gt=0.0, description="Period of the excitation, where it repeats."
-    )
+    span_s: tuple[float, float] | None = Field(None, description="First and last second to take.")
+    span: tuple[Fraction, Fraction] | None = Field(None, description="The same, as shares 0 to 1.")
+    period_s: Positive | None = Field(None, description="Period of the excitation, if it repeats.")
     subject: str | None = Field(None, description="Wearer of the machine.")
     session: str | None = Field(None, description="Name of its session.")
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, Kind, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
-from pipelines.settings.physical_bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
+from pipelines.settings.physical_bounds import Gravity, Length
 from pipelines.validation.suggestion import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
@@ -17,9 +17,7 @@ USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
 class JointSettings(Settings):
     """One joint."""
 
-    name: str = Field(
-        pattern=r"^[a-z][a-z0-9_]*$", description="As columns of files begin with it."
-    )
+    name: str = Field(pattern="^[a-z][a-z0-9_]*$", description="Columns of files begin with it.")
     kind: Kind = Field("revolute", description='"revolute" or "prismatic".')
 
 
@@ -41,16 +39,9 @@ class MechanismSettings(Settings):
             " single one revolute joint."
         ),
     )
-    thigh_length_m: float = Field(
-        0.38952,
-        gt=0.0,
-        le=MOST_LENGTH_M,
-        description="First joint's axis to the second's, hip to knee; the paper's leg.",
-    )
-    gravity_m_s2: float = Field(
+    thigh_length_m: Length = Field(0.38952, description="First axis to second; the paper's leg.")
+    gravity_m_s2: Gravity = Field(
         9.8,
-        ge=0.0,
-        le=MOST_GRAVITY_M_S2,
         description=(
             "Acceleration of gravity; the paper's value. 0 for joints with vertical axes and for"
             " level slides."

@@ -1,7 +1,11 @@
 """Bounds beyond which a length or the gravity was given in another unit."""
 
-MOST_GRAVITY_M_S2 = 30.0
-"""More than on any planet; 9.81 m/s² in cm/s² is beyond it."""
+from typing import Annotated
 
-MOST_LENGTH_M = 5.0
-"""More than any limb or machine for one; 389.52 mm and 38.952 cm are beyond it."""
+from pydantic import Field
+
+Gravity = Annotated[float, Field(ge=0.0, le=30.0)]
+"""In m/s², up to more than on any planet; 9.81 m/s² in cm/s² is beyond it."""
+
+Length = Annotated[float, Field(gt=0.0, le=5.0)]
+"""In m, up to more than any limb or machine for one; 389.52 mm and 38.952 cm are beyond it."""

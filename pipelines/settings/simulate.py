@@ -4,50 +4,28 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
+from pipelines.settings.base import NotNegative, Positive, Settings
 
 
 class SimulateSettings(Settings):
     """Controller, disturbance and length of the closed loop; defaults are the reference case."""
 
-    duration_s: float = Field(10.0, gt=0.0, description="Simulated time.")
+    duration_s: Positive = Field(10.0, description="Simulated time.")
     step_s: float = Field(0.001, gt=0.0, le=0.01, description="Step of controller and integrator.")
-    error_gain_1_s: float = Field(
-        10.0, gt=0.0, description="Lambda: weight of the error relative to its derivative."
-    )
-    feedback_gain_nm_s_rad: float = Field(
-        300.0, ge=0.0, description="Kv: feedback of the filtered error."
-    )
-    adaptation_gain: float = Field(
-        500.0, ge=0.0, description="F: how fast the network's weights adapt."
-    )
-    robust_gain_nm: float = Field(
-        0.3, ge=0.0, description="Gain of the sign term against the network's error."
-    )
+    error_gain_1_s: Positive = Field(10.0, description="Lambda: weight of error by derivative.")
+    feedback_gain_nm_s_rad: NotNegative = Field(300.0, description="Kv: feedback of the error.")
+    adaptation_gain: NotNegative = Field(500.0, description="F: rate at which the weights adapt.")
+    robust_gain_nm: NotNegative = Field(0.3, description="Gain of the robust (sign) term.")
     network_nodes: int = Field(7, ge=1, le=200, description="Gaussians of each joint's network.")
-    network_width: float = Field(10.0, gt=0.0, description="b: width of each Gaussian.")
-    torque_limit_nm: float = Field(
-        200.0, gt=0.0, description="Drive limit; adaptation pauses while it is reached."
-    )
-    disturbance_nm: float = Field(
-        2.0, ge=0.0, description="Amplitude of the sine disturbance on both joints."
-    )
-    disturbance_rad_s: float = Field(2.0, gt=0.0, description="Frequency of the disturbance.")
-    encoder_counts_per_turn: int = Field(
-        0, ge=0, description="Of the angle the controller sees; 0 for an ideal one."
-    )
-    encoder_noise_rad: float = Field(
-        0.0, ge=0.0, description="Standard deviation of noise on each angle reading."
-    )
-    speed_cutoff_hz: float = Field(
-        100.0,
-        gt=0.0,
-        description="Low-pass of the speed, a difference of angles where the encoder is not ideal.",
-    )
+    network_width: Positive = Field(10.0, description="b: width of each Gaussian.")
+    torque_limit_nm: Positive = Field(200.0, description="Drive limit, at which adaptation pauses.")
+    disturbance_nm: NotNegative = Field(2.0, description="Amplitude of the sine disturbance.")
+    disturbance_rad_s: Positive = Field(2.0, description="Frequency of the disturbance.")
+    encoder_counts_per_turn: int = Field(0, ge=0, description="Of the encoder; 0 for an ideal one.")
+    encoder_noise_rad: NotNegative = Field(0.0, description="RMS of the noise of each angle.")
+    speed_cutoff_hz: Positive = Field(100.0, description="Low-pass of a speed from encoder steps.")
     seed: int = Field(0, ge=0, description="Seed of the encoder noise.")
-    settled_after_s: float = Field(
-        5.0, ge=0.0, description="From here on the largest error counts."
-    )
+    settled_after_s: NotNegative = Field(5.0, description="From here on the largest error counts.")
     sweep_nm_s_rad: tuple[Annotated[float, Field(gt=0.0)], ...] = Field(
         (50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0),
         description="Values of Kv for the sweep of the paper's Figure 3; empty for none.",

@@ -70,7 +70,8 @@ def test_a_motion_too_fast_for_the_rig_is_refused(rig_file, motion):
         make_plan(load_rig(rig_file()), fast, REST, 5.0, RATE)
     assert "the hip would move at" in str(caught.value)
     assert str(caught.value).endswith(
-        "but the rig allows 3 rad/s; make the excitation slower or smaller"
+        "but the rig allows -3 to 3 rad/s; make the excitation slower or smaller: is its"
+        " omega_rad_s in rad/s?"
     )
 
 

@@ -29,8 +29,8 @@ def test_a_link_whose_port_is_another_processs_by_now_is_reported_as_a_possible_
         raise AssertionError("the link is taken")
     assert (
         str(refused.value)
-        == f"{link}: is a link to /dev/null already, as a virtual rig makes one; end that rig"
-        " or, if a killed one left the link, delete it, or name another path in serial_port"
+        == f"{link}: exists already, where a virtual rig's link was to be. End the rig that made"
+        " it, remove it, or name another path in serial_port"
     )
     assert os.readlink(link) == "/dev/null"
 
@@ -38,7 +38,7 @@ def test_a_link_whose_port_is_another_processs_by_now_is_reported_as_a_possible_
 def test_a_file_in_the_place_of_the_link_stays(link):
     link.write_text("a month of work")
     with (
-        pytest.raises(DeviceError, match="is there already, where the link"),
+        pytest.raises(DeviceError, match="exists already, where a virtual"),
         _linked(str(link), "/dev/null"),
     ):
         raise AssertionError("the place is taken")

@@ -140,16 +140,14 @@ def _check_motion(
     largest = max(peaks, key=lambda probe: abs(peaks[probe]))
     peak, where = peaks[asked], f"{asked.map_path}.read"
     if abs(peaks[largest]) < HARDLY_RAD:
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is"
             f" frozen: compare {where}.angle with the device's manual",
             "angle",
         )
         return
     if largest is not asked and abs(peaks[largest]) > CLEAR * abs(peak):
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"the {asked.place} was moved, but the angle of {largest.name} changed, by"
             f" {peaks[largest]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"
             " exchange host, port and unit of the two in the rig file",
@@ -157,8 +155,7 @@ def _check_motion(
         )
         return
     if peak * sign < 0:
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"its angle went {'down' if peak < 0 else 'up'} ({peak:+.3g} rad) when the"
             f" {asked.place} went {'forward' if asked.place == 'hip' else 'into flexion'}; expected"
             f" {'up' if sign > 0 else 'down'}: change the sign of {where}.angle.scale, and of"
@@ -175,8 +172,7 @@ def _check_motion(
         remedy = "compare the manual with"
         if plausible:
             remedy = f'with unit = "{plausible[0]}" it would be plausible: correct'
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected"
             f" {SWING_RAD[0]:g} to {SWING_RAD[1]:g} rad of 10 to 40 degrees; {remedy}"
             f" {where}.angle",
@@ -204,28 +200,24 @@ def _check_push(
     (largest, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
     where = f"{asked.map_path}.read"
     if abs(peak) < least:
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"no force of any cuff changed by more than {abs(peak):.3g} N when {asked.place} was to"
             f" be pressed, expected {least:g} N and more; was it? Else compare scale and unit in"
             f" {where} with the manual",
         )
     elif largest is not asked:
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"{asked.place} was pressed, but {largest.name} measured it ({axis} {peak:+.3g} N): the"
             " two are swapped; exchange host, port and unit of the two in the rig file",
         )
     elif axis != "force_y":
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"the push was measured in {axis} ({peak:+.3g} N), expected force_y, the segment's"
             f" forward axis: exchange the addresses in {where}",
             axis,
         )
     elif peak * sign < 0:
-        yield Finding(
-            asked.name,
+        yield asked.finding(
             f"force_y went {'up' if peak > 0 else 'down'} ({peak:+.3g} N), expected"
             f" {'up' if sign > 0 else 'down'}: it is the force of the exoskeleton on the leg,"
             f" forward positive; change the sign of {where}.force_y.scale",

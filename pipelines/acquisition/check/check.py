@@ -14,11 +14,11 @@ from pipelines.acquisition.check.survey import RigReport, probes_of, survey
 from pipelines.acquisition.machine.embedded_rig import embedded
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
-from pipelines.acquisition.pacing import urgent
 from pipelines.acquisition.preconditions.feasible_rate import rate_checks
 from pipelines.acquisition.preconditions.human_interlock import refuse_rare_readings
 from pipelines.acquisition.preconditions.set_point_scale import set_point_contradictions
 from pipelines.errors import DeviceError, InputError, SettingsError
+from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
 

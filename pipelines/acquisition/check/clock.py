@@ -90,8 +90,7 @@ def _check_counter(
     if _counts(counter, seconds, rate_hz):
         changes = np.count_nonzero(steps)
         if clock.step > 1 and not probe.in_lockstep and len(steps) > OFTEN * changes:
-            yield Finding(
-                probe.name,
+            yield probe.finding(
                 f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample;"
                 f" correct {where}.scale, or let the device count samples",
             )
@@ -99,36 +98,13 @@ def _check_counter(
     mended = remedy(
         "sequence", "", where, series, lambda v: _counts(v, seconds, rate_hz), counts=True
     )
-    if mended:
-        yield Finding(
-            probe.name, f"its counter reads {counter[0]:.6g}, then {counter[-1]:.6g}; {mended}"
-        )
-    elif not steps.any():
-        others = np.delete(series.words, _places(series, "sequence"), axis=1)
-        alive = (
-            "though other registers change"
-            if (others != others[0]).any()
-            else "and nothing else changes either"
-        )
-        yield Finding(
-            probe.name,
-            f"its counter stands still at {counter[-1]:g} for {seconds:.2g} s, {alive}; is it"
-            f" sampling? Else correct {where}",
-        )
-    elif (steps < 0).any():
-        yield Finding(
-            probe.name,
-            f"its counter goes back, from {counter[:-1][steps < 0][0]:g} to"
-            f" {counter[1:][steps < 0][0]:g}; compare {where} with the device's manual",
-        )
-    else:
-        measured = (counter[-1] - counter[0]) / seconds
-        expected = f"{rate_hz:g}" if rate_hz else "a sample rate"
-        yield Finding(
-            probe.name,
-            f"its counter goes up by {measured:.4g} a second, expected {expected}; set the device's"
-            f" rate or acquire.sample_rate_hz, or correct {where}",
-        )
+    measured = (counter[-1] - counter[0]) / seconds
+    expected = f"{rate_hz:g}" if rate_hz else "a sample rate"
+    otherwise = f"is it sampling? Set its rate or acquire.sample_rate_hz, or correct {where}"
+    yield probe.finding(
+        f"its counter goes up by {measured:.4g} a second, from {counter[0]:.6g} to"
+        f" {counter[-1]:.6g}, expected {expected}; {mended or otherwise}"
+    )
 
 
 def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
@@ -151,13 +127,10 @@ def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> I
     measured = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
         if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
-            yield Finding(
-                probe.name, f'{measured}; with unit = "{unit}" the two agree: correct {where}'
-            )
+            yield probe.finding(f'{measured}; with unit = "{unit}" the two agree: correct {where}')
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
-    yield Finding(
-        probe.name,
+    yield probe.finding(
         f"{measured};"
         f" {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
     )
@@ -194,26 +167,15 @@ def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
     """
     if len(series.fresh) < 2:  # this needs a counter that counts
         return
-    same = np.diff(series.words[:, _places(series, "sequence")], axis=0) == 0
-    latched = [name for name in series.block.names if name not in ("sequence", "status")]
-    is_same_sample = same.all(axis=1)
+    is_same_sample = (np.diff(series.raw("sequence"), axis=0) == 0).all(axis=1)
     torn = [
         name
-        for name in latched
-        if (
-            is_same_sample
-            & (np.diff(series.words[:, _places(series, name)], axis=0) != 0).any(axis=1)
-        ).any()
+        for name in series.block.names
+        if name not in ("sequence", "status")
+        and np.diff(series.raw(name), axis=0)[is_same_sample].any()
     ]
     if torn:
-        yield Finding(
-            probe.name,
+        yield probe.finding(
             f"{', '.join(torn)} changed while the sample counter did not: a block is not latched at"
             " one instant; read the registers that the device latches, see its manual",
         )
-
-
-def _places(series: Series, name: str) -> list[int]:
-    register = series.block.registers[name]
-    start = register.address - series.block.address
-    return list(range(start, start + register.registers))

@@ -191,7 +191,7 @@ def _check_register(
             lambda v: bool(expected.holds(v).all() and not expected.leaps(v, seconds, period_s)),
         )
     todo = mended or expected.otherwise.format(where=where)
-    yield Finding(probe.name, f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
+    yield probe.finding(f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
 
 
 def _check_faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
@@ -200,8 +200,7 @@ def _check_faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Findin
     status = int(series.of("status")[-1])
     bits = drive.map.active_faults(status)
     if bits:
-        yield Finding(
-            probe.name,
+        yield probe.finding(
             f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual"
             f" and clear it, or correct {probe.map_path}.fault_mask",
             "status",

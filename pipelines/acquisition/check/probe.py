@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.modbus.wraparound import Unwrapper
@@ -79,10 +80,14 @@ class Series:
     @property
     def fresh(self) -> NDArray:
         """Indices of the first answer with each new sample, (k,)."""
-        register = self.block.registers["sequence"]
+        is_new = (np.diff(self.raw("sequence"), axis=0) != 0).any(axis=1)
+        return np.flatnonzero(np.r_[True, is_new])
+
+    def raw(self, name: str) -> NDArray:
+        """Return the words of a quantity, (n, registers of it)."""
+        register = self.block.registers[name]
         start = register.address - self.block.address
-        counter = self.words[:, start : start + register.registers]
-        return np.flatnonzero(np.r_[True, (np.diff(counter, axis=0) != 0).any(axis=1)])
+        return self.words[:, start : start + register.registers]
 
 
 class Probe:
@@ -105,6 +110,10 @@ class Probe:
         """Cycles of a run from one reading to the next."""
         self._answers: list[tuple[float, float, list[int]]] = []
         self._last = [0] * self.block.count
+
+    def finding(self, text: str, quantity: str = "") -> Finding:
+        """Return a finding about the device."""
+        return Finding(self.name, text, quantity)
 
     def is_due(self, cycle: int) -> bool:
         """Return whether a run reads the device in a cycle."""

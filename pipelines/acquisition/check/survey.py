@@ -194,7 +194,7 @@ def _finding_of(error: DeviceError, probes: Sequence[Probe]) -> Finding:
     """Return an error as a finding about the device that it names."""
     for probe in probes:
         if str(error).startswith(probe.part.device.label):
-            return Finding(probe.name, str(error).removeprefix(f"{probe.part.device.label}: "))
+            return probe.finding(str(error).removeprefix(f"{probe.part.device.label}: "))
     return Finding("rig", str(error))
 
 
@@ -218,8 +218,7 @@ def _check_device(
         seconds = (len(series.asked) - 1) * probe.every / rate_hz
     elif rate_hz and report.latency.median > SLOW * probe.every / rate_hz:
         findings.append(
-            Finding(
-                probe.name,
+            probe.finding(
                 f"takes {report.latency.median * 1e3:.3g} ms to answer, too long for a sample of"
                 f" {rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its"
                 " own, raise its baud rate, or ask less often",

@@ -30,7 +30,7 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     register = series.block.registers.get("velocity")
     if register is None:
         return
-    device, where, fresh = probe.name, f"{probe.map_path}.read", series.fresh
+    where, fresh = f"{probe.map_path}.read", series.fresh
     t = series.answered[fresh]
     if probe.in_lockstep and rate_hz:
         t = np.arange(len(fresh)) / rate_hz
@@ -41,8 +41,7 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     angle, integral = q - q.mean(), travel - travel.mean()
     if np.ptp(q) < MOVED_RAD:
         if np.ptp(travel) > STANDING_RAD + np.ptp(q):
-            yield Finding(
-                device,
+            yield probe.finding(
                 f"velocity says that the joint went {np.ptp(travel):.3g} rad in {t[-1] - t[0]:.2g}"
                 f" s, but its angle changed by {np.ptp(q):.2g} rad; compare {where}.velocity with"
                 " the device's manual",
@@ -55,20 +54,17 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
         else 0.0
     )
     if abs(correlation) < CORRELATED:
-        yield Finding(
-            device,
+        yield probe.finding(
             f"velocity does not follow the angle (correlation {correlation:.2f}); compare"
             f" {where}.velocity with the device's manual",
         )
     elif ratio < 0:
-        yield Finding(
-            device,
+        yield probe.finding(
             f"velocity is negative where the angle grows ({ratio:.3g} of its rate of change,"
             f" expected 1); change the sign of {where}.velocity.scale",
         )
     elif abs(ratio - 1.0) > TOLERANCE:
-        yield Finding(
-            device,
+        yield probe.finding(
             f"velocity is {ratio:.3g} times the rate of change of the angle, expected 1; "
             f"{_unit(register, ratio, where)}",
         )

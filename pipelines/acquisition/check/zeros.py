@@ -37,23 +37,20 @@ def check_zeros(
         mean, full = float(forces[:, i].mean()), series.block.registers[axis].counts
         scale, offset = series.block.registers[axis].si
         if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= NEAR_END * full[1]) > 0.5:
-            yield Finding(
-                probe.name,
+            yield probe.finding(
                 f"{axis} is saturated at {mean:.4g} N, the end of its register; check the sensor's"
                 f" cable and amplifier, or compare {where}.{axis} with its manual",
             )
         elif is_empty and abs(mean) > ZERO_SHARE * limit_n:
             most = ZERO_SHARE * limit_n
-            yield Finding(
-                probe.name,
+            yield probe.finding(
                 f"{axis} is {mean:.4g} N with nobody in the machine, expected within ±{most:g} N"
                 f" ({ZERO_SHARE:.0%} of safety.cuff_force_n); tare the sensor, or correct"
                 f" {where}.{axis}.offset",
             )
     if len(forces) >= ENOUGH and not np.ptp(forces, axis=0).any():
         listed = ", ".join(f"{force:.4g}" for force in forces[0])
-        yield Finding(
-            probe.name,
+        yield probe.finding(
             f"all three forces are constant ({listed} N) over {len(forces)} samples, without any"
             " noise; is the sensor connected, and are these its live registers?",
         )

@@ -1,12 +1,11 @@
 """The embedded rig: a virtual rig in a process of its own, for the duration of a run."""
 
-import queue
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -32,23 +31,9 @@ def embedded(
     rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float
 ) -> Iterator[RigSettings]:
     """Run the virtual rig of a file; yield the rig's settings with the addresses of its devices."""
-    command = [
-        sys.executable,
-        "-m",
-        "exoid_cli",
-        "rig",
-        "serve",
-        str(path),
-        "--run",
-        run.run,
-        "--seed",
-        str(run.seed),
-        "--sample-rate-hz",
-        str(sample_rate_hz),
-        "--port",
-        "0",
-        "--until-input-ends",
-    ]
+    command = [sys.executable, "-m", "exoid_cli", "rig", "serve", str(path), "--run", run.run]
+    command += ["--seed", str(run.seed), "--sample-rate-hz", str(sample_rate_hz)]
+    command += ["--port", "0", "--until-input-ends"]
     with tempfile.TemporaryFile() as errors:
         # The rig ends with its input, which the system closes even if this process is killed.
         process = subprocess.Popen(
@@ -59,61 +44,41 @@ def embedded(
             bufsize=0,
             **_ON_ITS_OWN,
         )
-        output = ProcessOutput(process)
+        late = threading.Timer(START_S, process.kill)
+        late.start()
         try:
             lines = len({device.line for device in (*rig.drive, *rig.sensor)})
-            yield _at(rig, dict(_place(output, path, errors) for _ in range(lines)))
+            places = dict(_place(process, path, errors) for _ in range(lines))
+            late.cancel()
+            yield _at(rig, places)
         finally:
-            output.end()
+            late.cancel()
+            _end(process)
 
 
-class ProcessOutput:
-    """The output of a process, line by line.
-
-    A thread reads it, since not every system can wait for a pipe.
-    """
-
-    def __init__(self, process: subprocess.Popen) -> None:
-        self.process = process
-        self._lines = queue.SimpleQueue[bytes]()
-        self._thread = threading.Thread(target=self._read, name="embedded rig", daemon=True)
-        self._thread.start()
-
-    def line(self, longest_s: float) -> str:
-        """Return the next line; an empty one where the process has ended or took too long."""
-        with suppress(queue.Empty):
-            return self._lines.get(timeout=longest_s).decode().strip()
-        return ""
-
-    def end(self) -> None:
-        """End the process by closing its input; kill it if that takes too long."""
-        assert self.process.stdin is not None  # a pipe
-        self.process.stdin.close()
-        try:
-            self.process.wait(END_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        self._thread.join(END_S)
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None  # a pipe
-        with self.process.stdout as pipe:
-            for line in pipe:
-                self._lines.put(line)
-        self._lines.put(b"")
+def _end(process: subprocess.Popen) -> None:
+    """End a process by closing its input; kill it if that takes too long."""
+    assert process.stdin and process.stdout  # pipes
+    process.stdin.close()
+    try:
+        process.wait(END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    process.stdout.close()
 
 
-def _place(output: ProcessOutput, path: Path, errors: IO[bytes]) -> tuple[str | None, str]:
+def _place(process: subprocess.Popen, path: Path, errors: IO[bytes]) -> tuple[str | None, str]:
     """Wait for the rig's address of a line; return name and address.
 
     The name is None for devices that are on no line of the rig file.
     """
-    line = output.line(START_S)
+    assert process.stdout  # a pipe
+    line = process.stdout.readline().decode().strip()
     if line:
         name, _, place = line.rpartition(" ")
         return name or None, place
-    output.end()
+    _end(process)
     errors.seek(0)
     words = errors.read().decode(errors="replace").strip()
     if not words:
@@ -122,7 +87,7 @@ def _place(output: ProcessOutput, path: Path, errors: IO[bytes]) -> tuple[str | 
             " to see why"
         )
     # A settings error of the rig's process is one of this command too.
-    kind = SettingsError if output.process.returncode == SettingsError.exit_code else DeviceError
+    kind = SettingsError if process.returncode == SettingsError.exit_code else DeviceError
     raise kind(words.splitlines()[-1].removeprefix("exoid: "))
 
 

@@ -43,8 +43,3 @@ def fits(batch: bytes, head: bytes) -> bool:
         return False
     begin, end = match.span(1)
     return crc32(batch[:begin] + b"00000000" + batch[end:], crc32(head)) == int(match[1], 16)
-
-
-def has_any(content: bytes) -> bool:
-    """Return whether a part of a journal has a checksum; journals of an older exoid have none."""
-    return _CHECKSUM.search(content) is not None

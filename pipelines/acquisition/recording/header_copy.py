@@ -6,7 +6,6 @@ rows, which other readers of Arrow ignore.
 
 import re
 from base64 import b64decode, b64encode
-from collections.abc import Iterator
 from typing import BinaryIO
 from zlib import crc32
 
@@ -22,18 +21,12 @@ def head_as_text(head: bytes) -> str:
     return f"exoid-head:{crc32(head):08x}:{b64encode(head).decode()}"
 
 
-def ends_of(file: BinaryIO) -> Iterator[bytes]:
-    """Yield the searched bytes at the beginning and at the end of a journal."""
+def find_head(file: BinaryIO) -> bytes | None:
+    """Return the head of the first undamaged copy in a journal; None for none."""
     length = file.seek(0, 2)
     for place in (0, max(length - SEARCHED, 0)):
         file.seek(place)
-        yield file.read(SEARCHED)
-
-
-def find_head(file: BinaryIO) -> bytes | None:
-    """Return the head of the first undamaged copy in a journal; None for none."""
-    for content in ends_of(file):
-        for match in _COPY.finditer(content):
+        for match in _COPY.finditer(file.read(SEARCHED)):
             try:
                 head = b64decode(match[2])
             except ValueError:

@@ -36,20 +36,14 @@ END = b"\xff\xff\xff\xff\0\0\0\0"
 """Last bytes of a stream that was closed."""
 
 
-def field_of(name: str) -> pa.Field:
-    """Return the Arrow field of a journal's column."""
-    return pa.field(name, pa.int64() if name == "sequence" else pa.float64())
-
-
 class Journal:
     """Rows on their way to disk, written by a thread of its own: no leg must wait for a disk."""
 
     def __init__(self, path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> None:
         self.path = path
         self.rows = 0
-        self._schema = pa.schema(
-            map(field_of, columns), metadata={KEY: to_json(metadata, str(path)).encode()}
-        )
+        types = {name: pa.int64() if name == "sequence" else pa.float64() for name in columns}
+        self._schema = pa.schema(types, metadata={KEY: to_json(metadata, str(path)).encode()})
         self._head = self._schema.serialize().to_pybytes()
         self._copy = {header_copy.KEY: header_copy.head_as_text(self._head).encode()}
         self._waiting: deque[Sequence[float]] = deque()

@@ -12,9 +12,9 @@ import pyarrow as pa
 
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.recording import checksum
-from pipelines.acquisition.recording.header_copy import ends_of, find_head
+from pipelines.acquisition.recording.header_copy import find_head
 from pipelines.acquisition.recording.journal import ABORT, END
-from pipelines.contracts.equality import KEY, MAGIC
+from pipelines.contracts.equality import KEY
 from pipelines.contracts.run_paths import JOURNAL
 from pipelines.errors import ContractError, InputError
 
@@ -52,26 +52,17 @@ class JournalFile:
         """Bytes without meaning, and samples, of the last reading of all batches."""
         with open(path, "rb") as file:
             try:
-                copy = find_head(file)
-                self.checked = any(map(checksum.has_any, ends_of(file)))
-                """Whether its batches have checksums, which those of an older exoid have not."""
                 # A copy has a checksum, the head itself none: where they differ, the copy is right.
-                self._head = copy or _part_at(file, 0)
-                is_whole = self._head == _between(file, 0, len(self._head))
-                self._lost = 0 if is_whole else len(self._head)
-                self.schema = pa.ipc.open_stream(self._head).schema
-                metadata = json.loads(self.schema.metadata[KEY])
+                head = find_head(file)
+                is_whole = head is not None and head == _between(file, 0, len(head))
             except OSError as error:
-                _raise_disk_error(path, error)
-                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
-            except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
-                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
-        if not isinstance(metadata, dict):
-            raise ContractError(
-                f"{path}: its metadata are {metadata!r:.40}, expected a table of keys and values;"
-                " exoid wrote no such journal, nothing was changed"
-            )
-        self.metadata: dict[str, Any] = metadata
+                raise _disk_error(path, error) from error
+        if head is None:
+            raise ContractError(f"{path}: {_why_no_journal(path)}")
+        self._head = head
+        self._lost = 0 if is_whole else len(head)
+        self.schema = pa.ipc.open_stream(head).schema
+        self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
 
     def batches(self) -> Iterator[Batch]:
         """Yield all undamaged batches; after damage or a cut, search for the next one.
@@ -102,35 +93,27 @@ class JournalFile:
         """Return the batch at a place of the file, and leave the file at its end; None for none."""
         try:
             part = _part_at(file, place)
-            if self.checked and not checksum.fits(part, self._head):
+            if not checksum.fits(part, self._head):
                 return None
             stream = pa.ipc.open_stream(self._head + part)
             rows, words = stream.read_next_batch_with_custom_metadata()
-            rows.validate()
         except OSError as error:
-            _raise_disk_error(self.path, error)
-            return None
-        except (pa.ArrowException, EOFError, StopIteration, ValueError):
+            if error.errno is None:  # of Arrow, not of the disk
+                return None
+            raise _disk_error(self.path, error) from error
+        except (pa.ArrowException, EOFError, ValueError):
             return None
         return Batch(rows, dict(words) if words and ABORT in words else None)
 
 
-def _raise_disk_error(path: Path, error: OSError) -> None:
-    """Raise an error of the disk; not one of Arrow, which has no error number."""
-    if error.errno is not None:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another"
-            " disk and recover it there"
-        ) from error
+def _disk_error(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another"
+        " disk and recover it there"
+    )
 
 
 def _why_no_journal(path: Path) -> str:
-    with open(path, "rb") as file:
-        if file.read(len(MAGIC)) == MAGIC:
-            return (
-                "is no journal of a run but a Parquet file, of which nothing is to be recovered;"
-                " see `exoid show`"
-            )
     # Only a file with a journal's name can be the rest of one.
     if not path.name.endswith(JOURNAL):
         return (

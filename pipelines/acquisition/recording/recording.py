@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.recording.journal import ABORT, METADATA, ROWS, field_of
+from pipelines.acquisition.recording.journal import ABORT, METADATA, ROWS
 from pipelines.acquisition.recording.journal_file import JournalFile, in_pieces
 from pipelines.acquisition.recording.valid_rows import valid_batches
 from pipelines.contracts import RECORDING
@@ -40,8 +40,6 @@ class JournalSummary:
     """Metadata that were not known before the run."""
     damaged: bool = False
     """Whether samples that were written are missing, or bytes have no meaning."""
-    checked: bool = True
-    """Whether the samples have checksums."""
 
     @property
     def missed(self) -> int:
@@ -72,9 +70,7 @@ def summarize(journal: JournalFile) -> JournalSummary:
     ContractError
         The journal's metadata or columns are not those of a run.
     """
-    _refuse_other_columns(journal)
-    rate_hz = _positive(journal, "sample_rate_hz")
-    seconds = _positive(journal, "config", "run", "duration_s")
+    rate_hz, seconds = _rate_and_duration(journal)
     planned, samples, reached = round(seconds * rate_hz), 0, 0
     gaps = list[tuple[float, int]]()
     offset, last_words = None, None
@@ -89,63 +85,37 @@ def summarize(journal: JournalFile) -> JournalSummary:
         gaps = gaps + _gaps(np.concatenate([[reached - 1], index]), rate_hz)
         samples += len(index)
         reached = int(index[-1]) + 1
-    ending = None if last_words is None else _ending_of(last_words)
-    if ending is None:
+    damaged = journal.damaged > 0
+    if last_words is None:
         # Neither a killed run nor one on a full disk can write its last words.
-        why = (
+        abort: str | None = (
             f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its"
             " disk was full"
         )
-        damaged = journal.damaged > 0 or last_words is not None
         if damaged:
-            why += ", or its last words are damaged"
-        return JournalSummary(
-            samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked
-        )
-    abort, metadata, rows = ending
-    if not abort:
+            abort = f"{abort}, or its last words are damaged"
+        return JournalSummary(samples, planned, rate_hz, gaps, abort, damaged=damaged)
+    abort = last_words[ABORT].decode() or None
+    if abort is None:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
-    damaged = journal.damaged > 0 or rows != journal.rows
-    return JournalSummary(
-        samples, planned, rate_hz, gaps, abort, metadata, damaged, journal.checked
-    )
+    metadata = json.loads(last_words[METADATA])
+    damaged = damaged or int(last_words[ROWS]) != journal.rows
+    return JournalSummary(samples, planned, rate_hz, gaps, abort, metadata, damaged)
 
 
-def _ending_of(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
-    """Return why a run stopped early, more metadata and its samples; None where damaged."""
+def _rate_and_duration(journal: JournalFile) -> tuple[float, float]:
+    """Return the samples a second and the planned seconds; refuse what no run has written."""
     try:
-        metadata = json.loads(last_words[METADATA])
-        ending = last_words[ABORT].decode() or None, metadata, int(last_words[ROWS])
-    except (KeyError, ValueError):
-        return None
-    return ending if isinstance(metadata, dict) else None
-
-
-def _refuse_other_columns(journal: JournalFile) -> None:
-    """Refuse a journal whose columns cannot be those of a run."""
-    fields = {field.name: field for field in journal.schema}
-    for name in ("time_s", "sequence", *fields):
-        stored, expected = fields.get(name), field_of(name)
-        if stored is None or stored.type != expected.type:
-            fault = "is missing" if stored is None else f"holds {stored.type}"
-            raise ContractError(
-                f"{journal.path}: its column {name} {fault}, expected {expected.type}; exoid wrote"
-                " no such journal, nothing was changed"
-            )
-
-
-def _positive(journal: JournalFile, *keys: str) -> float:
-    """Return a number of a journal's metadata that every recording needs."""
-    value: Any = journal.metadata
-    for key in keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= LARGEST:
-        return value
-    fault = "is missing" if value is None else f"is {value!r:.40}"
-    raise ContractError(
-        f"{journal.path}: {'.'.join(keys)} of its metadata {fault}, expected a number above 0 and"
-        f" up to {LARGEST:g}; exoid wrote no such journal, nothing was changed"
-    )
+        rate_hz = float(journal.metadata["sample_rate_hz"])
+        seconds = float(journal.metadata["config"]["run"]["duration_s"])
+    except (KeyError, TypeError, ValueError):
+        rate_hz = seconds = 0.0
+    is_of_a_run = 0.0 < rate_hz <= LARGEST and 0.0 < seconds <= LARGEST
+    if not is_of_a_run or not {"time_s", "sequence"} <= set(journal.schema.names):
+        raise ContractError(
+            f"{journal.path}: columns or metadata are not those of a run; nothing was changed"
+        )
+    return rate_hz, seconds
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
@@ -171,8 +141,6 @@ def write_recording(journal: JournalFile, path: Path, summary: JournalSummary, *
     metadata = journal.metadata | summary.metadata | {"gaps": summary.gaps}
     if summary.abort:
         metadata["abort"] = summary.abort
-    if not summary.checked:
-        metadata["unchecked"] = True
     metadata |= more
     rows = (batch.rows for batch in valid_batches(journal))
     RECORDING.write_pieces(path, in_pieces(rows, PIECE_ROWS), metadata)

@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
+from pipelines.settings.base import Positive, Settings
 from pipelines.settings.rig.line import LineSettings, TcpLine
 from pipelines.settings.rig.with_human import TIGHTER, check_tighter, limits_in_force
 
@@ -21,15 +21,9 @@ At 1000 cycles a second this takes as long as the longest watchdog waits.
 class DeviceSettings(Settings):
     """Line and unit of a device."""
 
-    line: str | None = Field(
-        None, description="The line it is on, a table below [line]; else one of its own by TCP."
-    )
-    host: str = Field(
-        "127.0.0.1", description="Name or address; an embedded rig is always on this machine."
-    )
-    port: int = Field(
-        502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
-    )
+    line: str | None = Field(None, description="Its table below [line]; else its own TCP line.")
+    host: str = Field("127.0.0.1", description="Name or address; an embedded rig has its own.")
+    port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses its own.")
     unit: int = Field(1, ge=1, le=247, description="Modbus unit id.")
     map: str = Field(description="Its register map, a table below [map].")
 
@@ -54,21 +48,19 @@ class HumanDriveSettings(Settings):
     """Limits of a joint with a wearer; others are as without."""
 
     angle_rad: tuple[float, float] | None = Field(None, description="Lowest and highest angle.")
-    speed_rad_s: float | None = Field(None, gt=0.0, description="Highest speed, either way.")
-    torque_nm: float | None = Field(
-        None, gt=0.0, description="Highest torque at the joint, either way."
-    )
+    speed_rad_s: Positive | None = Field(None, description="Highest speed, either way.")
+    torque_nm: Positive | None = Field(None, description="Highest torque at the joint, either way.")
 
 
 class DriveSettings(DeviceSettings):
     """A drive, its transmission, and the limits of its joint."""
 
     joint: JointName = Field(description="The joint it moves.")
-    torque_constant_nm_a: float = Field(gt=0.0, description="Motor torque per ampere.")
-    gear_ratio: float = Field(gt=0.0, description="Motor turns per turn of the joint.")
+    torque_constant_nm_a: Positive = Field(description="Motor torque per ampere.")
+    gear_ratio: Positive = Field(description="Motor turns per turn of the joint.")
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
-    speed_rad_s: float = Field(gt=0.0, description="Highest speed, either way.")
-    torque_nm: float = Field(gt=0.0, description="Highest torque at the joint, either way.")
+    speed_rad_s: Positive = Field(description="Highest speed, either way.")
+    torque_nm: Positive = Field(description="Highest torque at the joint, either way.")
     with_human: HumanDriveSettings = Field(
         HumanDriveSettings(), description="Tighter limits of runs with_human."
     )
@@ -123,5 +115,5 @@ class ControllerSettings(Settings):
     type: str = Field("pd", description="Kind of loop.")
     kp_nm_rad: float | None = Field(None, description="Stiffness.")
     kd_nm_s_rad: float | None = Field(None, description="Damping.")
-    rate_hz: float | None = Field(None, gt=0.0, description="Rate of the loop.")
-    limit_nm: float | None = Field(None, gt=0.0, description="Torque at which it saturates.")
+    rate_hz: Positive | None = Field(None, description="Rate of the loop.")
+    limit_nm: Positive | None = Field(None, description="Torque at which it saturates.")

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Settings
+from pipelines.settings.base import NotNegative, Settings
 
 FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
 """Above this rate the silence between RTU frames is a fixed time, else 3.5 characters.
@@ -35,15 +35,9 @@ class Line(Settings):
 class NetworkLine(Line):
     """A line to a host."""
 
-    host: str = Field(
-        "127.0.0.1", description="Name or address; an embedded rig is always on this machine."
-    )
-    port: int = Field(
-        502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
-    )
-    silence_s: float = Field(
-        0.0, ge=0.0, description="Quiet time before each request, for a gateway that needs it."
-    )
+    host: str = Field("127.0.0.1", description="Name or address; an embedded rig has its own.")
+    port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses its own.")
+    silence_s: NotNegative = Field(0.0, description="Quiet time that a gateway may need.")
 
     @property
     def place(self) -> str:
@@ -93,15 +87,9 @@ class TlsLine(NetworkLine):
     """Modbus TCP Security: encrypted frames between peers with certificates."""
 
     transport: Literal["tls"]
-    port: int = Field(
-        802, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one."
-    )
-    ca: Path | None = Field(
-        None, description="Certificates that the device's is checked with; else the system's."
-    )
-    certificate: Path | None = Field(
-        None, description="exoid's certificate, for devices that ask for one."
-    )
+    port: int = Field(802, ge=1, le=65535, description="TCP port; an embedded rig chooses its own.")
+    ca: Path | None = Field(None, description="Checks the device's certificate; else the system.")
+    certificate: Path | None = Field(None, description="exoid's, for devices that ask for one.")
     key: Path | None = Field(None, description="Its private key, without a passphrase.")
     rig_certificate: Path | None = Field(None, description="Certificate of a virtual rig.")
     rig_key: Path | None = Field(None, description="Private key of the virtual rig.")
@@ -141,17 +129,12 @@ class RtuLine(Line):
 
     has_transaction_ids = False
     transport: Literal["rtu"]
-    serial_port: str = Field(
-        min_length=1, description="Path of the port, best one below /dev/serial/by-id."
-    )
+    serial_port: str = Field(min_length=1, description="Its path, best below /dev/serial/by-id.")
     baud_rate: int = Field(19200, ge=300, description="Bits a second.")
     parity: Literal["even", "odd", "none"] = Field("even", description="Parity bit.")
-    stop_bits: Literal[1, 2] = Field(
-        1, description="Stop bits; 2 where there is no parity, as the standard has it."
-    )
-    silence_s: float | None = Field(
+    stop_bits: Literal[1, 2] = Field(1, description="Stop bits; 2 is the standard without parity.")
+    silence_s: NotNegative | None = Field(
         None,
-        ge=0.0,
         description="Quiet time before each frame; else the standard's, 3.5 characters or 1.75 ms.",
     )
 

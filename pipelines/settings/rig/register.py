@@ -66,16 +66,10 @@ DIMENSION = {
 class Register(Settings):
     """Where a value lies and how its bits are read: value = raw x scale + offset, in ``unit``."""
 
-    address: int = Field(
-        ge=0, le=65535, description="Address of its first register, counted from 0."
-    )
+    address: int = Field(ge=0, le=65535, description="Of its first register, counted from 0.")
     type: RegisterType = Field(description="How the bits are to be read.")
-    word_order: Literal["big", "little"] = Field(
-        "big", description="Which half of a long value comes first."
-    )
-    byte_order: Literal["big", "little"] = Field(
-        "big", description="Which half of each register comes first."
-    )
+    word_order: Literal["big", "little"] = Field("big", description="Order of its registers.")
+    byte_order: Literal["big", "little"] = Field("big", description="Order of bytes in each.")
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
     offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")

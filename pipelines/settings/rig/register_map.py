@@ -24,16 +24,11 @@ class DriveRead(Settings):
     sequence: Register = Field(description="Sample counter.")
     time: Register = Field(description="The device's clock at the sample.")
     angle: Register = Field(description="Joint angle.")
-    current: Register = Field(
-        description="Motor current, positive where it pushes the angle upward."
-    )
+    current: Register = Field(description="Motor current, positive if it increases the angle.")
     velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
     temperature: Register | None = Field(None, description="Drive or motor temperature.")
     status: Register | None = Field(None, description="Status word.")
-    reference: Register | None = Field(
-        None,
-        description="Set-point that was in force; else recordings hold the one that exoid sent.",
-    )
+    reference: Register | None = Field(None, description="Set-point in force; else the sent one.")
 
 
 class DriveWrite(Settings):
@@ -41,9 +36,7 @@ class DriveWrite(Settings):
 
     reference: Register = Field(description="Set-point angle, to be reached within one sample.")
     control: Register = Field(description="Control word.")
-    heartbeat: Register | None = Field(
-        None, description="Counts up with every write: the host lives."
-    )
+    heartbeat: Register | None = Field(None, description="Counts up with every write.")
 
 
 class SensorRead(Settings):
@@ -61,9 +54,7 @@ class SensorRead(Settings):
 class DriveMap(Settings):
     """Register map of a make of drives."""
 
-    identity: tuple[Identity, ...] = Field(
-        (), description="Registers that identify the right device."
-    )
+    identity: tuple[Identity, ...] = Field((), description="Registers that identify the make.")
     read: DriveRead = Field(description="Block that is read.")
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     own_scale: bool = Field(
@@ -75,26 +66,16 @@ class DriveMap(Settings):
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
-    halt: int | None = Field(
-        None, description="Control word that holds the leg where a stop has led it; else enable."
-    )
-    fault_reset: int | None = Field(
-        None, description="Control word that clears a fault, for --reset-faults."
-    )
-    fault_mask: int = Field(
-        0, ge=0, description="Bits of the status word that mean a fault; 0 for none."
-    )
+    halt: int | None = Field(None, description="Control word that holds the leg; else enable.")
+    fault_reset: int | None = Field(None, description="Control word that clears a fault.")
+    fault_mask: int = Field(0, ge=0, description="Bits of the status that mean a fault.")
     faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
         default_factory=dict,
         description="Meaning of each fault bit, by its number; bit 0 is the lowest.",
     )
-    enabled_mask: int = Field(
-        0, ge=0, description="Bits of the status word that show whether it is enabled; 0: none."
-    )
+    enabled_mask: int = Field(0, ge=0, description="Bits of the status that show it is enabled.")
     enabled_value: int = Field(0, ge=0, description="Value of these bits while it is enabled.")
-    ring: RingSettings | None = Field(
-        None, description="The drive's own record of its latest samples, if it has one."
-    )
+    ring: RingSettings | None = Field(None, description="The drive's own record of samples.")
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -212,9 +193,7 @@ class DriveMap(Settings):
 class SensorMap(Settings):
     """Register map of a make of force sensors."""
 
-    identity: tuple[Identity, ...] = Field(
-        (), description="Registers that identify the right device."
-    )
+    identity: tuple[Identity, ...] = Field((), description="Registers that identify the make.")
     read: SensorRead = Field(description="Block that is read.")
 
     @model_validator(mode="after")

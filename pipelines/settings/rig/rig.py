@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.base import Positive, Settings, load_toml
 from pipelines.settings.rig import consistency
 from pipelines.settings.rig.devices import (
     ControllerSettings,
@@ -32,9 +32,7 @@ class RigSettings(Settings):
     """Everything exoid knows of a rig."""
 
     name: Annotated[str, Field(min_length=1)] = Field(description="Name that recordings carry.")
-    embedded: bool = Field(
-        False, description="Virtual: `exoid acquire` starts it in a process of its own."
-    )
+    embedded: bool = Field(False, description="Whether `exoid acquire` starts the virtual rig.")
     clock: Literal["lockstep", "real_time"] = Field(
         "real_time",
         description="Devices sample on their own clock, or (virtual rigs) once for each exchange.",
@@ -48,13 +46,9 @@ class RigSettings(Settings):
             "Samples are fetched with each set-point, or drained from the drives' own rings."
         ),
     )
-    record_rate_hz: float | None = Field(
-        None, gt=0.0, description="Samples a second in the drives' rings."
-    )
+    record_rate_hz: Positive | None = Field(None, description="Samples a second in the rings.")
     drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
-    sensor: tuple[SensorSettings, ...] = Field(
-        (), description="Cuff force sensors, read with a human only."
-    )
+    sensor: tuple[SensorSettings, ...] = Field((), description="Cuff sensors, read with a human.")
     line: dict[str, LineSettings] = Field(
         default_factory=dict, description="Lines that devices share, by name."
     )

@@ -18,35 +18,19 @@ class RingRecord(Settings):
     sequence: Register = Field(description="Sample counter, which counts as read.sequence does.")
     time: Register = Field(description="The device's clock at the sample.")
     angle: Register = Field(description="Joint angle.")
-    current: Register = Field(
-        description="Motor current, positive where it pushes the angle upward."
-    )
+    current: Register = Field(description="Motor current, positive if it increases the angle.")
     velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
-    reference: Register | None = Field(
-        None, description="Set-point in force; left out, recordings hold none."
-    )
+    reference: Register | None = Field(None, description="Set-point in force.")
 
 
 class RingSettings(Settings):
     """A ring of registers read by FC03, or a queue read by FC24."""
 
-    newest: Register | None = Field(
-        None, description="Of a ring: sequence number of the newest whole record."
-    )
-    address: int | None = Field(
-        None, ge=0, le=65535, description="Of a ring: where the record with number 0 begins."
-    )
-    capacity: int | None = Field(
-        None, ge=2, description="Of a ring: records in it; record n is the (n mod it)-th."
-    )
-    fifo: int | None = Field(
-        None, ge=0, le=65535, description="Of a queue: the address that FC24 asks for."
-    )
-    words: int = Field(
-        ge=1,
-        le=MOST_REGISTERS["read"],
-        description="Registers of 16 bits from one record to the next.",
-    )
+    newest: Register | None = Field(None, description="Of a ring: number of the newest record.")
+    address: int | None = Field(None, ge=0, le=65535, description="Of a ring: place of record 0.")
+    capacity: int | None = Field(None, ge=2, description="Of a ring: number of its records.")
+    fifo: int | None = Field(None, ge=0, le=65535, description="Of a queue: its address for FC24.")
+    words: int = Field(ge=1, le=MOST_REGISTERS["read"], description="Registers of each record.")
     record: RingRecord = Field(description="Registers of a record.")
 
     @model_validator(mode="after")

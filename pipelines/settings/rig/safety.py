@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
+from pipelines.settings.base import NotNegative, Positive, Settings
 from pipelines.settings.rig.with_human import check_tighter, limits_in_force
 
 LONGEST_RAMP_S = 60.0
@@ -14,58 +14,32 @@ LONGEST_RAMP_S = 60.0
 class HumanSafetySettings(Settings):
     """Limits that stop a run with a wearer; others are as without."""
 
-    cuff_force_n: float | None = Field(
-        None, gt=0.0, description="Highest force on any axis of any cuff sensor."
-    )
-    following_error_rad: float | None = Field(
-        None, gt=0.0, description="Farthest an angle may be from its set-point."
+    cuff_force_n: Positive | None = Field(None, description="Highest force on a cuff's axis.")
+    following_error_rad: Positive | None = Field(
+        None, description="Farthest an angle may be from its set-point."
     )
 
 
 class SafetySettings(Settings):
     """Conditions that stop a run, and how it is stopped."""
 
-    angle_margin_rad: float = Field(
-        0.02, ge=0.0, description="Set-points keep this far from each angle limit."
+    angle_margin_rad: NotNegative = Field(0.02, description="Set-points' least distance to limits.")
+    cuff_force_n: Positive = Field(400.0, description="Highest force on a cuff's axis.")
+    following_error_rad: Positive = Field(
+        0.15, description="Farthest an angle may be from its set-point."
     )
-    cuff_force_n: float = Field(
-        400.0, gt=0.0, description="Highest force on any axis of any cuff sensor."
-    )
-    following_error_rad: float = Field(
-        0.15, gt=0.0, description="Farthest an angle may be from its set-point."
-    )
-    watchdog_s: float = Field(
-        0.1, gt=0.0, description="Longest a cycle or a device's next sample may take."
-    )
-    reply_s: float | None = Field(
-        None,
-        gt=0.0,
-        description=(
-            "Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
-        ),
-    )
-    heartbeat_s: float | None = Field(
-        None,
-        gt=0.0,
-        description=(
-            "Time-out of the drives' own watchdogs, as it is set in them; else it is not known."
-        ),
-    )
-    connect_s: float = Field(
-        5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply."
-    )
-    control_s: float = Field(
-        1.0, gt=0.0, description="Longest a drive may take to carry out a control word."
-    )
+    watchdog_s: Positive = Field(0.1, description="Longest wait for a device's next sample.")
+    reply_s: Positive | None = Field(None, description="Wait in motion; else 0.3 of watchdog_s.")
+    heartbeat_s: Positive | None = Field(None, description="Time-out that is set in the drives.")
+    connect_s: Positive = Field(5.0, description="Longest wait for a line or reply before motion.")
+    control_s: Positive = Field(1.0, description="Longest time a control word may take.")
     deceleration_rad_s2: float = Field(
         8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down."
     )
     ramp_s: float = Field(
         3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back."
     )
-    settle_s: float = Field(
-        1.0, ge=0.0, description="Motion before the recording begins, for transients to fade."
-    )
+    settle_s: NotNegative = Field(1.0, description="Motion before the recording begins.")
     with_human: HumanSafetySettings = Field(
         HumanSafetySettings(), description="Tighter limits of runs with_human."
     )

@@ -144,13 +144,6 @@ def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other
         assert numbers == written.untouched(begin, end), at
 
 
-def test_no_batch_is_read_by_a_head_that_it_was_not_written_after(written, tmp_path):
-    lost = written.bytes.replace(b"exoid-head:", b"other-head:")
-    assert written.recovered(lost, tmp_path / "made.parquet") == set(range(SAMPLES))
-    for at in range(0, written.bytes.index(b"exoid-head:") - 1000, 13):
-        assert written.recovered(flipped(lost, at, at % 8), tmp_path / "made.parquet") == set()
-
-
 def test_a_journal_of_which_nothing_can_be_read_is_not_reported_as_of_no_use(written):
     begin, end = written.places[0][0], written.places[-1][1]
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
@@ -190,33 +183,13 @@ def test_a_run_whose_journal_the_disk_damaged_reports_the_number_and_place_of_it
     assert written.path.exists()
 
 
-@pytest.fixture
-def unchecked(tmp_path):
-    """A journal as an older exoid wrote it, without checksums."""
-    other = Written(tmp_path, ended=True)
-    other.bytes = other.bytes.replace(b"exoid-batch:", b"other-batch:")
-    other.path.write_bytes(other.bytes)
-    return other
-
-
-def test_a_journal_without_checksums_is_read_and_reported_as_unchecked(unchecked, exoid, tmp_path):
-    outcome = exoid("recover", unchecked.path, "-o", tmp_path / "made.parquet")
-    assert outcome.code == 0
-    assert (
-        "; its numbers were not checked, an older exoid wrote it without checksums; " in outcome.out
-    )
-    table = RECORDING.read(tmp_path / "made.parquet")
-    assert table.metadata["unchecked"] is True
-    assert np.array_equal(table.frame[COLUMNS].to_numpy(), [row(k) for k in range(SAMPLES)])
-    assert not unchecked.path.exists()
-
-
-def test_no_flipped_bit_in_a_batchs_header_asks_for_more_memory_than_there_is(unchecked):
-    begin, end = unchecked.places[3]
-    header = 8 + int.from_bytes(unchecked.bytes[begin + 4 : begin + 8], "little")
+def test_no_flipped_bit_in_a_batchs_header_asks_for_more_memory_than_there_is(tmp_path):
+    whole = Written(tmp_path, ended=True)
+    begin, end = whole.places[3]
+    header = 8 + int.from_bytes(whole.bytes[begin + 4 : begin + 8], "little")
     assert header < end - begin
     for at in range(begin, begin + header):
         for bit in range(8):
-            unchecked.path.write_bytes(flipped(unchecked.bytes, at, bit))
-            rows = sum(batch.rows.num_rows for batch in JournalFile(unchecked.path).batches())
+            whole.path.write_bytes(flipped(whole.bytes, at, bit))
+            rows = sum(batch.rows.num_rows for batch in JournalFile(whole.path).batches())
             assert rows >= 3 * BATCH  # all that comes before
