@@ -1,2 +1,1 @@
-"""Acquisition: move the leg along an excitation on whatever a rig file describes, and keep every
-sample."""
+"""Acquisition: move the leg along an excitation on the rig of a file, and keep every sample."""

@@ -1,5 +1,4 @@
-"""The control loop: set-points out, samples in, and every drive disabled at its end whatever
-happens."""
+"""The control loop: set-points out, samples in, and every drive disabled at its end."""
 
 import asyncio
 import time
@@ -49,8 +48,7 @@ class Loop:
         """The last sample."""
 
     async def run(self) -> None:
-        """Follow the plan to its end, then disable the drives; the supervisor knows why it ended
-        early."""
+        """Follow the plan to its end, then disable the drives; the supervisor has the reason."""
         try:
             self._supervisor.enabling.check_at_rest(await self._machine.look())
             await self._held(self._follow(await self._enable()))

@@ -5,13 +5,11 @@ import time
 from collections.abc import Awaitable, Callable
 
 LEAN = 0.005
-"""Share of a sample period by which a look at the counter comes earlier than one period after the
-last."""
+"""Share of a sample period by which each look at the counter comes earlier than the last."""
 STEP_BACK = 0.1
 """Share of a sample period to wait after a look that came too early."""
 SLOW = 0.3
-"""Share of a sample period after which an answer is too old to build on, where nobody knows when
-the next sample is latched."""
+"""Share of a sample period after which an answer is too old where the next sample is unknown."""
 
 
 class Lockstep:
@@ -49,8 +47,7 @@ class PhaseLock:
         self._due = time.perf_counter()
         self._count: int | None = None
         self._early: tuple[float, int] | None = None
-        """When a look came too early, and which sample it found: the one after it was latched later
-        than that."""
+        """When a look came too early, and the sample it returned: the next was latched later."""
 
     async def wait(self, last: int) -> int:
         """Wait for a sample after ``last`` that was not awaited yet; return its number.

@@ -91,8 +91,7 @@ def check_trajectory(
     if duration_s > trajectory.duration_s + 1e-9:
         raise InputError(
             f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's"
-            f" duration_s is {duration_s:g}; shorten the run, or give the trajectory's omega_rad_s"
-            " if it repeats"
+            f" duration_s is {duration_s:g}; shorten the run, or give omega_rad_s"
         )
     nowhere = np.empty((0, len(rig.drive)))
     samples = round(duration_s * sample_rate_hz)
@@ -163,8 +162,7 @@ def _ramp(
     slowest = rig.drive[int(np.argmax(speed / limits))]
     raise InputError(
         f"no ramp of at most {LONGEST_RAMP_S:g} s leads the {slowest.joint} between rest and the"
-        f" trajectory below its {slowest.speed_rad_s:g} rad/s; start with the leg nearer to the"
-        " motion"
+        f" trajectory below its {slowest.speed_rad_s:g} rad/s; start nearer to the motion"
     )
 
 

@@ -1,5 +1,4 @@
-"""Set-points that are computed when they come due: an hour of them takes no more memory than a
-minute."""
+"""Set-points that are computed when they come due, so that a long run takes no more memory."""
 
 from collections.abc import Callable, Iterator
 
@@ -7,21 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 BLOCK = 256
-"""Set-points that are computed at once while the leg moves; so few that no sample waits for
-them."""
+"""Set-points that are computed at once while the leg moves; few, as no sample may wait."""
 PIECE = 65536
 """Set-points that are looked at at once before."""
 
 
 class SetPoints:
-    """Set-points (n, J) rad, one a sample: the way in, the run, the way out. Indexed like an
-    array's rows."""
+    """Set-points (n, J) rad of way in, run and way out, indexed like an array's rows."""
 
     def __init__(
         self, lead_in: NDArray, run: Callable[[int, int], NDArray], samples: int, lead_out: NDArray
     ) -> None:
-        """Join ways in and out, (n, J) rad, with a run of so many samples; ``run`` computes it from
-        one to another."""
+        """Join ways in and out, (n, J) rad, with a run, which ``run`` computes in parts."""
         self.first, self.stop = len(lead_in), len(lead_in) + samples
         self._lead_in, self._run, self._lead_out = lead_in, run, lead_out
         self._begin, self._block = 0, lead_in[:0]

@@ -54,10 +54,7 @@ TRANSITIONS: Mapping[State, Mapping[State, Guard]] = {
     State.ABORT: {State.DISABLED: lambda now: now.all_disabled},
     State.DISABLED: {},
 }
-"""Where each state may lead, and the guard of each transition.
-
-Abort and disabled lead to no set-point of the plan any more.
-"""
+"""Where each state may lead, and the guard of each transition."""
 
 
 def check_guard(state: State, following: State, conditions: Conditions) -> None:

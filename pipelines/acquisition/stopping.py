@@ -64,10 +64,7 @@ class Stopping:
             self._supervisor.abort(error)
 
     async def _stop(self, joint: int) -> str | None:
-        """Slow one drive down and disable it, whatever happens to the others.
-
-        Return why it could not be disabled.
-        """
+        """Slow one drive down and disable it; return why it could not be disabled."""
         began_at = time.monotonic()
         try:
             await self._end_holding(joint)

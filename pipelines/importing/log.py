@@ -119,8 +119,8 @@ class Log:
             picked[name] = values if len(values) == 1 else values[run.rows]
         if all(len(self.columns[name]) == 1 for name in names):
             raise InputError(
-                f"{channel.where}: {', '.join(names)} have one row each, expected a column with a"
-                " row for each stamp"
+                f"{channel.where}: {', '.join(names)} have one row each, expected one for each"
+                " stamp"
             )
         return quantity(channel.reading, channel.gain, picked, channel.target, findings)
 
@@ -131,8 +131,8 @@ class Log:
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(
-                f"{channel.where} and its clock {reading.time!r} differ in length; name the clock"
-                " by which it was sampled"
+                f"{channel.where} and its clock {reading.time!r} differ in length; name its own"
+                " clock"
             )
         values = quantity(reading, channel.gain, columns, channel.target, findings)
         known = np.isfinite(values)
@@ -143,8 +143,7 @@ class Log:
         )
         if len(own) != 1:
             raise InputError(
-                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the"
-                " file"
+                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one"
             )
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s

@@ -216,8 +216,7 @@ def _whole_rows(
             texts = [str(finding) for finding in findings if finding.action == TAKEN_FOR_MISSING]
             seen = f" ({'; '.join(texts)})" if texts else ""
             raise InputError(
-                f"{name} has no value in any row{seen}; correct its column, range or time in"
-                " the map"
+                f"{name} has no value in any row{seen}; correct its column, range or time"
             )
     whole = np.all([known[name] for name in required], axis=0)
     if np.count_nonzero(whole) < FEWEST:
@@ -270,10 +269,7 @@ def _period_findings(
     if period_s is None:
         return []
     seen = f"the motion repeats every {period_s:.6g} s, but the map has no period_s"
-    action = (
-        f"set period_s = {period_s:.6g} in [[recording]], so that exoid diagnose can measure the"
-        " noise"
-    )
+    action = f"set period_s = {period_s:.6g} in [[recording]] for exoid diagnose"
     return [Finding("time", seen, action)]
 
 
@@ -287,8 +283,7 @@ def _check_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
                 f"joint[{i}].angle: reaches {np.min(angle):.4g} to {np.max(angle):.4g} rad,"
                 f" expected at most {LARGEST_ANGLE_RAD:.3g} rad either way"
                 f" ({counted(len(beyond), 'row')} of {len(angle)} beyond, the first {first})."
-                " Exclude outliers with range, or correct its unit, zero, counts_per_turn or"
-                " wraps_at in the map"
+                " Exclude outliers with range, or correct unit, zero, counts_per_turn or wraps_at"
             )
 
 

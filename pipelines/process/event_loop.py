@@ -11,10 +11,7 @@ MOST_FILES = 512
 
 
 def exact_event_loop() -> asyncio.AbstractEventLoop:
-    """Return an event loop with exact sleeps; the default one waits for whole milliseconds.
-
-    On Windows, and in a process with very many open files, it is the default one.
-    """
+    """Return an event loop with exact sleeps, where the system and its open files allow."""
     descriptor = os.open(os.devnull, os.O_RDONLY)  # the lowest free one
     os.close(descriptor)
     if sys.platform != "win32" and descriptor <= MOST_FILES:

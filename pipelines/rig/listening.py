@@ -85,10 +85,7 @@ async def _serving(
         server.decoder.register(request)
     try:
         if not await guarded(server).listen():
-            raise DeviceError(
-                f"{place}: cannot listen there; choose a free port with --port, another address"
-                " with --bind"
-            )
+            raise DeviceError(f"{place}: cannot listen there; choose another --port or --bind")
         yield
     finally:
         for connection in server.active_connections.values():
@@ -128,10 +125,7 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
 def _tls_context(line: TlsLine) -> ssl.SSLContext:
     """Return a TLS context with the rig's certificate; clients need one if the rig file has it."""
     if line.rig_certificate is None or line.rig_key is None:
-        raise SettingsError(
-            "a virtual rig on a TLS line shows a certificate too; give the line rig_certificate and"
-            " rig_key"
-        )
+        raise SettingsError("a virtual rig on a TLS line needs rig_certificate and rig_key")
     context, file = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), line.rig_certificate
     try:
         context.load_cert_chain(line.rig_certificate, line.rig_key, refuse_passphrase(line.rig_key))

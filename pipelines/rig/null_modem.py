@@ -9,10 +9,7 @@ from contextlib import contextmanager, suppress
 
 @contextmanager
 def null_modem() -> Iterator[tuple[str, str]]:
-    """Connect two serial ports for the duration of the block, in a running event loop.
-
-    Yield their paths.
-    """
+    """Connect two serial ports for the duration of the block; yield their paths."""
     loop = asyncio.get_running_loop()
     pairs = [os.openpty(), os.openpty()]
     for (near, _), (far, _) in (pairs, pairs[::-1]):

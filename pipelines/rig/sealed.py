@@ -36,8 +36,7 @@ class SealedFile(Settings):
     def _check_count(self) -> Self:
         if self.hidden > len(self.possibility):
             raise ValueError(
-                f"hidden: found {self.hidden}, expected at most the {len(self.possibility)}"
-                " possibilities"
+                f"hidden: found {self.hidden}, expected at most {len(self.possibility)}"
             )
         return self
 

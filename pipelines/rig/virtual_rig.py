@@ -34,8 +34,7 @@ def build_plant(
     """
     if rig.plant is None:
         raise SettingsError(
-            f"{path}: plant: missing, so there is no machine to simulate; add a [plant], see"
-            " docs/rig.md"
+            f"{path}: plant: missing, so there is no machine to simulate; add a [plant]"
         )
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
     cycle_hz = sample_rate_hz or rig.plant.sample_rate_hz

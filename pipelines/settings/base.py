@@ -18,10 +18,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Settings(BaseModel):
-    """One table of a settings file.
-
-    Every field has a description; its name ends with its unit.
-    """
+    """One table of a settings file; every field has a description, and its unit in its name."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 

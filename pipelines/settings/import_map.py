@@ -334,8 +334,8 @@ class ImportMap(Settings):
                 owner = owners.setdefault(reading.column, place)
                 if owner != place:
                     raise ValueError(
-                        f"{place}.column: found {reading.column!r}, which is also {owner};"
-                        " correct one of them"
+                        f"{place}.column: found {reading.column!r}, which is also {owner}; correct"
+                        " one"
                     )
         return self
 

@@ -1,8 +1,4 @@
-"""The page docs/import-map.md, written from the map's settings themselves.
-
-``python -m pipelines.settings.map_reference > docs/import-map.md`` updates it; a test compares
-them.
-"""
+"""The page docs/import-map.md from the map's settings themselves; `make docs` writes it."""
 
 from pydantic import BaseModel
 

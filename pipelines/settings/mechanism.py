@@ -77,8 +77,7 @@ class MechanismSettings(Settings):
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
                 f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg"
-                f" with hip and knee for {command}. Import recordings of other machines with `exoid"
-                " import`"
+                f" with hip and knee for {command}. Use `exoid import` for others"
             )
 
     @property

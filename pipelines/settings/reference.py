@@ -1,7 +1,4 @@
-"""The page docs/settings.md, written from the settings themselves.
-
-``python -m pipelines.settings.reference > docs/settings.md`` updates it; a test compares them.
-"""
+"""The page docs/settings.md from the settings themselves; `make docs` writes it."""
 
 import json
 from collections.abc import Iterator

@@ -27,8 +27,7 @@ def create(folder: Path, exoid: str) -> None:
     for name in ("exoid.toml", "rigs", "Makefile"):
         if (folder / name).exists():
             raise SettingsError(
-                f"{folder / name}: exists already, not overwritten; choose a new folder or move it"
-                " away"
+                f"{folder / name}: exists already, not overwritten; choose a new folder"
             )
     shutil.copytree(source / "rigs", folder / "rigs")
     experiment = (source / "experiments" / "default.toml").read_text(encoding="utf-8")

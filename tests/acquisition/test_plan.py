@@ -60,7 +60,7 @@ def test_a_motion_that_runs_once_is_not_asked_to_repeat(rig_file):
     assert (
         str(caught.value)
         == "the trajectory lasts 1.99 s and does not repeat, but the run's duration_s is 3; shorten"
-        " the run, or give the trajectory's omega_rad_s if it repeats"
+        " the run, or give omega_rad_s"
     )
 
 

@@ -206,8 +206,8 @@ def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_a_person_in_it(
     assert (outcome.code, outcome.out) == (2, "")
     assert (
         outcome.err
-        == f"exoid: {option} needs an empty machine, but --run with_human means that a person is in"
-        " it; drop one\n"
+        == f"exoid: {option} needs an empty machine, but --run with_human means a person; drop"
+        " one\n"
     )
 
 

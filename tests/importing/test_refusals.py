@@ -85,7 +85,7 @@ BAD_MAPS = [
         'unit = "rad"',
         'unit = "rad", zero = 1e6',
         "reaches -1e+06 to -1e+06 rad",
-        "correct its unit, zero",
+        "correct unit, zero",
     ),
     (
         'unit = "rad"',

@@ -53,4 +53,4 @@ def test_more_cannot_be_hidden_than_there_is(with_seed):
     path = with_seed(1, hidden=9)
     with pytest.raises(SettingsError) as caught:
         hidden_effects(path)
-    assert str(caught.value) == f"{path}: hidden: found 9, expected at most the 4 possibilities"
+    assert str(caught.value) == f"{path}: hidden: found 9, expected at most 4"

@@ -223,6 +223,5 @@ def test_init_overwrites_nothing(make):
         create(make.folder, exoid="exoid")
     assert (
         str(caught.value)
-        == f"{make.folder / 'exoid.toml'}: exists already, not overwritten; choose a new folder or"
-        " move it away"
+        == f"{make.folder / 'exoid.toml'}: exists already, not overwritten; choose a new folder"
     )

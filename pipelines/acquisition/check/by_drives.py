@@ -64,8 +64,7 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
         if abs(angle) > NEAR_ZERO_RAD:
             raise SettingsError(
                 f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g}"
-                " rad: a drive of wrong sign leaps by twice its angle; let the leg hang straight,"
-                " or add --by-hand"
+                " rad, as a drive of wrong sign leaps; let the leg hang straight, or add --by-hand"
             )
 
 
@@ -164,10 +163,7 @@ def _motion(start: Sequence[float]) -> dict[str, Any]:
 
 
 def _sent(t: NDArray, start: Sequence[float]) -> NDArray:
-    """Return the set-points (n, J) rad at instants (n,) s since the recording began.
-
-    Those of the recording may be the drive's own, whose scale may be wrong.
-    """
+    """Return the sent set-points (n, J) rad at times (n,) s; those of a file may be scaled."""
     phase = 2 * np.pi / PERIOD_S * t
     return np.array(start) + AMPLITUDE_RAD * np.column_stack([np.sin(phase), np.sin(2 * phase)])
 
@@ -212,14 +208,13 @@ def _check_answer(rig: RigSettings, j: int, gains: NDArray, torque: float) -> It
     elif abs(gain) < GAIN:
         yield Finding(
             name,
-            f"its angle does not follow its set-point (it goes {gain:.2f} as far); is it enabled?",
+            f"its angle does not follow its set-point (gain {gain:.2f}); is it enabled?",
         )
     elif gain < 0:
         yield Finding(
             name,
-            f"its angle goes against its set-point ({gain:.2f} as far): the sign of"
-            f" {where}.read.angle.scale or of {where}.write.reference.scale is wrong; --by-hand"
-            " shows which",
+            f"its angle goes against its set-point ({gain:.2f} as far): correct the sign of"
+            f" {where}.read.angle.scale or {where}.write.reference.scale (--by-hand)",
             "angle",
         )
     elif abs(gain - 1.0) > GAIN:

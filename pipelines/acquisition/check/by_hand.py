@@ -35,10 +35,7 @@ HARDLY_RAD = 1e-4
 """Movement below which an angle counts as constant."""
 MOTIONS = {
     "hip": (
-        (
-            "keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it"
-            " come back"
-        ),
+        ("keep the knee straight, swing the leg forward by 10 to 40 degrees and back"),
         1.0,
     ),
     "knee": (
@@ -84,8 +81,7 @@ async def by_hand(
         front = probe.place.endswith("front")
         inside = "forward" if front else "backward"
         await operator.ready(
-            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg does, and"
-            " let go."
+            f"{probe.place}: press on the inside of this cuff, {inside}, and let go."
         )
         least = PUSH_SHARE * rig.safety.cuff_force_n
         pressed = await _watch(
@@ -173,9 +169,8 @@ def _check_motion(
         if plausible:
             remedy = f'with unit = "{plausible[0]}" it would be plausible: correct'
         yield asked.finding(
-            f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected"
-            f" {SWING_RAD[0]:g} to {SWING_RAD[1]:g} rad of 10 to 40 degrees; {remedy}"
-            f" {where}.angle",
+            f"its angle changed by {peak:+.3g} rad in that motion, expected {SWING_RAD[0]:g} to"
+            f" {SWING_RAD[1]:g} rad of 10 to 40 degrees; {remedy} {where}.angle",
             "angle",
         )
     yield from check_velocity(asked, moved[asked], rate_hz)
@@ -202,8 +197,7 @@ def _check_push(
     if abs(peak) < least:
         yield asked.finding(
             f"no force of any cuff changed by more than {abs(peak):.3g} N when {asked.place} was to"
-            f" be pressed, expected {least:g} N and more; was it? Else compare scale and unit in"
-            f" {where} with the manual",
+            f" be pressed, expected {least:g} N; was it? Else compare scale and unit in {where}",
         )
     elif largest is not asked:
         yield asked.finding(

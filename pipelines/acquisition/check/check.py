@@ -61,8 +61,7 @@ def check_rig(
         rate_hz = rig.plant.sample_rate_hz
     if move and rate_hz is None and rig.sampling == "recorder":
         raise SettingsError(
-            "--rate-hz: missing; give the rate of set-points, which cannot be measured on drives"
-            " that record by themselves"
+            "--rate-hz: missing; give the rate of set-points, as drives that record do not show it"
         )
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")
@@ -89,8 +88,7 @@ def refuse_to_move_a_person(*, by_hand: bool, move: bool) -> None:
     for option, given in (("--by-hand", by_hand), ("--move", move)):
         if given:
             raise InputError(
-                f"{option} needs an empty machine, but --run with_human means that a person is in"
-                " it; drop one"
+                f"{option} needs an empty machine, but --run with_human means a person; drop one"
             )
 
 

@@ -112,8 +112,5 @@ def remedy(
         f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:MOST_NAMED]
     )
     if all(one.bytes_swapped for one, _ in best[:MOST_NAMED]):
-        return (
-            f"{named}: Modbus sends the high byte first; set the device to that, then compare"
-            f" {where}"
-        )
+        return f"{named}: Modbus sends the high byte first; set the device so, or compare {where}"
     return f"{named}: correct {where}"

@@ -42,9 +42,8 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     if np.ptp(q) < MOVED_RAD:
         if np.ptp(travel) > STANDING_RAD + np.ptp(q):
             yield probe.finding(
-                f"velocity says that the joint went {np.ptp(travel):.3g} rad in {t[-1] - t[0]:.2g}"
-                f" s, but its angle changed by {np.ptp(q):.2g} rad; compare {where}.velocity with"
-                " the device's manual",
+                f"velocity integrates to {np.ptp(travel):.3g} rad, but the angle changed by"
+                f" {np.ptp(q):.2g} rad; compare {where}.velocity with the manual",
             )
         return
     ratio = float(integral @ angle / (angle @ angle))

@@ -44,9 +44,8 @@ def check_zeros(
         elif is_empty and abs(mean) > ZERO_SHARE * limit_n:
             most = ZERO_SHARE * limit_n
             yield probe.finding(
-                f"{axis} is {mean:.4g} N with nobody in the machine, expected within ±{most:g} N"
-                f" ({ZERO_SHARE:.0%} of safety.cuff_force_n); tare the sensor, or correct"
-                f" {where}.{axis}.offset",
+                f"{axis} is {mean:.4g} N with nobody in the machine, expected within ±{most:g} N;"
+                f" tare the sensor, or correct {where}.{axis}.offset",
             )
     if len(forces) >= ENOUGH and not np.ptp(forces, axis=0).any():
         listed = ", ".join(f"{force:.4g}" for force in forces[0])

@@ -22,10 +22,7 @@ USUAL = 200e-6
 
 
 class Bounds:
-    """Bounds of a drive's sampling instants: sample n at ``origin`` + n periods, host's clock.
-
-    They are collected over a time that is too short for a drift.
-    """
+    """Bounds, over a short time, of sampling instants: sample n at ``origin`` + n periods."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s

@@ -91,9 +91,8 @@ async def reset_fault(drive: Drive) -> None:
         return
     if drive.map.fault_reset is None:
         raise SettingsError(
-            f"map.drive.{drive.settings.map}.fault_reset: missing, but {drive.device.label}"
-            " reports a fault that is to be reset; give its control word, see the drive's"
-            " manual"
+            f"map.drive.{drive.settings.map}.fault_reset: missing, but {drive.device.label} reports"
+            " a fault; give the control word that resets it"
         )
     try:
         await drive.write_idle(drive.map.fault_reset, values["angle"])

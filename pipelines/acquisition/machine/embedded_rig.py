@@ -69,10 +69,7 @@ def _end(process: subprocess.Popen) -> None:
 
 
 def _place(process: subprocess.Popen, path: Path, errors: IO[bytes]) -> tuple[str | None, str]:
-    """Wait for the rig's address of a line; return name and address.
-
-    The name is None for devices that are on no line of the rig file.
-    """
+    """Wait for a line's address; return its name, None for devices on no line, and address."""
     assert process.stdout  # a pipe
     line = process.stdout.readline().decode().strip()
     if line:
@@ -84,7 +81,6 @@ def _place(process: subprocess.Popen, path: Path, errors: IO[bytes]) -> tuple[st
     if not words:
         raise DeviceError(
             f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}`"
-            " to see why"
         )
     # A settings error of the rig's process is one of this command too.
     kind = SettingsError if process.returncode == SettingsError.exit_code else DeviceError

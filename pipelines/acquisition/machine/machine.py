@@ -78,9 +78,8 @@ class Machine:
         ]
         if labels:
             raise DeviceError(
-                f"{' and '.join(labels)}: driven by another program, since angle or set-point"
-                " change while exoid sends nothing; end that program, or hold the leg still;"
-                " nothing was sent"
+                f"{' and '.join(labels)}: driven by another program, as angle or set-point change;"
+                " end that program, or hold the leg still; nothing was sent"
             )
 
     async def reset_faults(self) -> None:
@@ -219,10 +218,7 @@ class Machine:
         return forces
 
     async def _latch(self, readings: list[Reading]) -> bool:
-        """Read drives again until all have latched the newest sample; replace their ``readings``.
-
-        Return False where one of them does not answer.
-        """
+        """Read drives again until all have latched the newest sample; return False if not."""
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
             counts = [

@@ -9,8 +9,7 @@ from pipelines.acquisition.machine.reading import Reading
 from pipelines.signals.interpolation import cubic_weights
 
 Position = Callable[[int], float | None]
-"""From a sample of the first drive to the fractional sample of another drive at that instant; None
-while that is unknown."""
+"""From a sample of the first drive to another's fractional sample then; None while unknown."""
 
 INTERPOLATED = tuple(f.name for f in fields(Reading) if f.type in (float, "float"))
 MOST_WAITING = 100_000

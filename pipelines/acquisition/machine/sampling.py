@@ -18,12 +18,10 @@ from pipelines.acquisition.machine.row import Row
 from pipelines.errors import DeviceError, Unanswered
 
 RecordCheck = Callable[[Row, Sequence[Sequence[Reading]], float], list[list[Reading]]]
-"""Given a cycle's row, each drive's samples and the host's clock (s), returns the new samples;
-raises DeviceError where one of them must stop the run."""
+"""From a row, each drive's samples and the host's time (s) to new samples; raises DeviceError."""
 
 SECOND_LOOK = (0.3, 0.65)
-"""Earliest and latest second reading of a drive with its own clock, as shares of a sample after the
-exchange: with both readings none of its samples is missed."""
+"""Earliest and latest second reading of a drive with its own clock, in samples: none is missed."""
 AIM = 0.1
 """Standard deviation of the second reading's instant about the drive's next sample, in samples."""
 

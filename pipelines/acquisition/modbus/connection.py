@@ -79,8 +79,7 @@ def tls_context(settings: TlsLine) -> ssl.SSLContext:
             )
     except OSError as error:  # SSLError is one
         raise SettingsError(
-            f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM"
-            " files"
+            f"{file}: is no certificate that can be used ({error.strerror or error})"
         ) from error
     return context
 
@@ -96,26 +95,14 @@ def explain(error: OSError) -> str:
         )
         return f"its certificate is not trusted ({error.verify_message.rstrip('.')}); {advice}"
     if isinstance(error, TimeoutError):
-        return (
-            "no TLS connection within safety.connect_s; check that the rig is on, and that the port"
-            " speaks TLS"
-        )
+        return "no TLS connection within safety.connect_s; check that rig and port speak TLS"
     if isinstance(error, ssl.SSLError):
-        return (
-            f"no TLS connection ({error.reason or error}); check that the port speaks TLS, and"
-            " certificate and key"
-        )
+        return f"no TLS connection ({error.reason or error}); check port, certificate and key"
     if error.errno == errno.ENOENT:
         there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-        return (
-            f"no such serial port; there is {there}; plug the adapter in, or correct serial_port in"
-            " the rig file"
-        )
+        return f"no such serial port; there is {there}; plug the adapter in, or correct serial_port"
     if error.errno in (errno.EACCES, errno.EPERM):
-        return (
-            "no permission for the serial port; on Linux join its group (sudo usermod -aG dialout"
-            " $USER), log in again"
-        )
+        return "no permission for the serial port; on Linux run `sudo usermod -aG dialout $USER`"
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         return "the serial port is busy; end the other program that uses it"
     return f"no connection ({error}); check that the rig is on, and the line in the rig file"

@@ -44,10 +44,7 @@ class TimeOut(NamedTuple):
 
 
 class Device:
-    """One device on a line.
-
-    Requests to several devices may be concurrent; those on one line are sent one after the other.
-    """
+    """One device on a line, which takes one request at a time from all its devices."""
 
     def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
         """Join a line; a rig's safety settings give the time-outs."""
@@ -81,8 +78,8 @@ class Device:
             if value != entry.value:
                 raise DeviceError(
                     f"{self.label}: identity register {entry.address} holds 0x{value:04X}, expected"
-                    f" 0x{entry.value:04X}: it is another device; check cabling and unit id, or"
-                    " correct the rig file"
+                    f" 0x{entry.value:04X}: it is another device; check cabling, unit id and rig"
+                    " file"
                 )
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:

@@ -65,16 +65,15 @@ def _locked(path: Path, name: str) -> IO[bytes]:
             file = os.fdopen(_opened(path), "rb+", buffering=0)
         except OSError as error:
             raise DeviceError(
-                f"{path}: cannot be opened ({error.strerror}), so another exoid may be using"
-                f" {name}; repair this file, or set TMPDIR to a folder that all users can write;"
-                " nothing was moved"
+                f"{path}: cannot be opened ({error.strerror}), so another exoid may use {name};"
+                " repair this file, or set TMPDIR to a common folder; nothing was moved"
             ) from error
         if not take(file, wait=False):
             with file:
                 pid = file.read(20).decode(errors="replace").strip() or "unknown"
             raise DeviceError(
-                f"{name}: another exoid (process {pid}) uses the devices there; wait for it to end,"
-                " or end it; nothing was moved"
+                f"{name}: another exoid (process {pid}) uses the devices there; wait for its end;"
+                " nothing was moved"
             )
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), os.stat(path)):

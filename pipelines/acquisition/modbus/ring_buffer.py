@@ -20,8 +20,7 @@ FEWEST_READS = 4
 
 Record = Mapping[str, float]
 NoteNewest = Callable[[float, float | None], int]
-"""From a counter register's value, and the host's clock (s) at the request if that was the newest
-sample's, to the sample's number without wraparound."""
+"""From a counter's value, and the time of the request (s) for the newest sample, to its number."""
 
 
 def _most_reads(settings: RingSettings, samples_per_cycle: int) -> int:

@@ -23,9 +23,8 @@ def refuse_short_heartbeat(rig: RigSettings, sample_rate_hz: float, *, with_sens
         if heartbeat_s is not None and heartbeat_s <= longest:
             raise SettingsError(
                 f"{key}: found {heartbeat_s:g}, expected more than {longest:.3g} s, for which one"
-                f" lost reply leaves {rig.label_of(drive)} without a set-point ({waits} x reply_s"
-                f" of {reply_s:.3g} s, and two samples); lower safety.reply_s, or raise the"
-                " time-out in the drive"
+                f" lost reply leaves {rig.label_of(drive)} without a set-point ({waits} x reply_s,"
+                " and two samples); lower safety.reply_s, or raise the time-out in the drive"
             )
 
 

@@ -21,7 +21,6 @@ def refuse_coarse_set_points(rig: RigSettings, sample_rate_hz: float) -> None:
         if count > coarsest:
             raise SettingsError(
                 f"map.drive.{drive.map}.write.reference: one count is {count:.3g} rad, expected at"
-                f" most {coarsest:.3g} rad, a quarter of the {drive.joint}'s longest step"
-                f" ({drive.speed_rad_s:g} rad/s at {sample_rate_hz:g} Hz); correct its scale, or"
-                " lower acquire.sample_rate_hz"
+                f" most {coarsest:.3g} rad, a quarter of the {drive.joint}'s longest step; correct"
+                " its scale, or lower acquire.sample_rate_hz"
             )

@@ -34,9 +34,8 @@ def _contradiction(map_: DriveMap) -> str | None:
     written, read = map_.write.reference, map_.read.angle
     if written.scale * read.scale < 0.0:
         return (
-            f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign"
-            " for both, else the drive leaps when it is enabled; find the wrong one by `exoid rig"
-            " check --by-hand`"
+            f"scale: found {written.scale:g} with {read.scale:g} of read.angle, expected one sign,"
+            " else the drive leaps when it is enabled; run `exoid rig check --by-hand`"
         )
     difference = None if map_.own_scale else _difference(written, read)
     if difference is None:
@@ -44,8 +43,8 @@ def _contradiction(map_: DriveMap) -> str | None:
     key, one, other = difference
     return (
         f"{key}: found {one} with {other} of read.angle, expected the same, else the drive leaps"
-        " when it is enabled; correct one, or set own_scale = true next to `enable` if both are as"
-        " in the drive's manual"
+        " when it is enabled; correct one, or set own_scale = true next to `enable` if both are"
+        " right"
     )
 
 

@@ -108,27 +108,22 @@ class JournalFile:
 
 def _disk_error(path: Path, error: OSError) -> InputError:
     return InputError(
-        f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another"
-        " disk and recover it there"
+        f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another disk"
     )
 
 
 def _why_no_journal(path: Path) -> str:
     # Only a file with a journal's name can be the rest of one.
     if not path.name.endswith(JOURNAL):
-        return (
-            f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run"
-            " left"
-        )
+        return f"is no journal of a run, nothing was changed; name a *{JOURNAL}"
     size = path.stat().st_size
     if size <= NO_SAMPLE:
         return (
             "is no journal of a run, or not even its head was written and so no sample; delete it"
         )
     return (
-        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and so"
-        " are its copies; nothing was changed; keep it, it may hold samples; check the disk, and"
-        " move it away to record here"
+        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and so are"
+        " its copies; nothing was changed; keep it, it may hold samples, and check the disk"
     )
 
 
@@ -192,10 +187,7 @@ def refuse_leftover(path: Path) -> None:
         return
     with locked(path) as lock:
         if not lock.free:
-            raise InputError(
-                f"{path}: another run is recording there now; choose another output or wait for"
-                " its end"
-            )
+            raise InputError(f"{path}: another run is recording there now; choose another output")
     journal = JournalFile(path)
     rows = sum(batch.rows.num_rows for batch in journal.batches())
     raise InputError(

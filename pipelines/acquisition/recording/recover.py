@@ -80,8 +80,5 @@ def recover(path: Path, output: Path | None = None) -> Recovery:
 
 def _why_no_sample(summary: JournalSummary) -> str:
     if summary.damaged:
-        return (
-            "no sample in it can be read, it is damaged; nothing was changed; keep it, and check"
-            " the disk"
-        )
+        return "no sample in it can be read, it is damaged; keep it, and check the disk"
     return "holds no sample, the run ended before its recording began; delete it"

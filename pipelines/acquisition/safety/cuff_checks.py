@@ -1,5 +1,4 @@
-"""Whether the readings of cuff sensors are plausible: forces that a sensor can resolve, and that
-change while the leg moves."""
+"""Whether cuff forces are plausible: measurable, and changing while the leg moves."""
 
 from collections.abc import Sequence
 from math import isnan

@@ -11,8 +11,7 @@ from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings
 
 REST_RAD = 0.02
-"""How far the leg may have moved between the plan and the moment at which the drives are
-enabled."""
+"""How far the leg may move from the plan's start until the drives are enabled, rad."""
 
 
 class Enabling:

@@ -80,8 +80,7 @@ class PlanProgress:
         if cycles_past_end > LONGEST_RETURN_S * self._rate_hz:
             raise DeviceError(
                 f"the motion is {LONGEST_RETURN_S:g} s late and still not finished: too many"
-                " samples are lost; check the line, or whether one drive's sample counter runs"
-                " differently from the other's"
+                " samples are lost; check the line, and the drives' sample counters"
             )
         pairs = zip(trackers, self._at(self._length).tolist(), strict=True)
         at_end = [abs(tracker.sent - angle) <= tracker.resolution for tracker, angle in pairs]

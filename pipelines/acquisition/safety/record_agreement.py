@@ -12,8 +12,7 @@ from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
 MOST_HELD = 1000
-"""Exchanges that wait for the record of their sample; a run that falls further behind is
-stopped."""
+"""Exchanges that wait for their record; a run that falls further behind is stopped."""
 COMPARED = 50
 """Samples of both accounts after which the torques' ratio is looked at."""
 RATIO = 0.25

@@ -8,8 +8,7 @@ from pipelines.settings.rig.devices import DriveSettings
 from pipelines.settings.rig.safety import SafetySettings
 
 WALK = 0.8
-"""Share of its speed limit at which a joint is led back to the plan: at the whole limit, overshoot
-or one encoder count would exceed it."""
+"""Share of the speed limit for the way back to the plan: a drive may overshoot."""
 NO_LAG_RAD = 1e-9
 """Rounding error between a set-point and the plan."""
 

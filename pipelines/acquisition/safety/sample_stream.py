@@ -19,11 +19,9 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import MOST_REGISTERS
 
 SPEED_SHARE = 0.25
-"""How far a drive's speed may differ from its angle's change in one sample, as a share of the speed
-limit."""
+"""How far a drive's speed may be from its angle's change, as a share of the speed limit."""
 ECHO_CYCLES = 8
-"""Within how many cycles at the speed limit a drive's set-point must be of the one that was
-sent."""
+"""How far a drive's set-point may be from the sent one, in cycles at the speed limit."""
 
 
 class SampleStream:

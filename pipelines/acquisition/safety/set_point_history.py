@@ -4,8 +4,7 @@ from collections import deque
 from dataclasses import dataclass
 
 LENGTH = 1024
-"""Set-points that are kept: a drive's records come after the exchanges between which they were
-latched."""
+"""Set-points that are kept, since a drive's records come later than the exchanges."""
 
 
 @dataclass(frozen=True)

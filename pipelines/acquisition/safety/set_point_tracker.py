@@ -18,8 +18,7 @@ from pipelines.acquisition.safety.return_to_plan import (
 from pipelines.settings.rig import RigSettings
 
 SLACK_SAMPLES = 2
-"""How far set-points may be ahead of their speed limit for a moment: they come in step with
-samples, which the host sees up to one sample late or early."""
+"""Samples by which set-points may be ahead of the speed limit, as the host sees samples late."""
 DRIFT = 0.01
 """Share of a cycle by which drives' clocks may part in one: far more than any two do."""
 
@@ -47,16 +46,14 @@ class SetPointTracker:
         self.counter_lead = 0.0
         """Samples by which the drive's counter leads the machine's cycles as set-points come."""
         self._speed = 0.0
-        """rad/s at which set-points move: a stop slows down from there, the way back to the plan
-        begins there."""
+        """Speed of the set-points, rad/s, at which a stop or the way back to the plan begins."""
         self._drift_speed = 0.0
         """rad/s at which the drive may go on by itself, as from its last two set-points."""
         self._answered_at = 0.0
         self._unanswered = 0
         """Set-points since the drive answered last."""
         self._moving_since: float | None = None
-        """In which of the machine's cycles a drive that goes on by itself was at ``base``; None
-        where it holds, or was sent something since."""
+        """Cycle in which a drive that goes on by itself was at ``base``; None for others."""
         self._slack_used = 0.0
         """By how much the set-points are ahead of the speed limit, s."""
 
@@ -211,10 +208,7 @@ class SetPointTracker:
         )
 
     def _move_base_on(self, cycle: int) -> None:
-        """Move the base of a drive that goes on by itself to where it is at a cycle.
-
-        Asked longer ago than a sample, it may have done anything since.
-        """
+        """Move the base of a drive that goes on by itself, if it was asked within a cycle."""
         since = self._moving_since
         if since is not None and abs(cycle - since) <= 1.0:
             self.base += self._speed * (cycle - since) / self._rate

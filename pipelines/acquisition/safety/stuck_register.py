@@ -11,8 +11,7 @@ STUCK_RAD, STUCK_CYCLES = 0.03, 10
 stuck; and how far other readings of the joint must contradict it: a joint may stick to its
 friction."""
 ANSWER_CYCLES = 5
-"""Cycles after which a joint has begun to go where it was sent, whatever its drive takes for
-that."""
+"""Cycles after which a joint has begun to follow its set-points, whatever its drive is."""
 CHANGING = {"angle": "rad", "velocity": "rad/s", "current": "A"}
 """Readings that change while a joint moves, with their units."""
 

@@ -308,10 +308,7 @@ class Supervisor:
             self._go(State.ABORT)
 
     def finish(self, complaints: Sequence[str]) -> None:
-        """End the run; ``complaints`` are of drives that may not have taken it to disable.
-
-        A run ends as disabled only if every drive is known to be; with a complaint, in abort.
-        """
+        """End the run, in abort with ``complaints`` of drives that may not be disabled."""
         self.reason.join(complaints)
         self.still_enabled = bool(complaints)
         end = State.ABORT if complaints else State.DISABLED

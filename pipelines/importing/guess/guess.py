@@ -112,8 +112,7 @@ def _check_columns(path: Path, first: Source) -> None:
         missing = set(first.names) - set(open_source(path, SourceSettings()).names)
         if missing:
             raise InputError(
-                f"has no column {', '.join(sorted(missing))}, which {first} has; guess a separate"
-                " map for it"
+                f"has no column {', '.join(sorted(missing))}, which {first} has; guess its own map"
             )
 
 

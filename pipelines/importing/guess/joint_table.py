@@ -341,10 +341,7 @@ class _JointWriter:
             self.proposal.unknown("torque_constant_nm_a", why)
 
     def _unit_of_torque(self, named: str | None, values: NDArray) -> tuple[str, str, bool]:
-        """Return the unit of a torque or force, why, and whether it is sure.
-
-        A unit in which the drive would be implausibly strong is not sure.
-        """
+        """Return the unit of a torque or force, why, and whether a drive can be that strong."""
         quantity, si = ("force", "N") if self.slides else ("torque", "N·m")
         unit, why = (named, FROM_NAME) if named else (si, "no name has its unit; SI assumed")
         reach = float(np.nanquantile(np.abs(values), 0.99)) * UNITS[unit].factor

@@ -181,10 +181,7 @@ def write_time(proposal: Proposal, guess: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
     if guess.rate_hz is not None:
-        why = (
-            f"several rows have one stamp of {guess.column}; taken for uniform, with {guess.unit}"
-            " as its unit"
-        )
+        why = f"several rows have one stamp of {guess.column}; taken for uniform, in {guess.unit}"
         if guess.pause_s:
             why += f"; but none came for {guess.pause_s:.3g} s, which `rate_hz` ignores"
         proposal.key("rate_hz", float(f"{guess.rate_hz:.6g}"), why, sure=False)

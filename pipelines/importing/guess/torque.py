@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 from pipelines.importing.quantities.consistency import whole_rows
 
 WINDOW_S = 0.1
-"""Length of the parabola whose curvature is the acceleration, s.
-
-It is short against a swing, and long against an encoder's steps.
-"""
+"""Length of the parabola for the acceleration, s: short against a swing, long against a step."""
 
 FEWEST = 50
 """Least number of rows for a fit of five parameters."""

@@ -46,8 +46,7 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
     if (negative & ~impossible).any():
         share = np.count_nonzero(negative & ~impossible) / len(values)
         seen = (
-            f"a signed register of {bits} bits logged without its sign, {share:.0%} of the rows"
-            " below 0"
+            f"a signed register of {bits} bits logged without its sign, {share:.0%} of it below 0"
         )
         findings.append(Finding(where, seen, f"less 2^{bits} there"))
     return np.where(impossible, np.nan, np.where(negative, values - 2.0**bits, values))
@@ -93,8 +92,7 @@ def unwrapped(
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
         action = (
-            f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at in the map names"
-            " another"
+            f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at names another"
         )
         findings.append(Finding(where, seen, action))
     return unwrapped_values

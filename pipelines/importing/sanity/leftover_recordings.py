@@ -56,5 +56,5 @@ def _unknown_mechanism(metadata: Mapping[str, Any]) -> str:
         return ""
     return (
         f"`exoid run` stops after filtering: {in_words(joints)} make no mechanism that exoid can"
-        " fit; leave joints out of the map"
+        " fit; leave some out"
     )

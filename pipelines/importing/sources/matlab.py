@@ -31,8 +31,7 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
         content = scipy.io.loadmat(path, simplify_cells=True)
     except Exception as error:  # scipy raises errors of any class for a damaged file
         raise InputError(
-            f"is a damaged .mat file ({type(error).__name__}: {error}); save it again, with -v7 or"
-            " -v7.3"
+            f"is a damaged .mat file ({type(error).__name__}: {error}); save it again"
         ) from error
     variables = {name: value for name, value in content.items() if not name.startswith("__")}
     if settings.table is not None:

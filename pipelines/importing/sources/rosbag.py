@@ -67,10 +67,7 @@ def _topic(reader: Any, named: str | None) -> str:
 
 
 def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
-    """Return a column for each joint's quantity.
-
-    Messages may have their joints in any order, and lack some.
-    """
+    """Return a column for each joint's quantity; messages may lack joints, in any order."""
     stamps: list[int] = []
     received: list[int] = []
     values: dict[str, dict[int, float]] = {}

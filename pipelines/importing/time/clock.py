@@ -15,10 +15,7 @@ from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 
 RESTART_S, RESTART_PERIODS = 1.0, 20
-"""A clock that steps back by more than the longer of these, s and samples, starts over.
-
-A smaller step back is of rows that arrived out of order.
-"""
+"""A clock starts over that steps back by more than the longer of these, s and samples."""
 RESTART_ROWS = 20
 """A clock that stays behind its latest stamp for more rows than these starts over, too."""
 LEAD_ROWS = 5

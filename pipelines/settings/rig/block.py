@@ -24,10 +24,7 @@ def check_block(block: Settings, name: str) -> None:
     for quantity, register in registers.items():
         if register.unit not in DIMENSION[quantity]:
             allowed = " or ".join(DIMENSION[quantity])
-            raise ValueError(
-                f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the"
-                " unit"
-            )
+            raise ValueError(f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}")
     for quantity in ("sequence", "heartbeat"):
         if quantity in registers:
             check_counter(registers[quantity], f"{name}.{quantity}")
@@ -46,8 +43,7 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
         for address in range(register.address, register.address + register.registers):
             if address in taken:
                 raise ValueError(
-                    f"{name}.{quantity}: register {address} is part of {taken[address]} too;"
-                    " correct one address"
+                    f"{name}.{quantity}: register {address} is part of {taken[address]} too"
                 )
             taken[address] = quantity
     length = max(taken) - min(taken) + 1
@@ -76,8 +72,7 @@ def check_counter(register: Register, name: str) -> None:
     if not register.is_plain_count:
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
-            f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or offset, as"
-            " it is a count"
+            f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or offset"
         )
 
 

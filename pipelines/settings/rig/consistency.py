@@ -1,7 +1,4 @@
-"""Checks over the whole rig: devices, maps, lines, sampling and limits must fit together.
-
-Each raises a ValueError that names the key, its value and the remedy.
-"""
+"""Checks over the whole rig; each raises a ValueError with key, value and remedy."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -12,10 +12,7 @@ from pipelines.settings.rig.with_human import TIGHTER, check_tighter, limits_in_
 JointName = Literal["hip", "knee"]
 
 MOST_EVERY = 1000
-"""Cycles from one reading of a sensor to the next.
-
-At 1000 cycles a second this takes as long as the longest watchdog waits.
-"""
+"""Most cycles between two readings of a sensor, the longest watchdog at 1000 a second."""
 
 
 class DeviceSettings(Settings):
@@ -31,10 +28,7 @@ class DeviceSettings(Settings):
     def _has_one_address(self) -> Self:
         for key in ("host", "port"):
             if self.line is not None and key in self.model_fields_set:
-                raise ValueError(
-                    f"{key}: found together with line = {self.line!r}, which has its own address;"
-                    " remove one"
-                )
+                raise ValueError(f"{key}: found together with line = {self.line!r}; remove one")
         return self
 
     def line_among(self, lines: Mapping[str, LineSettings]) -> LineSettings:

@@ -110,10 +110,7 @@ class TlsLine(NetworkLine):
 
 
 def refuse_passphrase(key: Path | None) -> Callable[[], str]:
-    """Return a callback that refuses a key with a passphrase.
-
-    OpenSSL would otherwise prompt for the passphrase, and block while a leg moves.
-    """
+    """Return a callback that refuses a key with a passphrase, for which OpenSSL would block."""
 
     def refuse() -> str:
         raise SettingsError(

@@ -40,10 +40,7 @@ class DriveWrite(Settings):
 
 
 class SensorRead(Settings):
-    """Values of a 3-axis force sensor, read in one block.
-
-    Axes are those of the segment, see docs/contracts.md.
-    """
+    """Values of a 3-axis force sensor, read in one block; axes as in docs/contracts.md."""
 
     sequence: Register = Field(description="Sample counter.")
     force_x: Register = Field(description="Force along the segment (distal).")
@@ -127,14 +124,12 @@ class DriveMap(Settings):
         if both:
             raise ValueError(
                 f"fault_mask: found 0x{self.fault_mask:04X}, but 0x{both:04X} of it is in"
-                f" enabled_value 0x{self.enabled_value:04X}. An enabled drive has no fault; correct"
-                " one of them"
+                f" enabled_value 0x{self.enabled_value:04X}. An enabled drive has no fault"
             )
         if self.enabled_mask and not self.enabled_mask & ~self.fault_mask:
             raise ValueError(
                 f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask"
-                f" 0x{self.fault_mask:04X}. Expected a bit that is set only in an enabled, or only"
-                " in a disabled drive"
+                f" 0x{self.fault_mask:04X}. Expected a bit that no fault sets"
             )
 
     def _check_ring_counters(self) -> None:
@@ -169,14 +164,11 @@ class DriveMap(Settings):
                 raise ValueError(
                     f"{name}: found {register.type} with scale {register.scale:g} and offset"
                     f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or"
-                    " offset, as its bits are flags"
+                    " offset"
                 )
             for key, value in values.items():
                 if not register.holds(value, value):
-                    raise ValueError(
-                        f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of"
-                        " them"
-                    )
+                    raise ValueError(f"{key}: found 0x{value:X}, but {name} is a {register.type}")
 
     def active_faults(self, status: int) -> str:
         """Return the fault bits of a status word with their names; empty without a fault."""

@@ -95,10 +95,7 @@ class RigSettings(Settings):
         return device.line_among(self.line)
 
     def turn_of(self, sensor: SensorSettings) -> int:
-        """Return the index of the cycle, among its ``every``, in which a sensor is read.
-
-        Sensors that are read equally seldom take turns.
-        """
+        """Return the cycle, among its ``every``, in which a sensor is read: they take turns."""
         equal = [other.cuff for other in self.sensor if other.every == sensor.every]
         return equal.index(sensor.cuff) % sensor.every
 
@@ -130,8 +127,7 @@ class RigSettings(Settings):
         if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
             raise SettingsError(
                 f"record_rate_hz: found {self.record_rate_hz:g} with set-points at"
-                f" {sample_rate_hz:g} Hz, expected a whole multiple; change it or"
-                " acquire.sample_rate_hz"
+                f" {sample_rate_hz:g} Hz, expected a whole multiple"
             )
         for name, drive in self.map.drive.items():
             if drive.ring and drive.ring.capacity and drive.ring.capacity < 2 * ratio:
@@ -166,10 +162,7 @@ class RigSettings(Settings):
         return "safety.heartbeat_s", self.safety.heartbeat_s
 
     def public(self) -> dict:
-        """Return the rig's part of a recording's metadata: all but the plant and files with keys.
-
-        Later stages must identify the plant from measurements.
-        """
+        """Return the rig's metadata: all but the plant, to be identified, and files with keys."""
         files: IncEx = {name: set(line.files) for name, line in self.line.items()}
         return self.model_dump(
             mode="json", exclude={"plant": True, "line": files}, exclude_none=True

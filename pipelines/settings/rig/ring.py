@@ -44,8 +44,7 @@ class RingSettings(Settings):
             )
         if self.fifo is not None and self.words > MOST_QUEUED:
             raise ValueError(
-                f"words: found {self.words}, expected at most {MOST_QUEUED}, the most that an FC24"
-                " answer carries"
+                f"words: found {self.words}, expected at most {MOST_QUEUED} for an FC24 answer"
             )
         if self.newest is not None:
             check_counter(self.newest, "newest")
@@ -72,8 +71,7 @@ class RingSettings(Settings):
         end = self.address + self.capacity * self.words
         if end > 65536:
             raise ValueError(
-                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535;"
-                " lower it"
+                f"capacity: found {self.capacity}, but such a ring ends beyond address 65535"
             )
         if self.address <= newest.address < end:
             raise ValueError(
@@ -85,6 +83,5 @@ class RingSettings(Settings):
             if not register.type.startswith("u") or span % self.capacity:
                 raise ValueError(
                     f"{name}.type: found {register.type} with a capacity of {self.capacity},"
-                    " expected an unsigned counter whose range is a multiple of the capacity, such"
-                    " as a power of 2"
+                    " expected an unsigned counter and a power of 2"
                 )

@@ -37,7 +37,6 @@ def check_safety_bounds(drives: Iterable[DriveSettings], safety: SafetySettings)
             if not abs(angle) <= 2 * pi:
                 raise ValueError(
                     f"drive[{i}].angle_rad: found {angle:g}, expected radians, at most one turn"
-                    " either way"
                 )
     for name, most in SAFETY.items():
         _check_at_most(f"safety.{name}", getattr(safety, name), most)

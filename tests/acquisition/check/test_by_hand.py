@@ -103,9 +103,7 @@ def test_radians_taken_for_degrees_are_detected_by_the_distance(checked, hand):
     findings = findings_of(
         checked(options={"operator": hand}, believed={ANGLE: ANGLE.replace('"rad"', '"deg"')})
     )
-    assert re.search(
-        r"drive hip: its angle changed by \+0\.00[67]\d* rad when the hip was moved", findings
-    )
+    assert re.search(r"drive hip: its angle changed by \+0\.00[67]\d* rad in that motion", findings)
     assert 'with unit = "rad" it would be plausible: correct map.drive.servo.read.angle' in findings
 
 

@@ -50,8 +50,8 @@ def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first
         # There is no rig to connect to.
         acquire(path, settings, excitation, tmp_path / "test.parquet")
     assert str(caught.value).endswith(
-        f"another exoid (process {os.getpid()}) uses the devices there; wait for it to end, or end"
-        " it; nothing was moved"
+        f"another exoid (process {os.getpid()}) uses the devices there; wait for its end; nothing"
+        " was moved"
     )
     assert not list(tmp_path.glob("*.journal"))
 
@@ -132,7 +132,7 @@ def test_a_drive_to_which_another_program_sends_set_points_is_sent_nothing(
     served = []
     with pytest.raises(
         DeviceError,
-        match=r"^drive hip .* and drive knee .*: driven by another program, since angle or",
+        match=r"^drive hip .* and drive knee .*: driven by another program, as angle or",
     ):
         record(fault=goes_on, served_as=served, drop=drops)
     assert not control_words

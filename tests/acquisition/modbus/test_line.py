@@ -294,7 +294,7 @@ def connecting(path):
 def test_a_serial_port_that_is_not_there_is_named_with_those_that_are(on_line, line_of, tmp_path):
     why = connecting(on_line(line_of("rtu")))
     assert why.startswith(f"line leg ({tmp_path}/port): no such serial port; there is ")
-    assert why.endswith("plug the adapter in, or correct serial_port in the rig file")
+    assert why.endswith("plug the adapter in, or correct serial_port")
 
 
 def test_a_serial_port_that_another_program_uses_is_not_shared(serve, on_line, line_of, tmp_path):

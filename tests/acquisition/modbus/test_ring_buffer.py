@@ -197,9 +197,9 @@ def test_a_queue_of_short_reads_is_emptied_at_twenty_samples_a_set_point():
         (
             "capacity = 2048",
             "capacity = 2000",
-            "an unsigned counter whose range is a multiple of the capacity",
+            "an unsigned counter and a power of 2",
         ),
-        ("capacity = 2048", "capacity = 16384", "such a ring ends beyond address 65535; lower it"),
+        ("capacity = 2048", "capacity = 16384", "such a ring ends beyond address 65535"),
         (
             "words = 10",
             "words = 9",

@@ -85,8 +85,8 @@ def test_a_drive_that_would_let_go_after_a_lost_reply_is_refused_before_anything
     assert (
         str(caught.value)
         == f"{path}: plant.heartbeat_s: found 0.5, expected more than 0.61 s, for which one lost"
-        " reply leaves drive hip (127.0.0.1:502, unit 1) without a set-point (2 x reply_s of"
-        " 0.3 s, and two samples); lower safety.reply_s, or raise the time-out in the drive"
+        " reply leaves drive hip (127.0.0.1:502, unit 1) without a set-point (2 x reply_s, and two"
+        " samples); lower safety.reply_s, or raise the time-out in the drive"
     )
 
 

@@ -25,8 +25,8 @@ def test_set_points_that_would_leap_a_count_are_refused_at_the_rate_at_which_the
     assert (
         str(caught.value)
         == f"{path}: map.drive.servo.write.reference: one count is 0.00332 rad, expected at most"
-        " 0.00275 rad, a quarter of the hip's longest step (2.2 rad/s at 200 Hz);"
-        " correct its scale, or lower acquire.sample_rate_hz"
+        " 0.00275 rad, a quarter of the hip's longest step; correct its scale, or lower"
+        " acquire.sample_rate_hz"
     )
 
 

@@ -151,8 +151,8 @@ def test_a_journal_of_which_nothing_can_be_read_is_not_reported_as_of_no_use(wri
         recover(written.path)
     assert (
         str(refused.value)
-        == f"{written.path}: no sample in it can be read, it is damaged; nothing was changed; keep"
-        " it, and check the disk"
+        == f"{written.path}: no sample in it can be read, it is damaged; keep it, and check the"
+        " disk"
     )
     with pytest.raises(InputError, match=r"holds 0 samples .* or move it away, it is damaged"):
         refuse_leftover(written.path)

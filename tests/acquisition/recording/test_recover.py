@@ -340,7 +340,7 @@ def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_r
         (
             "t.toml",
             b"unit = 'rad'",
-            "is no journal of a run, nothing was changed; name the *.journal that a killed",
+            "is no journal of a run, nothing was changed; name a *.journal",
         ),
         (
             "one.parquet.journal",
