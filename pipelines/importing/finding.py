@@ -1,6 +1,6 @@
 """An observation about a log, and the action that the import took."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -26,6 +26,19 @@ class Finding:
     def from_json(cls, entry: Mapping[str, str]) -> Self:
         """Return the finding in a recording's metadata."""
         return cls(entry["where"], entry["found"], entry["done"])
+
+
+Note = Callable[[str, str], None]
+"""Takes an observation about one place, and the action of the import."""
+
+
+def noting(where: str, findings: list[Finding]) -> Note:
+    """Return a function that adds findings about a place."""
+    return lambda observation, action: findings.append(Finding(where, observation, action))
+
+
+def unnoted(observation: str, action: str) -> None:
+    """Add no finding, as for a guess."""
 
 
 def counted(number: int, what: str) -> str:

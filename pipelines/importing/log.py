@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Finding, counted, noting
 from pipelines.importing.quantities.conversion import columns_of, counter_turn, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.sources.source import Columns, Source
@@ -122,25 +122,24 @@ class Log:
                 f"{channel.where}: {', '.join(names)} have one row each, expected one for each"
                 " stamp"
             )
-        return quantity(channel.reading, channel.gain, picked, channel.target, findings)
+        note = noting(channel.target, findings)
+        return quantity(channel.reading, channel.gain, picked, channel.target, note)
 
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
-        reading = channel.reading
-        stamps = clock.stamps(self.columns[str(reading.time)], self.settings, findings)
+        reading, of_time = channel.reading, noting("time", findings)
+        stamps = clock.stamps(self.columns[str(reading.time)], self.settings, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(
                 f"{channel.where} and its clock {reading.time!r} differ in length; name its own"
                 " clock"
             )
-        values = quantity(reading, channel.gain, columns, channel.target, findings)
+        note = noting(channel.target, findings)
+        values = quantity(reading, channel.gain, columns, channel.target, note)
         known = np.isfinite(values)
-        own = clock.runs(
-            clock.seconds(stamps[known], self.origin, self.settings, findings),
-            stamps[known],
-            findings,
-        )
+        since = clock.seconds(stamps[known], self.origin, self.settings, of_time)
+        own = clock.runs(since, stamps[known], of_time)
         if len(own) != 1:
             raise InputError(
                 f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one"
@@ -155,7 +154,7 @@ class Log:
         interpolated[gap[behind] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
         seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
-        findings.append(Finding(channel.target, seen, "interpolated linearly, not across its gaps"))
+        note(seen, "interpolated linearly, not across its gaps")
         return interpolated
 
 
@@ -182,19 +181,20 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             )
     columns = source.load(list(needed))
     findings: list[Finding] = []
+    note = noting("time", findings)
     if settings.time.column is None:
         rows = max(map(len, columns.values()))
-        run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), findings)
+        run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), note)
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}
     for stamped in clocks - {None}:
         clock.check_unit(columns[str(stamped)], str(stamped), settings.time.unit)
     columns = _as_numbers(columns, clocks, findings)
-    stamps = clock.stamps(columns[settings.time.column], settings.time, findings)
+    stamps = clock.stamps(columns[settings.time.column], settings.time, note)
     origin = clock.first_stamp(stamps)
-    time_s = clock.seconds(stamps, origin, settings.time, findings)
-    runs = tuple(clock.runs(time_s, stamps, findings))
+    time_s = clock.seconds(stamps, origin, settings.time, note)
+    runs = tuple(clock.runs(time_s, stamps, note))
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
 
 
@@ -230,6 +230,6 @@ def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]
 def _as_numbers(columns: Columns, clocks: set[str | None], findings: list[Finding]) -> Columns:
     """Return the columns as float64, but clocks as they are: dates, or integers of many digits."""
     return {
-        name: values if name in clocks else numbers(values, name, findings)
+        name: values if name in clocks else numbers(values, noting(name, findings))
         for name, values in columns.items()
     }

@@ -14,7 +14,7 @@ from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.provenance import metadata_of, sha256
 from pipelines.errors import ContractError, InputError, SettingsError, about
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.quantities.turn_offset import Beginnings
@@ -166,12 +166,12 @@ def _recordings_of(
     whole = _whole_rows(columns, log.required, findings)
     time = run.time_s[whole]
     sampling = Sampling.of(run.time_s, time)
-    findings += _sampling_findings(sampling)
+    note = noting("time", findings)
+    _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
-    _check_angles(columns, settings)
-    _check_torques(columns, settings)
+    _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))
-    findings += _period_findings(columns, settings, wanted)
+    _note_period(columns, settings, wanted, note)
     findings += plausibility.check(columns, settings)
     findings += before.check(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
@@ -233,72 +233,79 @@ def _whole_rows(
     return whole
 
 
-def _sampling_findings(sampling: Sampling) -> list[Finding]:
-    findings = []
+def _note_sampling(sampling: Sampling, note: Note) -> None:
     if not SLOWEST_HZ <= sampling.rate_hz <= FASTEST_HZ:
         seen = f"{sampling.rate_hz:.4g} Hz, usual are {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz"
-        findings.append(Finding("time", seen, "kept; check time.unit, s or ms, or time.rate_hz"))
+        note(seen, "kept; check time.unit, s or ms, or time.rate_hz")
     if sampling.irregular > 0.05:
         shortest, median, longest = (1e3 * step for step in sampling.steps_s)
         seen = (
             f"irregular: {sampling.irregular:.0%} of the steps are more than 2 % off their median; "
             f"{shortest:.4g} to {longest:.4g} ms, median {median:.4g}"
         )
-        action = "stamps kept as they are; exoid filter interpolates angles between them"
-        findings.append(Finding("time", seen, action))
+        note(seen, "stamps kept as they are; exoid filter interpolates angles between them")
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
         seen = (
             f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest"
             f" {longest_gap:.3g} s"
         )
-        findings.append(Finding("time", seen, "listed in `gaps`; nothing is filled in"))
-    return findings
+        note(seen, "listed in `gaps`; nothing is filled in")
 
 
-def _period_findings(
-    columns: Mapping[str, NDArray], settings: ImportMap, wanted: Sequence[RecordingSettings]
-) -> list[Finding]:
+def _note_period(
+    columns: Mapping[str, NDArray],
+    settings: ImportMap,
+    wanted: Sequence[RecordingSettings],
+    note: Note,
+) -> None:
     """Report a period that the map lacks, by which noise is separated from systematic errors."""
     if all(recording.period_s is not None for recording in wanted):
-        return []
+        return
     names = [joint.joint.column("reference") for joint in settings.joint]
     if not all(name in columns for name in names):
         names = [joint.joint.column("angle") for joint in settings.joint]
     period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in names]))
-    if period_s is None:
-        return []
-    seen = f"the motion repeats every {period_s:.6g} s, but the map has no period_s"
-    action = f"set period_s = {period_s:.6g} in [[recording]] for exoid diagnose"
-    return [Finding("time", seen, action)]
+    if period_s is not None:
+        seen = f"the motion repeats every {period_s:.6g} s, but the map has no period_s"
+        note(seen, f"set period_s = {period_s:.6g} in [[recording]] for exoid diagnose")
 
 
-def _check_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+    """Refuse an angle or torque that no joint has."""
     for i, joint in enumerate(settings.joint):
-        angle = columns[joint.joint.column("angle")]
-        beyond = np.flatnonzero(np.abs(angle) > LARGEST_ANGLE_RAD)
-        if joint.kind == "revolute" and len(beyond):
-            first = f"{angle[beyond[0]]:.4g} at {columns['time_s'][beyond[0]]:.6g} s"
-            raise SettingsError(
-                f"joint[{i}].angle: reaches {np.min(angle):.4g} to {np.max(angle):.4g} rad,"
-                f" expected at most {LARGEST_ANGLE_RAD:.3g} rad either way"
-                f" ({counted(len(beyond), 'row')} of {len(angle)} beyond, the first {first})."
-                " Exclude outliers with range, or correct unit, zero, counts_per_turn or wraps_at"
+        if joint.kind == "revolute":
+            _check_most(
+                columns,
+                f"joint[{i}].angle",
+                joint.joint.column("angle"),
+                LARGEST_ANGLE_RAD,
+                "rad",
+                "zero, counts_per_turn or wraps_at",
             )
-
-
-def _check_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
-    for i, joint in enumerate(settings.joint):
-        torque = columns[joint.joint.column("torque")]
         unit = "N·m" if joint.kind == "revolute" else "N"
-        beyond = np.flatnonzero((torque > LARGEST_TORQUE) | (torque < -LARGEST_TORQUE))
-        if len(beyond):
-            first = f"{torque[beyond[0]]:.4g} {unit} at {columns['time_s'][beyond[0]]:.6g} s"
-            raise SettingsError(
-                f"joint[{i}].torque: is {first}, expected at most {LARGEST_TORQUE:g} {unit}"
-                f" ({counted(len(beyond), 'row')} beyond). Exclude outliers with range, or correct"
-                " its unit, scale or gains in the map"
-            )
+        _check_most(
+            columns,
+            f"joint[{i}].torque",
+            joint.joint.column("torque"),
+            LARGEST_TORQUE,
+            unit,
+            "scale or gains",
+        )
+
+
+def _check_most(
+    columns: Mapping[str, NDArray], key: str, name: str, most: float, unit: str, also: str
+) -> None:
+    values = columns[name]
+    beyond = np.flatnonzero(np.abs(values) > most)
+    if len(beyond):
+        raise SettingsError(
+            f"{key}: reaches {np.min(values):.4g} to {np.max(values):.4g} {unit}, expected at most"
+            f" {most:.3g} {unit} either way ({counted(len(beyond), 'row')} of {len(values)} beyond,"
+            f" the first {values[beyond[0]]:.4g} at {columns['time_s'][beyond[0]]:.6g} s). Exclude"
+            f" outliers with range, or correct unit, {also}"
+        )
 
 
 def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:

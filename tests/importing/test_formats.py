@@ -11,6 +11,7 @@ import scipy.io
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.importing.finding import noting
 from pipelines.importing.quantities.numbers import numbers
 from tests.importing.conftest import MAP
 
@@ -316,7 +317,7 @@ def test_dates_where_an_angle_should_be_are_no_numbers(imported, pendulum, tmp_p
 def test_a_date_that_is_missing_is_no_text():
     findings = []
     values = np.array(["2025-03-30", "NaT", "NaT"], dtype="datetime64[ns]")
-    assert np.isnan(numbers(values, "angle", findings)).all()
+    assert np.isnan(numbers(values, noting("angle", findings))).all()
     assert [finding.observation for finding in findings] == [
         "1 row with text, the first '2025-03-30T00:00:00.' in row 0"
     ]

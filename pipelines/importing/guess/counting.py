@@ -39,8 +39,8 @@ class Counting:
         """
         values = values.astype(float)
         if self.bits is not None:
-            values = signed(values, self.bits, "", [])
-        return values if self.full is None else unwrapped(values, self.full, "", [])
+            values = signed(values, self.bits)
+        return values if self.full is None else unwrapped(values, self.full)
 
 
 def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, Counting]:

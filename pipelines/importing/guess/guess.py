@@ -131,7 +131,7 @@ def _numeric(values: NDArray) -> NDArray:
         return values
     if values.dtype.kind == "m":
         return whole_nanoseconds(values)
-    converted = numbers(values, "", [])
+    converted = numbers(values)
     finite = np.isfinite(converted)
     if finite.any() or values.dtype.kind == "f":
         return np.where(finite, converted, np.nan)
@@ -152,7 +152,7 @@ def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
     """Return the longest run of a clock's stamps (n,); None where each run has one row."""
     stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
     time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return max(clock.runs(time_s, stamps, []), key=len, default=None)
+    return max(clock.runs(time_s, stamps), key=len, default=None)
 
 
 def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:

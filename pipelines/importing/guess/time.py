@@ -274,7 +274,7 @@ def _step(values: NDArray, coarse: bool) -> float:
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values, [])
+    runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values)
     full = [
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)

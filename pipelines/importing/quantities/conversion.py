@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Note, counted
 from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
@@ -25,7 +25,7 @@ def quantity(
     gain: float,
     columns: Mapping[str, NDArray],
     where: str,
-    findings: list[Finding],
+    note: Note,
 ) -> NDArray:
     """Return a reading as a quantity: sign x gain x unit(scale x raw - zero).
 
@@ -38,30 +38,30 @@ def quantity(
     columns : mapping of str to (n,) array
         Columns of the log.
     where : str
-        Name of the quantity in findings.
-    findings : list of Finding
-        Extended by those about this reading.
+        Name of the quantity in errors.
+    note : callable
+        Takes what is reported about the reading.
 
     Returns
     -------
     (n,) array
         The quantity in SI, NaN where the log has none.
     """
-    raw = _raw(reading, columns, where, findings)
+    raw = _raw(reading, columns, where, note)
     if reading.signed_bits is not None:
-        raw = signed(raw, reading.signed_bits, where, findings)
+        raw = signed(raw, reading.signed_bits, note)
     if reading.range is not None:
-        raw = _within(raw, reading.range, where, findings)
+        raw = _within(raw, reading.range, note)
     if reading.wraps_at is not None:
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
-        raw = unwrapped(raw, reading.wraps_at, where, findings, near)
+        raw = unwrapped(raw, reading.wraps_at, note, near)
     unit = unit_named(reading.unit)
     assert unit is not None, "the map checks its units"
     if reading.wraps_at is None:
         full = full_at(raw, _turns(reading, unit))
         if full is not None:
             seen = f"steps by {full:.6g} from one row to the next, as a full counter does"
-            findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
+            note(seen, f"kept; set wraps_at = {full:.10g} at it")
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
 
 
@@ -95,19 +95,17 @@ def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
 
 
 def _raw(
-    reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, findings: list[Finding]
+    reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, note: Note
 ) -> NDArray:
     if reading.column is not None:
-        return numbers(columns[reading.column], where, findings)
+        return numbers(columns[reading.column], note)
     expression = Expression(str(reading.expression), f"{where}.expression")
-    return expression({name: numbers(columns[name], where, findings) for name in expression.names})
+    return expression({name: numbers(columns[name], note) for name in expression.names})
 
 
-def _within(
-    raw: NDArray, limits: tuple[float, float], where: str, findings: list[Finding]
-) -> NDArray:
+def _within(raw: NDArray, limits: tuple[float, float], note: Note) -> NDArray:
     outside = (raw < limits[0]) | (raw > limits[1])
     if outside.any():
         seen = f"{counted(int(outside.sum()), 'row')} outside {limits[0]:g} … {limits[1]:g}"
-        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
+        note(seen, TAKEN_FOR_MISSING)
     return np.where(outside, np.nan, raw)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Note, counted, unnoted
 
 LONGEST = 20
 """Greatest length of a text in a finding."""
@@ -17,17 +17,15 @@ TAKEN_FOR_MISSING = "taken for missing"
 """Treatment of a text where a number should be."""
 
 
-def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
+def numbers(values: NDArray, note: Note = unnoted) -> NDArray:
     """Return values as numbers.
 
     Parameters
     ----------
     values : (n,) array
         Values as the file has them.
-    where : str
-        Name of the quantity in findings.
-    findings : list of Finding
-        Extended by one for each kind of text.
+    note : callable
+        Takes what is reported about text.
 
     Returns
     -------
@@ -40,7 +38,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     # no number.
     text = pd.Series(values.astype(str).astype(object) if values.dtype.kind in "mM" else values)
     if _have_thousands(text):
-        findings.append(Finding(where, "commas between thousands", "read without them"))
+        note("commas between thousands", "read without them")
         text = text.str.replace(",", "")
     result = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     words = np.isnan(result) & pd.notna(values)
@@ -50,7 +48,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
             f"{counted(int(words.sum()), 'row')} with text, the first"
             f" {str(values[row])[:LONGEST]!r} in row {row}"
         )
-        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
+        note(seen, TAKEN_FOR_MISSING)
     return result
 
 

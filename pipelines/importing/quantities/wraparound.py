@@ -5,14 +5,14 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Note, counted, unnoted
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 
 REGISTERS = tuple(2.0**bits for bits in range(8, 33))
 """Moduli of counters of whole numbers."""
 
 
-def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> NDArray:
+def signed(values: NDArray, bits: int, note: Note = unnoted) -> NDArray:
     """Return the values of a signed register that was logged as unsigned (two's complement).
 
     A value that the register cannot hold becomes NaN. An example is 4.2949673e9, a number near 2^32
@@ -24,10 +24,8 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
         Readings from 0 to ``2**bits - 1``.
     bits : int
         Bits of the register.
-    where : str
-        Name of the quantity in findings.
-    findings : list of Finding
-        Extended by those about this register.
+    note : callable
+        Takes what is reported about the register.
 
     Returns
     -------
@@ -41,20 +39,18 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
             f"{counted(int(impossible.sum()), 'row')} that {bits} bits cannot hold, the first"
             f" {first:.10g}"
         )
-        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
+        note(seen, TAKEN_FOR_MISSING)
     negative = values >= 2.0 ** (bits - 1)
     if (negative & ~impossible).any():
         share = np.count_nonzero(negative & ~impossible) / len(values)
         seen = (
             f"a signed register of {bits} bits logged without its sign, {share:.0%} of it below 0"
         )
-        findings.append(Finding(where, seen, f"less 2^{bits} there"))
+        note(seen, f"less 2^{bits} there")
     return np.where(impossible, np.nan, np.where(negative, values - 2.0**bits, values))
 
 
-def unwrapped(
-    values: NDArray, modulus: float, where: str, findings: list[Finding], near: float = 0.0
-) -> NDArray:
+def unwrapped(values: NDArray, modulus: float, note: Note = unnoted, near: float = 0.0) -> NDArray:
     """Return a counter without its wraparounds, so that no step exceeds half the modulus.
 
     Parameters
@@ -63,10 +59,8 @@ def unwrapped(
         Readings, NaN where missing.
     modulus : float
         Reading at which the counter starts again at 0.
-    where : str
-        Name of the quantity in findings.
-    findings : list of Finding
-        Extended by those about this counter.
+    note : callable
+        Takes what is reported about the counter.
     near : float, optional
         The counter begins in the turn in which its first reading lies nearest to it.
 
@@ -85,16 +79,14 @@ def unwrapped(
     unwrapped_values = values.copy()
     unwrapped_values[known] = values[known] + modulus * np.cumsum(turns)
     if wraps:
-        findings.append(
-            Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on")
-        )
+        note(f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on")
     if turns[0]:
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
         action = (
             f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at names another"
         )
-        findings.append(Finding(where, seen, action))
+        note(seen, action)
     return unwrapped_values
 
 

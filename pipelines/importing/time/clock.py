@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
-from pipelines.importing.finding import Finding, counted
+from pipelines.importing.finding import Finding, Note, counted, noting, unnoted
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
@@ -101,7 +101,7 @@ def check_unit(raw: NDArray, column: str, unit: str) -> None:
     known = raw[~pd.isna(raw)]
     right = {"dates": ["iso8601"], "durations": ["ns"]}.get(content)
     if right is None:
-        right = _likely_units(numbers(known, column, []))
+        right = _likely_units(numbers(known))
     raise SettingsError(
         f"{column!r} holds {content}, the first {str(known[0])[:LONGEST]!r}, but the map has"
         f" time.unit = {unit!r}; set it to {' or '.join(right)}"
@@ -120,12 +120,12 @@ def _content(raw: NDArray) -> str:
     if raw.dtype.kind in "biufmM":
         return {"M": "dates", "m": "durations"}.get(raw.dtype.kind, "plain numbers")
     some = raw[~pd.isna(raw)][:FEW]
-    if np.isfinite(numbers(some, "", [])).any():
+    if np.isfinite(numbers(some)).any():
         return "plain numbers"
     return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
 
 
-def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDArray:
+def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
     """Return time stamps as numbers in the map's unit.
 
     Whole numbers stay integers, as float64 cannot represent every nanosecond since 1970.
@@ -136,8 +136,8 @@ def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDA
         Stamps as the file has them.
     settings : TimeSettings
         Unit of the stamps.
-    findings : list of Finding
-        Extended by those about the stamps.
+    note : callable
+        Takes what is reported about the stamps.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDA
             f"has {str(raw[0])[:LONGEST]!r}, expected a date such as 2026-01-31 12:00:00.125;"
             " correct time.column or time.unit in the map"
         )
-    return whole(values) if values.dtype.kind in "iu" else numbers(values, "time", findings)
+    return whole(values) if values.dtype.kind in "iu" else numbers(values, note)
 
 
 def whole(values: NDArray) -> NDArray:
@@ -185,9 +185,7 @@ def whole(values: NDArray) -> NDArray:
     return values.astype(np.int64)
 
 
-def seconds(
-    values: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]
-) -> NDArray:
+def seconds(values: NDArray, origin: float, settings: TimeSettings, note: Note) -> NDArray:
     """Return stamps as times since an origin.
 
     Parameters
@@ -198,8 +196,8 @@ def seconds(
         Stamp at time 0.
     settings : TimeSettings
         Unit of the stamps, and the modulus of the clock if it wraps around.
-    findings : list of Finding
-        Extended by one about wraparounds.
+    note : callable
+        Takes what is reported about wraparounds.
 
     Returns
     -------
@@ -210,7 +208,7 @@ def seconds(
     assert unit is not None, "the map checks its units"
     since = (values - origin).astype(float)
     if settings.wraps_at is not None:
-        since = _unwrapped(since, settings.wraps_at, findings)
+        since = _unwrapped(since, settings.wraps_at, note)
     return since * unit.factor
 
 
@@ -228,23 +226,17 @@ def first_stamp(values: NDArray) -> float:
     return known[0]
 
 
-def _unwrapped(since: NDArray, modulus: float, findings: list[Finding]) -> NDArray:
+def _unwrapped(since: NDArray, modulus: float, note: Note) -> NDArray:
     """Undo wraparounds, which are steps back by more than half the modulus."""
     known = np.isfinite(since)
     wraps = np.diff(since[known], prepend=since[known][0]) < -0.5 * modulus
     if wraps.any():
-        findings.append(
-            Finding(
-                "time",
-                f"wraps at {modulus:.10g}, {counted(int(wraps.sum()), 'time')}",
-                "counted on",
-            )
-        )
+        note(f"wraps at {modulus:.10g}, {counted(int(wraps.sum()), 'time')}", "counted on")
         since[known] += modulus * np.cumsum(wraps)
     return since
 
 
-def uniform(rows: int, rate_hz: float, findings: list[Finding]) -> Run:
+def uniform(rows: int, rate_hz: float, note: Note) -> Run:
     """Return the run of a log without a clock.
 
     Parameters
@@ -253,20 +245,14 @@ def uniform(rows: int, rate_hz: float, findings: list[Finding]) -> Run:
         Number of rows.
     rate_hz : float
         Their rate, Hz.
-    findings : list of Finding
-        Extended by a remark.
+    note : callable
+        Takes what is reported about the clock.
     """
-    findings.append(
-        Finding(
-            "time",
-            "no clock in the log",
-            f"rows taken for uniform at {rate_hz:g} Hz, by the map",
-        )
-    )
+    note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
     return Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
 
 
-def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
+def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     """Divide a log into runs whose times strictly increase.
 
     Parameters
@@ -275,8 +261,8 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
         Times, s, which may be missing, repeat, go back and start over.
     raw : (n,) array
         Stamps as the file has them, which show whether a counter was full.
-    findings : list of Finding
-        Extended by those about the clock.
+    note : callable
+        Takes what is reported about the clock.
 
     Returns
     -------
@@ -285,20 +271,14 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
     """
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
-        findings.append(
-            Finding(
-                "time", f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out"
-            )
-        )
+        note(f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out")
     _refuse_backwards(time_s[rows])
-    rows = _without_outliers(rows, time_s, findings)
+    rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        findings.append(
-            Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]])))
-        )
+        note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]])))
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
 
@@ -329,7 +309,7 @@ def _period(time_s: NDArray) -> float:
     return float(np.median(steps)) if len(steps) else np.inf
 
 
-def _without_outliers(rows: NDArray, time_s: NDArray, findings: list[Finding]) -> NDArray:
+def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
     """Leave out single stamps far from both neighbours, which are close to each other."""
     time = time_s[rows]
     far = max(RESTART_S, RESTART_PERIODS * _period(time))
@@ -343,7 +323,7 @@ def _without_outliers(rows: NDArray, time_s: NDArray, findings: list[Finding]) -
             f"{counted(int(stray.sum()), 'stamp')} far from both neighbours, the first in row"
             f" {first}"
         )
-        findings.append(Finding("time", seen, "left out"))
+        note(seen, "left out")
     return rows[np.concatenate([[True], ~stray, [True]])] if len(rows) > 2 else rows
 
 
@@ -400,37 +380,27 @@ def _if_full(before: float, after: float) -> str:
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:
     """Return rows in the order of time, one for each stamp, without a few long before the rest."""
     findings: list[Finding] = []
+    note = noting("time", findings)
     time = time_s[rows]
     back = np.count_nonzero(np.diff(time) < 0.0)
     if back:
         order = np.argsort(time, kind="stable")
         rows, time = rows[order], time[order]
-        findings.append(
-            Finding(
-                "time", f"goes back a little, {counted(int(back), 'time')}", "rows put in order"
-            )
-        )
+        note(f"goes back a little, {counted(int(back), 'time')}", "rows put in order")
     repeated = np.diff(time, prepend=-np.inf) <= 0.0
     if repeated.any():
-        first_repeated = int(rows[np.argmax(repeated)])
-        findings.append(_repeated_stamps(int(repeated.sum()), len(rows), first_repeated))
+        count, share = int(repeated.sum()), float(repeated.mean())
+        seen = f"{counted(count, 'row')} ({share:.1%}) with the stamp of another, the first is row"
+        advice = ""
+        if share >= 0.05:
+            advice = "; if rows are uniform and the clock is coarse, set time.rate_hz instead"
+        note(f"{seen} {rows[np.argmax(repeated)]}", f"the first of each kept{advice}")
         rows, time = rows[~repeated], time[~repeated]
     first = _lead(time)
     if first:
         seen = f"{counted(first, 'row')} {time[first] - time[first - 1]:.3g} s before the rest"
-        findings.append(Finding("time", seen, "left out"))
+        note(seen, "left out")
     return Run(rows[first:], time[first:] - time[first], float(time[first]), tuple(findings))
-
-
-def _repeated_stamps(count: int, rows: int, first: int) -> Finding:
-    seen = (
-        f"{counted(count, 'row')} ({count / rows:.1%}) with the stamp of another, the first is row"
-        f" {first}"
-    )
-    advice = ""
-    if count >= 0.05 * rows:
-        advice = "; if rows are uniform and the clock is coarse, set time.rate_hz in place of it"
-    return Finding("time", seen, f"the first of each kept{advice}")
 
 
 def _lead(time: NDArray) -> int:
