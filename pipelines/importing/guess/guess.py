@@ -61,11 +61,6 @@ def propose(paths: Sequence[Path]) -> Proposal:
                 "no angle column found, by name or as the integral of another column, among"
                 f" {_in_short(source.names)}; write the map by hand (docs/import.md)"
             )
-    constants = {
-        name: float(values[0])
-        for name, values in columns.items()
-        if len(values) == 1 and values.dtype.kind in "iuf"
-    }
     proposal = Proposal()
     proposal.remark(
         f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`."
@@ -77,7 +72,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     used = {time.column}
     alone = len(joints) == 1
     for number, joint in enumerate(joints):
-        used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone, constants))
+        used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone))
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)

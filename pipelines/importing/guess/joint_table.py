@@ -1,6 +1,5 @@
 """The tables of a joint in a map: its columns, their units, signs and zeros, each with a reason."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -27,9 +26,6 @@ SWINGS_RAD = 2.0
 HANGS_RAD = 0.15
 """Error of that direction by friction and backlash; within it the log's zero hangs down."""
 
-GAIN = re.compile(r"gain|^g_?(tau|f)|^k_?t(au)?$", re.IGNORECASE)
-"""Usual names of the gain of a drive."""
-
 
 def write_joint(
     proposal: Proposal,
@@ -38,7 +34,6 @@ def write_joint(
     columns: Columns,
     time_s: NDArray,
     alone: bool,
-    constants: Mapping[str, float],
 ) -> list[str]:
     """Write a joint's tables into a map.
 
@@ -56,8 +51,6 @@ def write_joint(
         Times, s.
     alone : bool
         Whether it is the only joint. Motions of other joints would disturb a fit of its torque.
-    constants : mapping of str to float
-        The log's single numbers, which may include a drive's gain.
 
     Returns
     -------
@@ -79,7 +72,7 @@ def write_joint(
     writer.write_angle(time_s, fit)
     if "velocity" in joint.columns:
         writer.write_velocity()
-    writer.write_torque(fit, constants)
+    writer.write_torque(fit)
     writer.write_others()
     return writer.used
 
@@ -179,7 +172,7 @@ class _JointWriter:
             self._write_gear("if it is the motor's", units.gear)
         self._write_counting("velocity")
 
-    def write_torque(self, fit: TorqueFit | None, constants: Mapping[str, float]) -> None:
+    def write_torque(self, fit: TorqueFit | None) -> None:
         """Write the table of torque or force."""
         drive = self.joint.drive
         if drive is None:
@@ -191,7 +184,7 @@ class _JointWriter:
         remark = "commanded, not measured, so without the drive's friction" if commanded else ""
         self._write_column(drive, "torque", remark)
         self._write_counting(drive)
-        self._write_torque_unit(drive, constants)
+        self._write_torque_unit(drive)
         self._write_torque_sign(fit)
 
     def write_others(self) -> None:
@@ -286,7 +279,7 @@ class _JointWriter:
         why = f"by gravity's torque the joint would hang there ({fit.explained:.0%} fits)"
         self.proposal.key("zero", zero, why, sure=False)
 
-    def _write_torque_unit(self, drive: str, constants: Mapping[str, float]) -> None:
+    def _write_torque_unit(self, drive: str) -> None:
         named = self.joint.columns[drive].unit
         dimension = UNITS[named].dimension if named else ""
         lost_sign = self.counters[drive].bits is not None
@@ -300,7 +293,11 @@ class _JointWriter:
             self._write_gear(ratio=self.units.gear)
         elif drive == "voltage":
             self.proposal.key("unit", named or "V", "a voltage, by its name", named is not None)
-            self._write_gain(constants)
+            if self.slides:
+                self.proposal.unknown("gain_n_v", "force for a volt, from the amplifier")
+            else:
+                why = "torque for a volt, from the amplifier; gain_n_v if it slides"
+                self.proposal.unknown("gain_nm_v", why)
         elif dimension == "current" or (not named and (drive == "current" or whole)):
             if named:
                 self.proposal.key("unit", named, FROM_NAME)
@@ -319,16 +316,6 @@ class _JointWriter:
             if dimension == "torque" and self.slides:
                 why = "travel for a turn of the screw, from its data sheet"
                 self.proposal.unknown("lead_m", why)
-
-    def _write_gain(self, constants: Mapping[str, float]) -> None:
-        """Ask for the gain of an amplifier, which the log may hold."""
-        values = [f"{name} = {value:.6g}" for name, value in constants.items() if GAIN.search(name)]
-        origin = f"perhaps {values[0]}, which the log holds" if values else "from the amplifier"
-        if self.slides:
-            self.proposal.unknown("gain_n_v", f"force for a volt, {origin}")
-        else:
-            why = f"torque for a volt, {origin}; gain_n_v if it slides"
-            self.proposal.unknown("gain_nm_v", why)
 
     def _write_motor_constant(self) -> None:
         """Ask for torque or force per ampere."""

@@ -19,8 +19,6 @@ SLIDING = ("force", "torque", "current", "voltage")
 """Quantities that show the force of a prismatic joint's drive, the best first."""
 OBVIOUS = 0.9
 """Least share of the variance by which a velocity is recognised without a name."""
-FEW_PAIRS = 400
-"""Number of pairs up to which all are compared: twenty columns, each with each."""
 MANY = 100.0
 """Least range of an encoder's counts; the level of a queue has a smaller one."""
 FROM_THE_BASE = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -217,14 +215,11 @@ def _by_behaviour(
 def _pairs(
     usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
 ) -> list[tuple[Meaning, Meaning]]:
-    """Return the pairs of columns that may be angle and velocity; of many only the likeliest."""
+    """Return the pairs of columns that are likeliest angle and velocity."""
     angles = [m for m in usable if not m.quantity]
     velocities = [m for m in usable if m.quantity in ("", "velocity")]
-    if len(angles) * len(velocities) <= FEW_PAIRS:
-        pairs = [(angle, velocity) for angle in angles for velocity in velocities]
-    else:
-        logged = ([_float(columns, m) for m in members] for members in (angles, velocities))
-        pairs = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]
+    logged = ([_float(columns, m) for m in members] for members in (angles, velocities))
+    pairs = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]
     return [(angle, velocity) for angle, velocity in pairs if angle is not velocity]
 
 

@@ -128,9 +128,6 @@ def _from_slope(
     ratio = _gear(slope, unit, velocity_named) if sure and velocity_named else None
     if ratio and velocity_named:
         reason += f", as of a motor that turns {ratio:g} times for one turn of the joint"
-        misnamed = _misnamed(slope, unit, velocity_named)
-        if misnamed:
-            reason += f"; or it is in {misnamed} despite its name"
         return Units(unit, why, sure, velocity_named, reason, False, sign, ratio)
     velocity = velocity_named or VELOCITY_OF[unit]
     return Units(unit, why, sure, velocity, f"{reason}, which no units explain", False, sign)
@@ -148,18 +145,6 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
     ratio = _turns(slope, unit, velocity)
     near = round(ratio) if abs(ratio - round(ratio)) < WHOLE * ratio else float(f"{ratio:.3g}")
     return float(near) if LEAST_GEAR < ratio < MOST_GEAR else None
-
-
-def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
-    """Return another unit of the velocity that explains a slope without a gear, if any."""
-    fitting = (
-        other
-        for other in VELOCITIES
-        if other != velocity
-        and UNITS[other].dimension == "angular velocity"
-        and abs(_turns(slope, unit, other) - 1.0) < NEAR
-    )
-    return next(fitting, None)
 
 
 def counts_in_a_turn(

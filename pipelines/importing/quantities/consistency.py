@@ -73,7 +73,7 @@ def likeliest_integrals(
         Indices of the angle and the velocity of each pair.
     """
     time_s, *columns = _middle(time_s, *angles, *velocities)
-    if len(time_s) < 5 * SPAN:
+    if len(time_s) < 5 * SPAN or not angles or not velocities:
         return []
     some = slice(None, None, -(-len(time_s) // max(FEWEST_SCREENED, MOST_SCREENED // len(columns))))
     whole = [_interpolated(column) for column in columns]
