@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipelines.acquisition.machine.row import Row
 from pipelines.acquisition.plan import Plan
@@ -62,28 +62,23 @@ class ProgressReport:
         """Report how far the run is with its last sample."""
         self._reported_at = time.monotonic()
         supervisor, plan = self._supervisor, self._plan
-        duration_s = (plan.stop - plan.first) / supervisor.rate
-        state, reason = supervisor.state, supervisor.why
-        enabled = supervisor.still_enabled
-        if row is None:
-            self._report(
-                Progress(state, duration_s=duration_s, abort=reason, still_enabled=enabled)
-            )
-            return
-        set_point = supervisor.progress.set_point(row)
-        samples = (set_point + 2) * row.samples_per_cycle
-        gaps = self._writer.gaps
-        self._report(
-            Progress(
-                state,
+        progress = Progress(
+            supervisor.state,
+            duration_s=(plan.stop - plan.first) / supervisor.rate,
+            abort=supervisor.why,
+            still_enabled=supervisor.still_enabled,
+        )
+        if row is not None:
+            set_point = supervisor.progress.set_point(row)
+            samples = (set_point + 2) * row.samples_per_cycle
+            gaps = self._writer.gaps
+            progress = replace(
+                progress,
                 time_s=(set_point - plan.first) / supervisor.rate,
-                duration_s=duration_s,
                 row=row,
                 samples=self._writer.rows,
                 missed=sum(count for _, count in gaps),
                 gaps=len(gaps),
                 rate_hz=samples / (self._reported_at - self._began_at),
-                abort=reason,
-                still_enabled=enabled,
             )
-        )
+        self._report(progress)

@@ -30,18 +30,13 @@ class Interpretation:
 
 def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     """Yield every other description of a register, the likeliest first."""
-    results = [Interpretation(*key) for key in _all(name, block)]
-    return iter(sorted((one for one in results if one.cost), key=lambda one: one.cost))
+    return iter(sorted((one for one in _all(name, block) if one.cost), key=lambda one: one.cost))
 
 
-def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
+def _all(name: str, block: Block) -> Iterator[Interpretation]:
     was = block.registers[name]
-    taken = {
-        a
-        for other, r in block.registers.items()
-        if other != name
-        for a in range(r.address, r.address + r.registers)
-    }
+    others = (register for other, register in block.registers.items() if other != name)
+    taken = {address for register in others for address in register.addresses}
     for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
         end = was.address + REGISTERS[kind]
         if end > block.address + block.count or taken & set(range(was.address, end)):
@@ -60,10 +55,12 @@ def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
         )
         if kind.startswith("float") and not was.type.startswith("float") and was.scale != 1.0:
             update["scale"] = 1.0  # a float is in its unit, not in counts
-        yield was.model_copy(update=update), swapped, _written(update, swapped), cost
+        register = was.model_copy(update=update)
+        yield Interpretation(register, swapped, _written(update, swapped), cost)
     for unit in DIMENSION[name]:
         if unit != was.unit:
-            yield was.model_copy(update={"unit": unit}), False, _written({"unit": unit}, False), 1
+            register = was.model_copy(update={"unit": unit})
+            yield Interpretation(register, False, _written({"unit": unit}, False), 1)
 
 
 def _written(update: dict, swapped: bool) -> str:

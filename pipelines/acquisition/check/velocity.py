@@ -57,19 +57,16 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
             f"velocity does not follow the angle (correlation {correlation:.2f}); compare"
             f" {where}.velocity with the device's manual",
         )
-    elif ratio < 0:
-        yield probe.finding(
-            f"velocity is negative where the angle grows ({ratio:.3g} of its rate of change,"
-            f" expected 1); change the sign of {where}.velocity.scale",
-        )
     elif abs(ratio - 1.0) > TOLERANCE:
         yield probe.finding(
             f"velocity is {ratio:.3g} times the rate of change of the angle, expected 1; "
-            f"{_unit(register, ratio, where)}",
+            f"{_remedy(register, ratio, where)}",
         )
 
 
-def _unit(register: Register, ratio: float, where: str) -> str:
+def _remedy(register: Register, ratio: float, where: str) -> str:
+    if ratio < 0.0:
+        return f"change the sign of {where}.velocity.scale"
     for unit in DIMENSION["velocity"]:
         if abs(ratio * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
             return (

@@ -40,7 +40,7 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
     """Refuse registers that overlap, or too many for one exchange."""
     taken: dict[int, str] = {}
     for quantity, register in registers.items():
-        for address in range(register.address, register.address + register.registers):
+        for address in register.addresses:
             if address in taken:
                 raise ValueError(
                     f"{name}.{quantity}: register {address} is part of {taken[address]} too"
@@ -91,11 +91,7 @@ def check_no_gap(block: Settings, name: str) -> None:
     ValueError
         Names the first register without a name.
     """
-    named = {
-        address
-        for register in registers_of(block).values()
-        for address in range(register.address, register.address + register.registers)
-    }
+    named = {address for register in registers_of(block).values() for address in register.addresses}
     unnamed = sorted(set(range(min(named), max(named))) - named)
     if unnamed:
         raise ValueError(

@@ -166,18 +166,14 @@ def check_margin(drives: Sequence[DriveSettings], margin_rad: float) -> None:
         Names the joint and its range.
     """
     for drive in drives:
-        for key, limits in (
-            ("angle_rad", drive.angle_rad),
-            ("with_human.angle_rad", drive.with_human.angle_rad),
-        ):
-            if limits is None:
-                continue
-            half_rad = (limits[1] - limits[0]) / 2.0
-            if not margin_rad < half_rad:
-                raise ValueError(
-                    f"safety.angle_margin_rad: found {margin_rad:g}, expected less than"
-                    f" {half_rad:g}, half of the {drive.joint}'s {key}; lower it"
-                )
+        # Limits with a wearer are within the others.
+        low, high = drive.with_human.angle_rad or drive.angle_rad
+        half_rad = (high - low) / 2.0
+        if not margin_rad < half_rad:
+            raise ValueError(
+                f"safety.angle_margin_rad: found {margin_rad:g}, expected less than"
+                f" {half_rad:g}, half of the {drive.joint}'s angle_rad; lower it"
+            )
 
 
 def check_set_points(drives: Sequence[DriveSettings], maps: Maps, safety: SafetySettings) -> None:

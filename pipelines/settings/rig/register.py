@@ -90,6 +90,11 @@ class Register(Settings):
         return REGISTERS[self.type]
 
     @property
+    def addresses(self) -> range:
+        """Addresses of its registers."""
+        return range(self.address, self.address + self.registers)
+
+    @property
     def si(self) -> tuple[float, float]:
         """SI units per count, and the SI value at a raw 0."""
         return self.scale * UNITS[self.unit], self.offset * UNITS[self.unit]

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from pipelines.settings.base import Settings
-from pipelines.settings.rig.block import check_block, check_no_gap
+from pipelines.settings.rig.block import check_block, check_counter, check_no_gap
 from pipelines.settings.rig.register import Register
 from pipelines.settings.rig.ring import RingSettings
 
@@ -160,12 +160,7 @@ class DriveMap(Settings):
         ):
             if register is None:
                 continue
-            if not register.is_plain_count:
-                raise ValueError(
-                    f"{name}: found {register.type} with scale {register.scale:g} and offset"
-                    f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or"
-                    " offset"
-                )
+            check_counter(register, name)
             for key, value in values.items():
                 if not register.holds(value, value):
                     raise ValueError(f"{key}: found 0x{value:X}, but {name} is a {register.type}")

@@ -131,7 +131,7 @@ def test_nothing_is_written_to_a_real_rig(checked):
             VELOCITY,
             VELOCITY.replace("1e-5", "-1e-5"),
             [
-                "velocity is negative where the angle grows",
+                "velocity is -",
                 "change the sign of map.drive.servo.read.velocity.scale",
             ],
         ),
