@@ -34,9 +34,7 @@ class JointBounds(Settings):
     """The bounds of each joint; defaults are the paper's Table 2."""
 
     hip: Bounds = Field(Bounds(angle_rad=(0.0872, 1.2217)), description="Hip, forward positive.")
-    knee: Bounds = Field(
-        Bounds(angle_rad=(-1.6232, -0.2269)), description="Knee, flexion negative."
-    )
+    knee: Bounds = Field(Bounds(angle_rad=(-1.6232, -0.2269)), description="Flexion negative.")
 
 
 class NoiseSettings(Settings):
@@ -57,17 +55,11 @@ class DesignSettings(Settings):
         "free", description='Mean angle of hip and knee, or "free" to search it too.'
     )
     criterion: Literal["log_det", "condition", "scaled_condition"] = Field(
-        "log_det",
-        description=(
-            "Quality of an excitation: log det of A'A/N, or the condition number of the"
-            " regressor, raw (the paper's) or with its columns scaled to unit norm."
-        ),
+        "log_det", description="log det of A'A/N, or condition number, raw or of scaled columns."
     )
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
     bounds: JointBounds = Field(JointBounds(), description="Of angle, speed and acceleration.")
-    topology: Literal["ring", "global"] = Field(
-        "ring", description="Neighbours whose best a particle follows: those on a ring, or all."
-    )
+    topology: Literal["ring", "global"] = Field("ring", description="Neighbours on a ring, or all.")
     particles: int = Field(128, ge=4, description="Size of the swarm.")
     iterations: int = Field(800, ge=1, description="Most moves of the swarm.")
     seconds: Positive = Field(60.0, description="Longest search, by this computer's clock.")

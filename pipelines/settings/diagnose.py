@@ -9,9 +9,5 @@ class DiagnoseSettings(Settings):
     """The diagnosis of effects that the model lacks."""
 
     known: tuple[str, ...] = Field(
-        (),
-        description=(
-            "Effects known to be present, such as `rotor_inertia@knee` or `parallel_spring@hip`."
-            " They are part of the baseline, and their size is fitted."
-        ),
+        (), description="Effects known to be present, as `rotor_inertia@knee`, with fitted size."
     )

@@ -30,14 +30,10 @@ def _four_runs() -> tuple[RunSettings, ...]:
 class Experiment(Settings):
     """All settings of one experiment; every key has a default."""
 
-    mechanism: MechanismSettings = Field(
-        MechanismSettings(), description="The machine's joints and geometry."
-    )
+    mechanism: MechanismSettings = Field(MechanismSettings(), description="Joints and geometry.")
     design: DesignSettings = Field(DesignSettings(), description="The excitation.")
     acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
-    run: tuple[RunSettings, ...] = Field(
-        default_factory=_four_runs, description="The runs, in order."
-    )
+    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="Runs, in order.")
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")

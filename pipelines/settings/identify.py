@@ -21,17 +21,8 @@ class IdentifySettings(Settings):
 
     figures: bool = Field(True, description="Draw figures next to the parameters, as PNG and PDF.")
     method: Method = Field(
-        "weighted_least_squares",
-        description=(
-            "Estimator of both steps; docs/estimators.md explains the choice. Instrumental"
-            " variables need set-points in the recording; they and output error hold whole runs in"
-            " memory."
-        ),
+        "weighted_least_squares", description="Estimator of both steps; see docs/estimators.md."
     )
     reversals: bool = Field(
-        False,
-        description=(
-            "Fit samples near a joint's reversals, too. The model's friction is wrong there, so"
-            " parameters are biased; for comparison with fits of other tools to every sample."
-        ),
+        False, description="Fit samples near a joint's reversals too, where friction is biased."
     )

@@ -23,6 +23,7 @@ LARGEST = 1e12
 PLACEHOLDERS = {"file", "folder", "purpose"}
 """Words in braces that a recording's name may have."""
 
+Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Factor = Annotated[float, Field(gt=0.0, le=LARGEST)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -32,18 +33,12 @@ class SourceSettings(Settings):
 
     delimiter: str | None = Field(None, description="The character between fields of a text file.")
     decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
-    comment: str | None = Field(
-        None, min_length=1, max_length=1, description="First character of lines to be skipped."
-    )
+    comment: str | None = Field(None, min_length=1, max_length=1, description="Mark of comments.")
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
     columns: tuple[str, ...] | None = Field(None, description="Columns of a text without a header.")
     encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
     table: str | None = Field(
-        None,
-        description=(
-            "Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic"
-            " (ROS)."
-        ),
+        None, description="Place of the columns: JSON key, HDF5 group, .mat struct, ROS topic."
     )
 
     @field_validator("delimiter")
@@ -63,15 +58,11 @@ class TimeSettings(Settings):
     column: str | None = Field(None, description="The column with the time stamps.")
     unit: str = Field("s", description="s, ms, us, ns, min, or iso8601 for dates written out.")
     wraps_at: Positive | None = Field(
-        None,
-        description="Reading at which the clock wraps around to 0, such as 4294967296 (32 bits).",
+        None, description="Reading at which the clock wraps around to 0, such as 4294967296."
     )
     rate_hz: Positive | None = Field(None, description="In place of a column: rows a second.")
     restarts: Literal["longest", "split"] = Field(
-        "longest",
-        description=(
-            "Where the clock starts over: keep the longest run, or make a recording of each."
-        ),
+        "longest", description="Where the clock starts over: keep the longest run, or split there."
     )
 
     @model_validator(mode="after")
@@ -89,40 +80,22 @@ class ReadingSettings(Settings):
 
     column: str | None = Field(None, description="Name of the column.")
     expression: str | None = Field(
-        None,
-        description=(
-            'In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".'
-        ),
+        None, description='In place of a column: arithmetic with columns, as "gtau * vir".'
     )
     unit: str = Field(description="Unit of the readings, after `scale`.")
     scale: float = Field(
         1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths."
     )
     sign: Literal[1, -1] = Field(1, description="-1 where the log counts the other way.")
-    zero: float = Field(0.0, ge=-LARGEST, le=LARGEST, description="Reading at the joint's zero.")
+    zero: Bounded = Field(0.0, description="Reading at the joint's zero.")
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
-        None,
-        description=(
-            "Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits"
-            " is -1."
-        ),
+        None, description="Bits of a signed register that was logged without its sign."
     )
     wraps_at: Factor | None = Field(
-        None,
-        description=(
-            "Raw reading at which a counter wraps around to 0 (65536, 360). Turns are counted"
-            " from the one in which the log begins nearest to `zero`. With it `signed_bits` has no"
-            " effect."
-        ),
+        None, description="Raw reading at which a counter wraps around to 0, such as 65536 or 360."
     )
-    begins_at: float | None = Field(
-        None,
-        ge=-LARGEST,
-        le=LARGEST,
-        description=(
-            "Approximate raw reading at which each log begins, turns counted, where that is not"
-            " near `zero`."
-        ),
+    begins_at: Bounded | None = Field(
+        None, description="Approximate raw reading at which each log begins, turns counted."
     )
     range: tuple[float, float] | None = Field(None, description="Lowest and highest raw reading.")
     time: str | None = Field(None, description="Column with this channel's own time stamps.")
@@ -234,16 +207,10 @@ class RecordingSettings(Settings):
     """A recording of each file: all of it, or a span."""
 
     name: str = Field(
-        "{file}_{purpose}",
-        description=(
-            "Its name; {file} is the source's name without its ending, {folder} that of its folder."
-        ),
+        "{file}_{purpose}", description="Its name, of {file}, {folder} and {purpose}."
     )
     files: str = Field(
-        "*",
-        description=(
-            'Pattern of its files, such as "swing_0[0-2].csv", or with folder, "run1/*.csv".'
-        ),
+        "*", description='Pattern of its files, such as "swing_0[0-2].csv" or "run1/*.csv".'
     )
     purpose: Literal["train", "validate"] = Field(description="To fit to, or to judge the fit.")
     run: Literal["exo_alone", "with_human"] = Field(

@@ -26,26 +26,15 @@ class MechanismSettings(Settings):
 
     name: str = Field(
         "leg",
-        pattern=r"^[a-z][a-z0-9_]*$",
-        description=(
-            '"leg": two revolute joints in series, any double pendulum. "single": one joint. '
-            "Or a mechanism of your own, by its name."
-        ),
+        pattern="^[a-z][a-z0-9_]*$",
+        description='"leg" (two revolute joints), "single", or a mechanism of your own.',
     )
     joints: tuple[JointSettings, ...] = Field(
-        (),
-        description=(
-            "Name and kind of each joint from the base on; a leg without it has hip and knee, a"
-            " single one revolute joint."
-        ),
+        (), description="Name and kind of each joint, from the base on; optional for the usual."
     )
     thigh_length_m: Length = Field(0.38952, description="First axis to second; the paper's leg.")
     gravity_m_s2: Gravity = Field(
-        9.8,
-        description=(
-            "Acceleration of gravity; the paper's value. 0 for joints with vertical axes and for"
-            " level slides."
-        ),
+        9.8, description="Gravity, the paper's value; 0 for vertical axes and level slides."
     )
 
     @model_validator(mode="after")

@@ -55,9 +55,7 @@ class DriveSettings(DeviceSettings):
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
     speed_rad_s: Positive = Field(description="Highest speed, either way.")
     torque_nm: Positive = Field(description="Highest torque at the joint, either way.")
-    with_human: HumanDriveSettings = Field(
-        HumanDriveSettings(), description="Tighter limits of runs with_human."
-    )
+    with_human: HumanDriveSettings = Field(HumanDriveSettings(), description="Limits with_human.")
 
     @model_validator(mode="after")
     def _limits_are_in_order(self) -> Self:
@@ -93,13 +91,7 @@ class SensorSettings(DeviceSettings):
         description="Where it sits."
     )
     every: int = Field(
-        1,
-        ge=1,
-        le=MOST_EVERY,
-        description=(
-            "Cycles from one reading to the next; rows between hold no force. Sensors with the same"
-            " number take turns."
-        ),
+        1, ge=1, le=MOST_EVERY, description="Cycles between two readings; equal ones take turns."
     )
 
 

@@ -131,8 +131,7 @@ class RtuLine(Line):
     parity: Literal["even", "odd", "none"] = Field("even", description="Parity bit.")
     stop_bits: Literal[1, 2] = Field(1, description="Stop bits; 2 is the standard without parity.")
     silence_s: NotNegative | None = Field(
-        None,
-        description="Quiet time before each frame; else the standard's, 3.5 characters or 1.75 ms.",
+        None, description="Quiet time before each frame; else the standard's."
     )
 
     @property

@@ -54,10 +54,7 @@ class PlantSettings(Settings):
     rest_rad: Pair = Field((0.0, 0.0), description="Where the leg hangs before a run.")
     sample_rate_hz: Positive = Field(200.0, description="Samples a second that the devices latch.")
     heartbeat_s: Positive | None = Field(
-        None,
-        description=(
-            "Time without a set-point after which a drive slows down and disables itself."
-        ),
+        None, description="Time without a set-point after which a drive disables itself."
     )
     clock_ppm: Pair = Field((0.0, 0.0), description="How much too fast each drive's clock is.")
     clock_offset_s: Pair = Field((0.0, 0.0), description="Each drive's clock at the start.")

@@ -55,11 +55,7 @@ class DriveMap(Settings):
     read: DriveRead = Field(description="Block that is read.")
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     own_scale: bool = Field(
-        False,
-        description=(
-            "Set-points and angles agree although their type, order, scale or offset differ; else"
-            " a difference is refused."
-        ),
+        False, description="Set-points agree with angles though their registers differ."
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
@@ -67,8 +63,7 @@ class DriveMap(Settings):
     fault_reset: int | None = Field(None, description="Control word that clears a fault.")
     fault_mask: int = Field(0, ge=0, description="Bits of the status that mean a fault.")
     faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
-        default_factory=dict,
-        description="Meaning of each fault bit, by its number; bit 0 is the lowest.",
+        default_factory=dict, description="Meaning of each fault bit, by its number."
     )
     enabled_mask: int = Field(0, ge=0, description="Bits of the status that show it is enabled.")
     enabled_value: int = Field(0, ge=0, description="Value of these bits while it is enabled.")

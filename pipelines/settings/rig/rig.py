@@ -34,24 +34,16 @@ class RigSettings(Settings):
     name: Annotated[str, Field(min_length=1)] = Field(description="Name that recordings carry.")
     embedded: bool = Field(False, description="Whether `exoid acquire` starts the virtual rig.")
     clock: Literal["lockstep", "real_time"] = Field(
-        "real_time",
-        description="Devices sample on their own clock, or (virtual rigs) once for each exchange.",
+        "real_time", description="Devices' own clock, or (virtual rigs) a sample each exchange."
     )
-    clocks: Literal["common", "own"] = Field(
-        "common", description="Drives sample at the same instants, or each by a clock of its own."
-    )
+    clocks: Literal["common", "own"] = Field("common", description="Of all drives, or of each one.")
     sampling: Literal["cyclic", "recorder"] = Field(
-        "cyclic",
-        description=(
-            "Samples are fetched with each set-point, or drained from the drives' own rings."
-        ),
+        "cyclic", description="Samples come with each set-point, or from the drives' own rings."
     )
     record_rate_hz: Positive | None = Field(None, description="Samples a second in the rings.")
     drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
     sensor: tuple[SensorSettings, ...] = Field((), description="Cuff sensors, read with a human.")
-    line: dict[str, LineSettings] = Field(
-        default_factory=dict, description="Lines that devices share, by name."
-    )
+    line: dict[str, LineSettings] = Field(default_factory=dict, description="Shared lines by name.")
     map: Maps = Field(description="Register maps.")
     safety: SafetySettings = Field(SafetySettings(), description="What stops a run, and how.")
     geometry: GeometrySettings = Field(GeometrySettings(), description="The leg in this rig.")

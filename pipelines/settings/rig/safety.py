@@ -15,9 +15,7 @@ class HumanSafetySettings(Settings):
     """Limits that stop a run with a wearer; others are as without."""
 
     cuff_force_n: Positive | None = Field(None, description="Highest force on a cuff's axis.")
-    following_error_rad: Positive | None = Field(
-        None, description="Farthest an angle may be from its set-point."
-    )
+    following_error_rad: Positive | None = Field(None, description="Largest error of the angle.")
 
 
 class SafetySettings(Settings):
@@ -25,24 +23,16 @@ class SafetySettings(Settings):
 
     angle_margin_rad: NotNegative = Field(0.02, description="Set-points' least distance to limits.")
     cuff_force_n: Positive = Field(400.0, description="Highest force on a cuff's axis.")
-    following_error_rad: Positive = Field(
-        0.15, description="Farthest an angle may be from its set-point."
-    )
+    following_error_rad: Positive = Field(0.15, description="Largest error of the angle.")
     watchdog_s: Positive = Field(0.1, description="Longest wait for a device's next sample.")
     reply_s: Positive | None = Field(None, description="Wait in motion; else 0.3 of watchdog_s.")
     heartbeat_s: Positive | None = Field(None, description="Time-out that is set in the drives.")
     connect_s: Positive = Field(5.0, description="Longest wait for a line or reply before motion.")
     control_s: Positive = Field(1.0, description="Longest time a control word may take.")
-    deceleration_rad_s2: float = Field(
-        8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down."
-    )
-    ramp_s: float = Field(
-        3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back."
-    )
+    deceleration_rad_s2: float = Field(8.0, gt=0.0, le=100.0, description="Deceleration of a stop.")
+    ramp_s: float = Field(3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way in, and back.")
     settle_s: NotNegative = Field(1.0, description="Motion before the recording begins.")
-    with_human: HumanSafetySettings = Field(
-        HumanSafetySettings(), description="Tighter limits of runs with_human."
-    )
+    with_human: HumanSafetySettings = Field(HumanSafetySettings(), description="Limits with_human.")
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
