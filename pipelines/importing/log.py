@@ -119,8 +119,7 @@ class Log:
             picked[name] = values if len(values) == 1 else values[run.rows]
         if all(len(self.columns[name]) == 1 for name in names):
             raise InputError(
-                f"{channel.where}: {', '.join(names)} have one row each, expected one for each"
-                " stamp"
+                f"{channel.where}: {', '.join(names)} have one row each, expected one a stamp"
             )
         note = noting(channel.target, findings)
         return quantity(channel.reading, channel.gain, picked, channel.target, note)
@@ -131,10 +130,7 @@ class Log:
         stamps = clock.stamps(self.columns[str(reading.time)], self.settings, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
-            raise InputError(
-                f"{channel.where} and its clock {reading.time!r} differ in length; name its own"
-                " clock"
-            )
+            raise InputError(f"{channel.where} and its clock {reading.time!r} differ in length")
         note = noting(channel.target, findings)
         values = quantity(reading, channel.gain, columns, channel.target, note)
         known = np.isfinite(values)

@@ -380,7 +380,4 @@ def refuse_to_overwrite(path: Path) -> None:
     RECORDING.refuse_place(path)
     metadata = metadata_of(path)
     if metadata.get("contract") == RECORDING.label and "imported" not in metadata:
-        raise ContractError(
-            f"{path}: holds a recording that was not imported, not overwritten; choose another"
-            " folder"
-        )
+        raise ContractError(f"{path}: holds a recording that was not imported, not overwritten")

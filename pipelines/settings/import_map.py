@@ -301,8 +301,7 @@ class ImportMap(Settings):
                 owner = owners.setdefault(reading.column, place)
                 if owner != place:
                     raise ValueError(
-                        f"{place}.column: found {reading.column!r}, which is also {owner}; correct"
-                        " one"
+                        f"{place}.column: found {reading.column!r}, which is also {owner}"
                     )
         return self
 

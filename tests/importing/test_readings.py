@@ -290,7 +290,7 @@ def test_a_counter_begins_in_the_turn_nearest_to_zero_whatever_turn_it_is_logged
     assert (
         "begins at 64906 of 65536; taken for -630, in the turn nearest to 1000" in outcome.printed
     ) is not signed
-    assert "turns apart" not in outcome.printed
+    assert "turn apart" not in outcome.printed
 
 
 def test_logs_that_begin_more_than_half_a_turn_apart_are_reported_and_begins_at_settles_it(
@@ -310,11 +310,11 @@ def test_logs_that_begin_more_than_half_a_turn_apart_are_reported_and_begins_at_
     )
     text = text.replace('name = "whole"', 'name = "{file}"')
     outcome = imported(*files, map_text=text)
-    assert "begins at -3.122 and in a.csv at 3.122, 1 turns apart; kept" in outcome.printed
+    assert "begins at -3.122, in a.csv at 3.122, 1 turn apart; kept" in outcome.printed
     findings = outcome.recording("b").metadata["imported"]["findings"]
-    assert any("turns apart" in finding["found"] for finding in findings)
+    assert any("turn apart" in finding["found"] for finding in findings)
     settled = imported(*files, map_text=text.replace("wraps_at", "begins_at = 180, wraps_at"))
-    assert "turns apart" not in settled.printed
+    assert "turn apart" not in settled.printed
     assert_allclose(
         settled.recording("b").frame["pivot_angle_rad"], pendulum.angle + np.pi + 0.02, atol=1e-12
     )

@@ -147,10 +147,8 @@ def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]
         "current": Expectation(
             -current,
             current,
-            f"expected less than {current:.2g} A of a disabled drive ({TORQUE_AT_REST:.0%} of its"
-            " torque_nm)",
-            "does another master drive it? Disable it there, or compare {where} with the device's"
-            " manual",
+            f"expected less than {current:.2g} A of a disabled drive",
+            "does another master drive it? Else compare {where} with its manual",
         ),
         "temperature": Expectation(
             *TEMPERATURE_C,

@@ -87,7 +87,7 @@ def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
     )
     yield Finding(
         "rig",
-        f"all devices can be asked {rate.cycles_hz:.0f} times a second (drives alone:"
-        f" {drives.cycles_hz:.0f}), and {rate.late:.0%} of the cycles are too long at {rate_hz:g}"
-        f" Hz; {remedy}",
+        f"all devices can be asked {rate.cycles_hz:.0f} times a second (drives:"
+        f" {drives.cycles_hz:.0f}), {rate.late:.0%} of the cycles are too long at {rate_hz:g} Hz;"
+        f" {remedy}",
     )

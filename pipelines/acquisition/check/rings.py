@@ -61,10 +61,7 @@ async def _fault(
         try:
             records = await drive.drain(reading.sequence)
         except DeviceError as error:
-            return (
-                f"its record cannot be drained ({error}); compare {_where(drive)} with the device's"
-                " manual"
-            )
+            return f"its record cannot be drained ({error}); correct {_where(drive)}"
         for record in records:
             history.add(record.sequence, record.reference)  # none is sent: the drive's own
             agreement.check(record)
@@ -73,10 +70,7 @@ async def _fault(
     for probe in drives:
         probe.take()
     if not begun:
-        return (
-            f"its record brought no sample in {DRAINS} cycles; compare {_where(drive)} with the"
-            " device's manual"
-        )
+        return f"its record brought no sample in {DRAINS} cycles; correct {_where(drive)}"
     return None
 
 

@@ -69,8 +69,5 @@ def _remedy(register: Register, ratio: float, where: str) -> str:
         return f"change the sign of {where}.velocity.scale"
     for unit in DIMENSION["velocity"]:
         if abs(ratio * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
-            return (
-                f'with unit = "{unit}" the two agree: correct {where}.velocity, or the angle\'s'
-                " unit"
-            )
+            return f'with unit = "{unit}" the two agree: correct {where}.velocity'
     return f"correct {where}.velocity.scale (or the gear ratio in it), or the angle's unit"

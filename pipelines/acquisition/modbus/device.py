@@ -78,8 +78,7 @@ class Device:
             if value != entry.value:
                 raise DeviceError(
                     f"{self.label}: identity register {entry.address} holds 0x{value:04X}, expected"
-                    f" 0x{entry.value:04X}: it is another device; check cabling, unit id and rig"
-                    " file"
+                    f" 0x{entry.value:04X}: it is another device; check cabling and unit id"
                 )
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
@@ -196,8 +195,7 @@ class Device:
         if words is not None and len(response.registers) != words:
             raise DeviceError(
                 f"{self.label}: answered {action} with {len(response.registers)} registers,"
-                f" expected {words}; compare the register map in the rig file with the device's"
-                " manual"
+                f" expected {words}; compare its register map with the manual"
             )
         return list(response.registers)
 

@@ -43,8 +43,7 @@ def _contradiction(map_: DriveMap) -> str | None:
     key, one, other = difference
     return (
         f"{key}: found {one} with {other} of read.angle, expected the same, else the drive leaps"
-        " when it is enabled; correct one, or set own_scale = true next to `enable` if both are"
-        " right"
+        " when it is enabled; correct one, or set own_scale = true next to `enable`"
     )
 
 

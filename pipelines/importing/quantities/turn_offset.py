@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.finding import Finding
+from pipelines.importing.finding import Finding, counted
 
 
 class Beginnings:
@@ -42,7 +42,7 @@ class Beginnings:
             away = round((begins - first) / turn)
             if away:
                 seen = (
-                    f"begins at {begins:.4g} and in {first_log} at {first:.4g}, {abs(away)} turns"
+                    f"begins at {begins:.4g}, in {first_log} at {first:.4g}, {abs(away)} turns"
                     " apart"
                 )
                 yield Finding(
