@@ -42,8 +42,8 @@ class Beginnings:
             away = round((begins - first) / turn)
             if away:
                 seen = (
-                    f"begins at {begins:.4g}, in {first_log} at {first:.4g}, {abs(away)} turns"
-                    " apart"
+                    f"begins at {begins:.4g}, in {first_log} at {first:.4g},"
+                    f" {counted(abs(away), 'turn')} apart"
                 )
                 yield Finding(
                     name, seen, "kept; if all logs begin at the same reading, set begins_at to it"
