@@ -24,6 +24,10 @@ class Rate:
     late: float
     """Share of cycles that are longer than a sample; 0 where no rate is known."""
 
+    def as_json(self) -> dict:
+        """Return it as JSON objects."""
+        return {"cycles_hz": self.cycles_hz, "late": self.late, "cycle": self.cycle.as_json()}
+
 
 async def cycles(
     probes: Sequence[Probe], seconds: float, rate_hz: float | None, fewest: int = 20

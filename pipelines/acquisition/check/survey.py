@@ -71,24 +71,13 @@ class RigReport:
 
     def as_json(self) -> dict:
         """Return it as JSON objects."""
-        rates = {"together": self.together, "drives_alone": self.drives_alone}
         return {
             "rate_hz": self.rate_hz,
             "by_hand": self.by_hand,
             "moved": [asdict(answer) for answer in self.answers],
             "devices": [device.as_json() for device in self.devices],
-            **{
-                name: (
-                    {
-                        "cycles_hz": rate.cycles_hz,
-                        "late": rate.late,
-                        "cycle": rate.cycle.as_json(),
-                    }
-                    if rate
-                    else None
-                )
-                for name, rate in rates.items()
-            },
+            "together": self.together and self.together.as_json(),
+            "drives_alone": self.drives_alone and self.drives_alone.as_json(),
             "findings": [asdict(finding) for finding in self.findings],
         }
 
