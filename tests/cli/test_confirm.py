@@ -164,7 +164,7 @@ def test_a_motion_beyond_the_limits_with_a_person_is_refused_before_the_question
     rig.write_text(rig.read_text().replace("speed_rad_s = 2.2", "speed_rad_s = 0.5"))
     outcome = exoid(*arguments)
     assert outcome.code == 2
-    assert "but the rig allows 0.5 rad/s" in outcome.err
+    assert "but the rig allows -0.5 to 0.5 rad/s" in outcome.err
     assert "[y/N]" not in outcome.err
 
 

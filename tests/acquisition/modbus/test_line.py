@@ -309,7 +309,9 @@ def test_a_serial_port_that_another_program_uses_is_not_shared(serve, on_line, l
 
 def test_a_serial_port_without_permission_says_how_to_get_it():
     # As root, who may everything, tests cannot meet the real thing.
-    assert "join its group" in explain(serial.SerialException(errno.EACCES, "Permission denied"))
+    assert "usermod -aG dialout" in explain(
+        serial.SerialException(errno.EACCES, "Permission denied")
+    )
 
 
 def test_a_path_that_is_no_serial_port_is_refused(on_line, line_of, tmp_path):

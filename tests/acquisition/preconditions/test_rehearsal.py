@@ -19,7 +19,7 @@ def slowly(record):
     def run(takes_s, who, run):
         written, seen = set(), []
 
-        def slow(device, function, written):
+        def slow(device, function, words):
             written.update({device} if function == EXCHANGE else ())
             if seen and device in getattr(seen[0].rig, who):
                 time.sleep(takes_s)
