@@ -22,12 +22,6 @@ from pipelines.settings.rig.line import (
     refuse_passphrase,
 )
 
-CERTIFICATE_ADVICE = {
-    9: "set the clocks of this computer and of the rig, or wait until it is valid",
-    10: "renew it at the rig, or set this computer's clock if that is wrong",
-}
-"""Remedies for certificates that are not valid now, by OpenSSL's error code."""
-
 
 def client_of(
     settings: LineSettings,
@@ -89,11 +83,8 @@ def explain(error: OSError) -> str:
     if isinstance(error, socket.gaierror):
         return f"no such host ({error.strerror}); correct host in the rig file, or give its address"
     if isinstance(error, ssl.SSLCertVerificationError):
-        advice = CERTIFICATE_ADVICE.get(
-            error.verify_code,
-            "set ca to its issuer's certificate, and host to the name in it",
-        )
-        return f"its certificate is not trusted ({error.verify_message.rstrip('.')}); {advice}"
+        reason = error.verify_message.rstrip(".")
+        return f"its certificate is not trusted ({reason}); check ca, host and both clocks"
     if isinstance(error, TimeoutError):
         return "no TLS connection within safety.connect_s; check that rig and port speak TLS"
     if isinstance(error, ssl.SSLError):

@@ -340,14 +340,10 @@ def test_a_rig_whose_certificate_has_no_trusted_issuer_is_not_trusted(
 
 
 @pytest.mark.parametrize(
-    ("days", "reason", "advice"),
-    [
-        (-2, "certificate has expired", "renew it at the rig"),
-        (2, "certificate is not yet valid", "set the clocks"),
-    ],
+    ("days", "reason"), [(-2, "certificate has expired"), (2, "certificate is not yet valid")]
 )
 def test_a_certificate_that_is_not_valid_now_is_reported_as_that(
-    serve, on_line, line_of, certificates, tmp_path, days, reason, advice
+    serve, on_line, line_of, certificates, tmp_path, days, reason
 ):
     stamp = [f"{datetime.now(UTC) + timedelta(days=days + more):%Y%m%d%H%M%SZ}" for more in (0, 1)]
     (tmp_path / "ca.cnf").write_text(
@@ -384,7 +380,7 @@ def test_a_certificate_that_is_not_valid_now_is_reported_as_that(
     path = on_line(line_of("tls", **timed))
     with serve(path, None):
         why = connecting(path)
-    assert f"its certificate is not trusted ({reason}); {advice}" in why
+    assert f"its certificate is not trusted ({reason}); check ca, host and both clocks" in why
 
 
 @pytest.mark.parametrize("shown", ["", r"\1 = '\2other.\3'\n"], ids=["none", "another's"])
