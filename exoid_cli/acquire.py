@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from pipelines.settings import Experiment
     from pipelines.settings.rig import RigSettings
 
-LINE_S = 5.0
-"""Time between lines of progress where there is no terminal, s."""
-
 
 def acquire(
     context: typer.Context,
@@ -185,6 +182,8 @@ def _record(
 @contextmanager
 def _run_view(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], None]]:
     """Show a run: a picture on a terminal, else a line every 5 s and at each change of state."""
+    # Time between lines of progress where there is no terminal, s.
+    line_s = 5.0
     from exoid_cli.operator_view import OperatorView, plain_line
 
     view, last_line, last_state = OperatorView(rig, run), float("-inf"), None
@@ -194,7 +193,7 @@ def _run_view(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], N
         view.update(progress)
         if console.err.is_terminal or not console.speaks:
             return
-        if progress.state is not last_state or time.monotonic() - last_line >= LINE_S:
+        if progress.state is not last_state or time.monotonic() - last_line >= line_s:
             last_line, last_state = time.monotonic(), progress.state
             printer.print(plain_line(progress))
 

@@ -111,12 +111,6 @@ def options(
     console.add_options(quiet=quiet, json=json)
 
 
-INTERRUPTED = 130
-"""The exit code that typer makes of KeyboardInterrupt."""
-BROKEN_PIPE = 128 + 13
-"""Exit code of a stop by SIGPIPE, as in shells; Windows has no such signal."""
-
-
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
     if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
@@ -187,18 +181,22 @@ def _fail(text: str, code: int) -> int:
 
 def _broken_pipe() -> int:
     """Discard further output, which nobody reads after ``exoid effects | head -1``."""
+    # Exit code of a stop by SIGPIPE, as in shells; Windows has no such signal.
+    broken_pipe = 128 + 13
     with open(os.devnull, "w") as devnull:
         os.dup2(devnull.fileno(), sys.stdout.fileno())
-    return BROKEN_PIPE
+    return broken_pipe
 
 
 def _command_line(arguments: Sequence[str]) -> int:
+    # The exit code that typer makes of KeyboardInterrupt.
+    interrupted = 130
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
     code = command.main(
         args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False
     )
-    if code == INTERRUPTED:
+    if code == interrupted:
         raise KeyboardInterrupt  # typer returns the exit code only, without a message
     return code or 0
 

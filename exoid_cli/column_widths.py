@@ -5,14 +5,13 @@ from collections.abc import Sequence
 
 from rich.cells import cell_len
 
-GAP = 2
-"""Spaces between columns."""
-
 
 def column_widths(
     headings: Sequence[str], rows: Sequence[Sequence[str]], width: int
 ) -> list[int | None]:
     """Return each column's width; None for all where no line needs or allows a break."""
+    # Spaces between columns.
+    gap = 2
     table = [[heading, *cells] for heading, *cells in zip(headings, *rows, strict=True)]
     wanted = [
         max(cell_len(line) for text in column for line in text.split("\n")) for column in table
@@ -20,7 +19,7 @@ def column_widths(
     widths = [
         max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table
     ]
-    room = width - GAP * (len(table) - 1)
+    room = width - gap * (len(table) - 1)
     if sum(wanted) <= room or sum(widths) > room:
         return [None] * len(table)
     for _ in range(room - sum(widths)):

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text
 
-DRAWING_S = 0.0005
-"""Longest time that drawing a live picture may delay other threads, s."""
 LATE_S = 5.0
 """Time after which a start that shows nothing needs a line of explanation, s."""
 
@@ -219,13 +217,15 @@ class Console:
         A thread of its own draws it on the alternate screen, so that it survives a resized window.
         The last picture is printed below the earlier output.
         """
+        # Longest time that drawing a live picture may delay other threads, s.
+        drawing_s = 0.0005
         if not self._may_move:
             yield
             return
         from rich.live import Live
 
         interval = sys.getswitchinterval()
-        sys.setswitchinterval(DRAWING_S)
+        sys.setswitchinterval(drawing_s)
         try:
             with Live(picture, console=self.err, screen=True, refresh_per_second=10):
                 yield

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from pipelines.importing.recordings import Imported
     from pipelines.settings.import_map import ImportMap
 
-FEW = 3
-"""Most logs whose findings are all printed."""
-
 
 def import_(
     files: Annotated[
@@ -80,6 +77,8 @@ def _propose(files: list[Path], map_file: Path | None) -> None:
 
 
 def _import(files: list[Path], map_: Path, output: Path) -> None:
+    # Most logs whose findings are all printed.
+    few = 3
     from pipelines.contracts.atomic import folder_to_fill, leftovers
     from pipelines.importing.sanity.leftover_recordings import unused
     from pipelines.settings.import_map import load_map
@@ -95,7 +94,7 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
         logs = _recordings(files, settings, map_, output)
     for recording in unused(settings, files):
         console.warn(f"{map_}: {recording}")
-    if len(logs) > FEW:
+    if len(logs) > few:
         _say_in_short(logs)
     else:
         for log in logs:

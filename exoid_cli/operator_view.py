@@ -17,12 +17,6 @@ if TYPE_CHECKING:
 CUFFS = ("thigh front", "thigh back", "shank front", "shank back")
 NEAR = 0.05
 """Share of the range between two limits within which one of them is near."""
-SHOWN_S = 3.0
-"""Time for which a warning stays after its cause is over, s; a shorter one would be missed."""
-BAR = 13
-"""Columns of a bar."""
-ABORT_LINES = 3
-"""Most lines of the reason for a stop."""
 
 # Blue and orange differ to everyone, and words repeat whatever a colour says.
 PLAIN, CALM, URGENT, FAINT = (
@@ -56,9 +50,11 @@ class Gauge(NamedTuple):
 
     def line(self) -> Line:
         """Return value and bar; an exclamation mark shows that a limit is near."""
+        # Columns of a bar.
+        bar = 13
         if np.isnan(self.value):
             return [(f"{self.name:<11}   not read", FAINT)]
-        position = round(min(max(self.share, 0.0), 1.0) * (BAR - 1))
+        position = round(min(max(self.share, 0.0), 1.0) * (bar - 1))
         style = URGENT if self.near else CALM
         value = f"{self.value:+.2f} {self.unit}"
         return [
@@ -67,7 +63,7 @@ class Gauge(NamedTuple):
             (f"{self.low:>6g} ", FAINT),
             ("─" * position, FAINT),
             ("█", style),
-            ("─" * (BAR - 1 - position), FAINT),
+            ("─" * (bar - 1 - position), FAINT),
             (f" {self.high:<5g}", FAINT),
         ]
 
@@ -101,6 +97,8 @@ class OperatorView:
 
     def alert(self) -> str:
         """Return the instruction or warning in capitals; empty if all is well."""
+        # Time for which a warning stays after its cause is over, s; a shorter one would be missed.
+        shown_s = 3.0
         progress, now = self._progress, time.monotonic()
         if progress is None:
             return ""
@@ -108,9 +106,9 @@ class OperatorView:
             return "PRESS E-STOP"
         if progress.abort is not None:
             return "ABORT"
-        if now - self._near_at < SHOWN_S:
+        if now - self._near_at < shown_s:
             return "LIMIT NEAR"
-        return "SAMPLES LOST" if now - self._lost_at < SHOWN_S else ""
+        return "SAMPLES LOST" if now - self._lost_at < shown_s else ""
 
     def _gauges(self) -> list[Gauge]:
         """Return every value that has limits, in the order shown."""
@@ -145,11 +143,13 @@ class OperatorView:
             yield cut
 
     def _lines(self, width: int) -> list[Line]:
+        # Most lines of the reason for a stop.
+        abort_lines = 3
         progress = self._progress
         if progress is None:
             return []
         reason = wrap(
-            progress.abort or "", max(width - 1, 4), max_lines=ABORT_LINES, placeholder="..."
+            progress.abort or "", max(width - 1, 4), max_lines=abort_lines, placeholder="..."
         )
         head = [self._head(progress, width), *[[(text, URGENT)] for text in reason], []]
         gauges = [gauge.line() for gauge in self._gauges()]

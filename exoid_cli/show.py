@@ -12,12 +12,8 @@ if TYPE_CHECKING:
 
 HASH = 12
 """Characters of a hash that are shown, enough to distinguish files."""
-FIRST = 10
-"""Candidates that are shown."""
 COLUMNS = 8
 """Most columns of a table that lists objects."""
-FEW = 6
-"""Elements of a list that are shown."""
 
 
 def show(
@@ -88,17 +84,19 @@ def _show_content(inspection: "Inspection") -> bool:
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     """Print the decision on each of the first candidates, and its reason."""
+    # Candidates that are shown.
+    first = 10
     from pipelines.wording.causes import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
-    for row in rows[:FIRST]:
+    for row in rows[:first]:
         console.say(
             f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}:"
             f" {row['verdict']}"
         )
         console.note(labels_in_words(row["reason"], labels))
-    if len(rows) > FIRST:
-        console.say(f"\n{len(rows) - FIRST} more are in the file")
+    if len(rows) > first:
+        console.say(f"\n{len(rows) - first} more are in the file")
 
 
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:
@@ -158,8 +156,10 @@ def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
 
 
 def _in_short(value: Any) -> str:
+    # Elements of a list that are shown.
+    few = 6
     if isinstance(value, list) and (
-        len(value) > FEW or any(isinstance(item, list) for item in value)
+        len(value) > few or any(isinstance(item, list) for item in value)
     ):
         rows = f"{len(value)} x {len(value[0])}" if isinstance(value[0], list) else str(len(value))
         return f"{rows} values; --json shows them"

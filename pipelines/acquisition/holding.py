@@ -9,9 +9,6 @@ from pipelines.acquisition.safety.set_point_tracker import SLACK_SAMPLES
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.errors import Unanswered
 
-LOOK_PAUSE = 0.25
-"""Share of a sample between two looks whether a drive is sent nothing."""
-
 
 class Holding:
     """One task a drive, for as long as the plan is followed."""
@@ -37,6 +34,8 @@ class Holding:
 
         Raise as soon as something is wrong, for whoever awaits does not see it.
         """
+        # Share of a sample between two looks whether a drive is sent nothing.
+        look_pause = 0.25
         drive = self._exchange.machine.drives[joint]
         period = 1.0 / self._supervisor.rate
         patience, look_at = SLACK_SAMPLES * period, 0.0
@@ -47,13 +46,13 @@ class Holding:
                 async with asyncio.timeout(due - time.monotonic()):
                     await self._ended.wait()
                     return
-            is_delayed = time.monotonic() - due > LOOK_PAUSE * period
+            is_delayed = time.monotonic() - due > look_pause * period
             self._exchange.refuse_signals()
             self._supervisor.reason.refuse()
             if self._exchange.sent_at(joint) != sent_at:  # no drive is awaited for long
                 patience = SLACK_SAMPLES * period
             elif drive.device.awaited_s > period:  # it is the one that is awaited
-                look_at = time.monotonic() + LOOK_PAUSE * period
+                look_at = time.monotonic() + look_pause * period
             # This computer was late, and so with the plan: following it goes first.
             elif is_delayed and due > look_at:
                 look_at = time.monotonic() + period

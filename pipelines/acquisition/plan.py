@@ -18,9 +18,6 @@ from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.safety import LONGEST_RAMP_S
 
-RAMP_GROWTH = 1.2
-"""Factor by which a ramp that breaks a speed limit is lengthened."""
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -144,6 +141,8 @@ def _ramp(
     end_s: float,
 ) -> NDArray:
     """Return the shortest ramp (n, J) from or to rest that keeps the limits, and settles before."""
+    # Factor by which a ramp that breaks a speed limit is lengthened.
+    ramp_growth = 1.2
     ramp_s = rig.safety.ramp_s
     settle_s = rig.safety.settle_s if before else 0.0
     limits = np.array([drive.speed_rad_s for drive in rig.drive])
@@ -158,7 +157,7 @@ def _ramp(
         speed = np.abs(np.diff(path, axis=0)).max(axis=0) * rate
         if (speed <= limits).all():
             return reference
-        ramp_s *= RAMP_GROWTH
+        ramp_s *= ramp_growth
     slowest = rig.drive[int(np.argmax(speed / limits))]
     raise InputError(
         f"no ramp of at most {LONGEST_RAMP_S:g} s leads the {slowest.joint} between rest and the"

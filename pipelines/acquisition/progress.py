@@ -10,9 +10,6 @@ from pipelines.acquisition.recording.sample_writer import SampleWriter
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.states import State
 
-REPORT_S = 0.1
-"""Time between two reports."""
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -55,7 +52,9 @@ class ProgressReport:
 
     def report_seldom(self, row: Row) -> None:
         """Report, unless the last report was a moment ago."""
-        if time.monotonic() - self._reported_at >= REPORT_S:
+        # Time between two reports.
+        report_s = 0.1
+        if time.monotonic() - self._reported_at >= report_s:
             self.report(row)
 
     def report(self, row: Row | None) -> None:

@@ -11,8 +11,6 @@ from pipelines.errors import DeviceError
 from pipelines.process.termination import ENDING, handled, known
 
 T = TypeVar("T")
-SIGNAL_POLL_S = 0.05
-"""Time between two looks for signals while devices are awaited, before anything moves."""
 
 
 @contextmanager
@@ -44,10 +42,12 @@ async def until_signal(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) 
     DeviceError
         A signal came first, however long a device is awaited.
     """
+    # Time between two looks for signals while devices are awaited, before anything moves.
+    signal_poll_s = 0.05
     task = asyncio.ensure_future(work)
     try:
         while not task.done():
-            await asyncio.wait([task], timeout=SIGNAL_POLL_S)
+            await asyncio.wait([task], timeout=signal_poll_s)
             if stopped_by:
                 raise DeviceError(
                     f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved"

@@ -5,9 +5,6 @@ from collections.abc import Callable, Coroutine, Iterable
 
 from pipelines.process.event_loop import exact_event_loop
 
-MOST_ENDED = 1000
-"""How often the event loop may be ended from outside until a run is given up."""
-
 Note = Callable[[BaseException], None]
 """Takes an error that asked the work to end."""
 
@@ -18,10 +15,12 @@ def run_to_its_end(run: Coroutine, note: Note) -> None:
     An exception that ends the loop itself, as KeyboardInterrupt does, is noted, and the loop goes
     on.
     """
+    # How often the event loop may be ended from outside until a run is given up.
+    most_ended = 1000
     with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         loop = runner.get_loop()
         task = loop.create_task(run)
-        for tries_left in reversed(range(MOST_ENDED)):
+        for tries_left in reversed(range(most_ended)):
             try:
                 return loop.run_until_complete(task)
             except BaseException as error:

@@ -14,7 +14,6 @@ LARGEST_ANGLE_RAD = 3 * math.pi
 """Largest angle in radians, 1.5 turns; a hip's swing of 20 degrees would exceed it as 20 rad."""
 LARGEST = 1e12
 """Largest value of any quantity in SI units; the squares of a file's rows still have a sum."""
-_CORRECT_ROWS = "correct or drop the row and write the file again"
 
 
 @dataclass(frozen=True)
@@ -123,6 +122,7 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> Non
     ContractError
         Names the first row.
     """
+    correct_rows = "correct or drop the row and write the file again"
     is_float = pa.types.is_floating(column.type)
     missing = pc.is_null(column, nan_is_null=True)
     if not nullable and _any(missing):
@@ -130,14 +130,13 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> Non
         if is_float:
             actual, expected = "NaN", "a finite number"
         raise ContractError(
-            f"{where.row(first_true(missing))}: found {actual}, expected {expected};"
-            f" {_CORRECT_ROWS}"
+            f"{where.row(first_true(missing))}: found {actual}, expected {expected}; {correct_rows}"
         )
     if is_float and _any(pc.is_inf(column)):
         row = first_true(pc.is_inf(column))
         raise ContractError(
             f"{where.row(row)}: found {column[row].as_py()}, expected a finite number;"
-            f" {_CORRECT_ROWS}"
+            f" {correct_rows}"
         )
 
 

@@ -12,7 +12,6 @@ KEY = b"exoid"
 """Key of exoid's entry in a Parquet file's schema metadata."""
 MAGIC = b"PAR1"
 """First bytes of a Parquet file."""
-CREATED_AT = "created_at"
 _CREATED_AT_IN_TEXT = re.compile(rb'"created_at": "[^"]*"')
 BLOCK = 2**20
 """Bytes that are compared at a time."""
@@ -50,6 +49,7 @@ def _tables_equal(old: BinaryIO, new: BinaryIO) -> bool:
 
 
 def _header(schema: pa.Schema) -> tuple[list[Any], dict[str, Any]]:
+    created_at = "created_at"
     metadata = json.loads((schema.metadata or {}).get(KEY, b"{}"))
     columns = [(field.name, str(field.type), field.metadata or {}) for field in schema]
-    return columns, metadata | {CREATED_AT: None}
+    return columns, metadata | {created_at: None}

@@ -15,12 +15,8 @@ from pipelines.contracts.equality import KEY, MAGIC
 from pipelines.errors import ContractError
 from pipelines.validation.suggestion import similar_file
 
-STREAM = b"\xff\xff\xff\xff"
-"""First bytes of an Arrow stream, and so of a run's journal."""
 ROWS = 2**16
 """Rows of a piece that is read and of a row group that is written, some 20 MB of a recording."""
-READ_AHEAD = 2**20
-"""Bytes of each column that are read ahead; by default Arrow reads the whole row group."""
 
 
 def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
@@ -107,10 +103,12 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+    # Bytes of each column that are read ahead; by default Arrow reads the whole row group.
+    read_ahead = 2**20
     _refuse_unreadable(path)
     try:
         # Not read_table(path), which takes a parent folder named "run=1" for a column.
-        with pq.ParquetFile(path, buffer_size=READ_AHEAD) as file:
+        with pq.ParquetFile(path, buffer_size=read_ahead) as file:
             yield file
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
@@ -230,8 +228,10 @@ def _refuse_unreadable(path: Path) -> None:
 
 
 def _fault_of_bytes(path: Path) -> str:
+    # First bytes of an Arrow stream, and so of a run's journal.
+    stream = b"\xff\xff\xff\xff"
     start = _start(path)
-    if start == STREAM:
+    if start == stream:
         return (
             f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"
             f" whole samples; `exoid recover {path}` makes a recording of it"

@@ -16,9 +16,6 @@ from pipelines import __version__
 from pipelines.contracts import parquet
 from pipelines.errors import ContractError
 
-LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow")
-"""Libraries that compute or write results."""
-
 
 def describe(
     inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None
@@ -51,7 +48,9 @@ def describe(
 @cache
 def _software() -> dict[str, str]:
     """Return the versions of Python and of the libraries that results depend on."""
-    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+    # Libraries that compute or write results.
+    libraries = ("numpy", "scipy", "numba", "pandas", "pyarrow")
+    return {"python": platform.python_version()} | {name: version(name) for name in libraries}
 
 
 def sha256(path: Path) -> str:

@@ -16,10 +16,6 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.model import Model, Term
 
-MOTOR_SHARE = 0.04
-"""Share of a joint's inertia that stays with its motor in front of a spring, for machines other
-than the exoskeleton; as of a leg."""
-
 
 @reaction
 def _no_reaction(at, state, values, geometry, joint, out):
@@ -157,6 +153,9 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     InputError
         If the joint has play and the machine is no exoskeleton.
     """
+    # Share of a joint's inertia that stays with its motor in front of a spring, for machines other
+    # than the exoskeleton; as of a leg.
+    motor_share = 0.04
     if effect.on.is_exoskeleton:
         return effect.motor_inertia
     if effect.exoskeleton_only:
@@ -168,7 +167,7 @@ def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)
     j = effect.on.names.index(str(effect.joint))
     return float(
-        MOTOR_SHARE * mechanism.mass_matrix(np.zeros(len(mechanism.kinds)), X, geometry)[j, j]
+        motor_share * mechanism.mass_matrix(np.zeros(len(mechanism.kinds)), X, geometry)[j, j]
     )
 
 

@@ -24,8 +24,6 @@ from pipelines.model import Model
 RATE_HZ = 1000.0
 """Rate of drives that report none, and the highest that is simulated; a faster one changes nothing
 in a regression."""
-BANDWIDTH_RAD_S = 2.0 * np.pi * 8.0
-"""Bandwidth of the loop that replaces unknown drives."""
 
 
 def closed_loop(model: Model, motion: Motion) -> Motion:
@@ -78,6 +76,8 @@ def _set_points(motion: Motion) -> NDArray:
 
 
 def _drives(motion: Motion, a: Assembly) -> Drives:
+    # Bandwidth of the loop that replaces unknown drives.
+    bandwidth_rad_s = 2.0 * np.pi * 8.0
     controller: Mapping[str, Any] = motion.metadata.get("controller") or {}
     each = [controller.get(joint) or {} for joint in motion.joints]
     if all(_gain(c, "kp") for c in each):
@@ -91,8 +91,8 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
     else:
         mass = masses(a)[0].mean(axis=0).diagonal()
         kp, kd, limit, rate = (
-            BANDWIDTH_RAD_S**2 * mass,
-            2.0 * BANDWIDTH_RAD_S * mass,
+            bandwidth_rad_s**2 * mass,
+            2.0 * bandwidth_rad_s * mass,
             np.inf * mass,
             RATE_HZ + 0 * mass,
         )

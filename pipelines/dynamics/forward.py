@@ -27,9 +27,6 @@ from pipelines.dynamics.compiled_once import compiled_once
 from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring_at
 from pipelines.mechanics.instant import vector
 
-STICTION_SWEEPS = 20
-STICTION_TOLERANCE = 1e-9
-
 HOT: dict[str, Any] = {"cache": True, "_nrt": False}
 """Compiler options of the innermost functions. They allocate nothing, so that ``_nrt`` may switch
 off numba's reference counting, which would take more than half of their time."""
@@ -406,6 +403,9 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
     rates : (4, J) array
         Written: d(state)/dt with that direction.
     """
+    # Each joint's direction changes the others' speeds, so the joints are swept until none changes.
+    stiction_sweeps = 20
+    stiction_tolerance = 1e-9
     for j in range(a.joints):
         w.direction[j] = np.sign(state[DTHETA, j])
     accelerations(a, w, t, state, memory, w.direction, load, drive, rates)
@@ -416,7 +416,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
         return
     for j in range(a.joints):
         w.slope[j] = _grip(a, w, t, state, memory, load, drive, rates, j)
-    for _ in range(STICTION_SWEEPS):
+    for _ in range(stiction_sweeps):
         change = 0.0
         for j in range(a.joints):
             _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
@@ -428,7 +428,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
                 # Without dry friction nothing can hold this joint.
                 w.direction[j] = np.sign(ahead)
             change = max(change, abs(w.direction[j] - before))
-        if change < STICTION_TOLERANCE:
+        if change < stiction_tolerance:
             break
     _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
 

@@ -21,12 +21,6 @@ KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
 """Knee angles at which a leg's mass matrix is evaluated, rad. It is even in the knee angle, and
 depends on no other."""
 
-MORE_POSES = 500
-"""Number of poses of a machine of more than two joints."""
-
-STABLE_REACH = 1.5
-"""Greatest product of step and fastest rate; the Runge-Kutta method is stable up to 2.78, but
-accurate only below."""
 
 MOST_STEPS = 200
 """Most integration steps per sample. At the default gain and rate, more correspond to an inertia
@@ -55,12 +49,14 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
 
 def _poses(joints: int) -> NDArray:
     """Return joint angles, (k, J) rad; no mass matrix depends on the first joint's."""
-    poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else MORE_POSES, joints))
+    # Number of poses of a machine of more than two joints.
+    more_poses = 500
+    poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else more_poses, joints))
     if joints < 3:
         poses[:, -1] = KNEE_ANGLES
     else:
         poses[:, 1:] = np.pi * (
-            2.0 * qmc.Halton(joints - 1, scramble=False).random(MORE_POSES) - 1.0
+            2.0 * qmc.Halton(joints - 1, scramble=False).random(more_poses) - 1.0
         )
     return poses
 
@@ -110,8 +106,11 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     InputError
         If it exceeds ``MOST_STEPS``, because the model hardly has mass at some pose.
     """
+    # Greatest product of step and fastest rate; the Runge-Kutta method is stable up to 2.78, but
+    # accurate only below.
+    stable_reach = 1.5
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
-    needed = feedback_gain * mobility * period / STABLE_REACH
+    needed = feedback_gain * mobility * period / stable_reach
     if not needed <= MOST_STEPS:
         raise InputError(
             f"the effective inertia falls to {1.0 / mobility:.2g} kg·m² at some pose: a simulation"

@@ -31,10 +31,6 @@ from pipelines.model import Model
 WINDOW_S = 1.0
 EVERY_S = 0.5
 
-LONGEST_STEP_S = 0.0025
-MEMORY_SUBSTEPS = 8
-"""Steps per sample of the effects' memories along the recorded motion, as in the regression."""
-
 
 @dataclass(frozen=True)
 class ReplayResult:
@@ -79,6 +75,7 @@ def replay(
     InputError
         If no stretch of valid samples is as long as a window.
     """
+    longest_step_s = 0.0025
     length = round(window_s * motion.sample_rate_hz)
     every = max(1, round(every_s * motion.sample_rate_hz))
     first = np.array(
@@ -111,7 +108,7 @@ def replay(
             memory[stretch],
         )
     torque = np.ascontiguousarray(model.delivered(motor))
-    parts = int(np.ceil(0.5 / (motion.sample_rate_hz * LONGEST_STEP_S)))
+    parts = int(np.ceil(0.5 / (motion.sample_rate_hz * longest_step_s)))
     out = np.empty((len(first), length + 1, 2, a.joints))
     for k, window in zip(first, out, strict=True):
         a.temperature[:] = temperature[k]
@@ -173,18 +170,20 @@ def _recall(a, w, s, time, states, load, k, share, memory):
 @njit(**HOT)
 def _remember(a, w, s, time, states, load, temperature, memory):
     """Write the memories along a recorded stretch (n, 4, J), from rest, into ``memory`` (n, m)."""
+    # Steps per sample of the effects' memories along the recorded motion, as in the regression.
+    memory_substeps = 8
     for k in range(len(time) - 1 if memory.shape[1] > 0 else 0):
         for j in range(a.joints):
             a.temperature[j] = temperature[k, j]
         for m in range(memory.shape[1]):
             memory[k + 1, m] = memory[k, m]
-        h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
-        for i in range(MEMORY_SUBSTEPS):
+        h = (time[k + 1] - time[k]) / memory_substeps
+        for i in range(memory_substeps):
             # Midpoint rule: half a step to the middle, then a whole step with the rate there.
-            _recall(a, w, s, time, states, load, k, i / MEMORY_SUBSTEPS, memory[k + 1])
+            _recall(a, w, s, time, states, load, k, i / memory_substeps, memory[k + 1])
             for m in range(memory.shape[1]):
                 s.memory[m] = memory[k + 1, m] + 0.5 * h * s.memory_rates[0, m]
-            _recall(a, w, s, time, states, load, k, (i + 0.5) / MEMORY_SUBSTEPS, s.memory)
+            _recall(a, w, s, time, states, load, k, (i + 0.5) / memory_substeps, s.memory)
             for m in range(memory.shape[1]):
                 memory[k + 1, m] += h * s.memory_rates[0, m]
 

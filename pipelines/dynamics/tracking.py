@@ -14,9 +14,6 @@ from pipelines.errors import InputError
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.simulate import SimulateSettings
 
-NODES_REACH = 1.5
-"""The network's centres lie between plus and minus this value, on the diagonal."""
-
 
 @dataclass(frozen=True)
 class ClosedLoop:
@@ -126,13 +123,15 @@ def track(
 
 
 def _controller(settings: SimulateSettings, feedback_gain: float) -> RbfController:
+    # The network's centres lie between plus and minus this value, on the diagonal.
+    nodes_reach = 1.5
     return RbfController(
         error_gain=settings.error_gain_1_s,
         feedback_gain=feedback_gain,
         adaptation_gain=settings.adaptation_gain,
         robust_gain=settings.robust_gain_nm,
         limit=settings.torque_limit_nm,
-        nodes=np.linspace(-NODES_REACH, NODES_REACH, settings.network_nodes),
+        nodes=np.linspace(-nodes_reach, nodes_reach, settings.network_nodes),
         width=settings.network_width,
     )
 

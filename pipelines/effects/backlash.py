@@ -25,8 +25,6 @@ STRIKING_RATIO = 1.0
 """Damping ratio of the link's impacts behind a measured motion, which does not determine how it
 bounces."""
 
-CONTACT_DAMPING_RATIO = 0.3
-"""Damping ratio of the motor's swing on its teeth."""
 
 CROSSING_TORQUE = 2.0
 """Transmitted torque in N·m below which its estimate does not determine the side."""
@@ -80,8 +78,10 @@ class Backlash(Effect):
     @spring
     def spring(twist, twist_rate, values):
         """Return zero within the play; beyond it, the torque of teeth that push and never pull."""
+        # Damping ratio of the motor's swing on its teeth.
+        contact_damping_ratio = 0.3
         half = 0.5 * values[0]
-        damping = 2.0 * CONTACT_DAMPING_RATIO * sqrt(values[1] * MOTOR_INERTIA)
+        damping = 2.0 * contact_damping_ratio * sqrt(values[1] * MOTOR_INERTIA)
         if twist > half:
             return max(0.0, values[1] * (twist - half) + damping * twist_rate)
         if twist < -half:

@@ -8,9 +8,6 @@ from pipelines.effects.kernel import spring
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
-RELAXATION_S = 0.02
-"""Damping over stiffness of soft tissue under a strap, s."""
-
 MACHINE_INERTIA = 0.02
 """Inertia on the machine's side, kg·m²; a joint needs some even if a model assigns all mass to the
 limb."""
@@ -80,7 +77,9 @@ class CuffCompliance(Effect):
     @spring
     def spring(twist, twist_rate, values):
         """Return k (twist (1 + h twist²) + relaxation twist_rate)."""
-        return values[0] * (twist * (1.0 + values[2] * twist * twist) + RELAXATION_S * twist_rate)
+        # Damping over stiffness of soft tissue under a strap, s.
+        relaxation_s = 0.02
+        return values[0] * (twist * (1.0 + values[2] * twist * twist) + relaxation_s * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the limb; without its mass, it follows its torque immediately.

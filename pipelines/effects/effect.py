@@ -33,14 +33,8 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
 from pipelines.mechanics.units import Scale, unit_at
 
-DIFFERENCE = 1e-6
-"""Relative step of numerical derivatives."""
-
-
 WIDE = 4.0
 """Ratio of a typical range's ends above which a parameter varies by factors."""
-LEAST_WARMING_C = 1.0
-"""Least change of a motor's temperature, °C, from which a dependence on it can be fitted."""
 
 
 class Side(StrEnum):
@@ -447,10 +441,12 @@ class Effect(ABC):
 
     def temperature_varies(self, motions: Sequence[Motion]) -> bool:
         """Return whether every run has its motor's temperature, and the temperatures vary."""
+        # Least change of a motor's temperature, °C, from which a dependence on it can be fitted.
+        least_warming_c = 1.0
         read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
         ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
         # Missing temperatures are NaN, and the comparison is then false.
-        return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)
+        return len(ends) > 0 and bool(np.ptp(ends) >= least_warming_c)
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Return shapes for which the effect is linear.
@@ -522,10 +518,12 @@ class Effect(ABC):
         (parameters, fitted) array
             By central differences, unless ``physical`` is the identity.
         """
+        # Relative step of numerical derivatives.
+        difference = 1e-6
         values = np.asarray(values, dtype=float)
         if type(self).physical is Effect.physical:
             return np.eye(len(values))
-        steps = np.diag(DIFFERENCE * np.maximum(np.abs(values), DIFFERENCE))
+        steps = np.diag(difference * np.maximum(np.abs(values), difference))
         ahead = np.array([self.physical(values + step) for step in steps])
         behind = np.array([self.physical(values - step) for step in steps])
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T

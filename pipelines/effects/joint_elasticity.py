@@ -16,10 +16,6 @@ MOTOR_INERTIA = 0.1
 DAMPING_RATIO = 0.1
 """Damping ratio of the motor's swing on the spring, as of a harmonic drive's flexspline."""
 
-SWING_RATIO = 0.05
-"""Damping ratio of the link's swing behind a measured motion. A larger one damps the true swing, a
-smaller one lets errors persist."""
-
 
 class JointElasticity(Effect):
     """A torsion spring between motor and link, the encoder on the motor."""
@@ -79,9 +75,12 @@ class JointElasticity(Effect):
         Motion
             Of the links, n samples.
         """
+        # Damping ratio of the link's swing behind a measured motion. A larger one damps the true
+        # swing, a smaller one lets errors persist.
+        swing_ratio = 0.05
         if motion.link_swing is not None:
             return link_behind_motor(
-                motion, motion.link_swing, self, self.completed(shape), SWING_RATIO
+                motion, motion.link_swing, self, self.completed(shape), swing_ratio
             )
         j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()

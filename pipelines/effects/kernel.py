@@ -130,27 +130,6 @@ _READ_ALONG = void(
 
 _SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
-MEMORY_SUBSTEPS = 8
-"""Steps per sample along a measured motion: a presliding state changes within a few
-milliseconds."""
-
-SETTLING_S = 2.0
-"""Time for which a motion is assumed to have run at its first velocity before it begins. A memory
-that began at zero would be wrong until the first reversal."""
-
-SWING_SUBSTEPS = 4
-"""Steps per sample of a load on its spring. The rule is stable at any stiffness, and accurate up to
-some 30 Hz."""
-
-WIDEST_TWIST = 1.0
-"""Largest twist, rad, with which a swinging load begins at rest."""
-
-TORN = np.pi
-"""Limit of a twist, rad, that no real transmission reaches. A load of negative mass or gravity,
-which a fit may try, would diverge from its spring within a second; here it stops."""
-
-NUDGE = 1e-7
-"""Step of a spring's difference quotients, rad and rad/s."""
 
 ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
 """Options for functions whose arrays are all arguments. Without reference counting they take a
@@ -279,14 +258,20 @@ def columns_along_with_memory(
     out : (n, J, p) array
         Written: N·m per unit.
     """
+    # Steps per sample along a measured motion: a presliding state changes within a few
+    # milliseconds.
+    memory_substeps = 8
+    # Time for which a motion is assumed to have run at its first velocity before it begins. A
+    # memory that began at zero would be wrong until the first reversal.
+    settling_s = 2.0
     kernel, rate = reaction_at(where), derivative_at(where_rate)
     state, middle, slope = memory[0], memory[1], memory[2]
     now, later = scratch[:5], scratch[5:10]
     if q.shape[0] > 1:
-        h = (time[1] - time[0]) / MEMORY_SUBSTEPS
+        h = (time[1] - time[0]) / memory_substeps
         t = _between(time, q, dq, ddq, load, 0, 0.0, now)
         at = Instant(t, now[0], now[1], now[2], now[3], now[4], temperature[0])
-        for _ in range(int(SETTLING_S / h)):
+        for _ in range(int(settling_s / h)):
             _advance(rate, at, at, h, state, middle, slope, values, geometry, joint)
     for k in range(q.shape[0]):
         for j in range(q.shape[1]):
@@ -295,11 +280,11 @@ def columns_along_with_memory(
         _unit_columns(kernel, at, state, values, geometry, joint, scratch[10], out[k])
         if k + 1 == q.shape[0]:
             break
-        h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
-        for i in range(MEMORY_SUBSTEPS):
-            t = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS, now)
+        h = (time[k + 1] - time[k]) / memory_substeps
+        for i in range(memory_substeps):
+            t = _between(time, q, dq, ddq, load, k, i / memory_substeps, now)
             at = Instant(t, now[0], now[1], now[2], now[3], now[4], temperature[k])
-            t = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS, later)
+            t = _between(time, q, dq, ddq, load, k, (i + 0.5) / memory_substeps, later)
             ahead = Instant(t, later[0], later[1], later[2], later[3], later[4], temperature[k])
             _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint)
 
@@ -343,7 +328,9 @@ def read_along(where, values, joint, time, temperature, torque, at_once, state, 
 @njit(inline="always")
 def _twist_at_rest(kernel, values, torque, stiffness):
     """Return the twist at which spring and load balance."""
-    low, high = -WIDEST_TWIST, WIDEST_TWIST
+    # Largest twist, rad, with which a swinging load begins at rest.
+    widest_twist = 1.0
+    low, high = -widest_twist, widest_twist
     for _ in range(40):
         middle = 0.5 * (low + high)
         if kernel(middle, 0.0, values) + stiffness * middle < torque:
@@ -378,20 +365,28 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
     out : (n,) array
         Twist, rad.
     """
+    # Steps per sample of a load on its spring. The rule is stable at any stiffness, and accurate up
+    # to some 30 Hz.
+    swing_substeps = 4
+    # Limit of a twist, rad, that no real transmission reaches. A load of negative mass or gravity,
+    # which a fit may try, would diverge from its spring within a second; here it stops.
+    torn = np.pi
+    # Step of a spring's difference quotients, rad and rad/s.
+    nudge = 1e-7
     kernel = spring_at(where)
     twist, rate = _twist_at_rest(kernel, values, torque[0], stiffness[0]), 0.0
     out[0] = twist
-    s = h / SWING_SUBSTEPS
+    s = h / swing_substeps
     for n in range(1, torque.shape[0]):
-        for i in range(SWING_SUBSTEPS):
-            share = (i + 0.5) / SWING_SUBSTEPS
+        for i in range(swing_substeps):
+            share = (i + 0.5) / swing_substeps
             load = torque[n - 1] + share * (torque[n] - torque[n - 1])
             mass = max(least, inertia[n - 1] + share * (inertia[n] - inertia[n - 1]))
             drag = damping[n - 1] + share * (damping[n] - damping[n - 1])
             slope = stiffness[n - 1] + share * (stiffness[n] - stiffness[n - 1])
             passed = kernel(twist, rate, values)
-            per_twist = (kernel(twist + NUDGE, rate, values) - passed) / NUDGE
-            per_rate = (kernel(twist, rate + NUDGE, values) - passed) / NUDGE
+            per_twist = (kernel(twist + nudge, rate, values) - passed) / nudge
+            per_rate = (kernel(twist, rate + nudge, values) - passed) / nudge
             drag += 2.0 * ratio * np.sqrt(max(0.0, per_twist) * mass)
             push = (
                 load - drag * rate - slope * twist - passed - 0.5 * s * (slope + per_twist) * rate
@@ -401,6 +396,6 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
             )
             twist += s * (rate + 0.5 * change)
             rate += change
-            if not abs(twist) < TORN:
-                twist, rate = TORN if twist > 0.0 else -TORN, 0.0
+            if not abs(twist) < torn:
+                twist, rate = torn if twist > 0.0 else -torn, 0.0
         out[n] = twist

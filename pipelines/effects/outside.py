@@ -13,8 +13,6 @@ from importlib.metadata import EntryPoint, entry_points
 from pipelines.effects.effect import Effect
 from pipelines.errors import InputError
 
-GROUP = "exoid.effects"
-
 STATED = ("name", "title", "side", "equation", "source", "looks_like", "confirm")
 """Attributes that every effect must have."""
 
@@ -27,9 +25,10 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
     InputError
         If one cannot be loaded, is not an effect, or has the name of another.
     """
+    group = "exoid.effects"
     taken = {effect.name: effect.__module__ for effect in known}
     effects = []
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
         effect = _loaded(entry)
         if effect.name in taken:
             raise _broken(

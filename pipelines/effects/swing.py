@@ -14,13 +14,6 @@ from pipelines.mechanics.load import Load
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
-LEAST_INERTIA = 0.02
-"""Least inertia of any load of an exoskeleton, kg·m²."""
-
-ROTOR_INERTIA = 0.17
-"""Inertia of a rotor that the rigid body's parameters include, kg·m²: the middle of the typical
-range."""
-
 
 def link_behind_motor(
     motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float
@@ -37,8 +30,11 @@ def link_behind_motor(
 
 def rotor_among_links(motion: Motion, joint: str) -> float:
     """Return the rotor's inertia that the rigid body's parameters include in the links, kg·m²."""
+    # Inertia of a rotor that the rigid body's parameters include, kg·m²: the middle of the typical
+    # range.
+    rotor_inertia = 0.17
     counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
-    return ROTOR_INERTIA if counted else 0.0
+    return rotor_inertia if counted else 0.0
 
 
 def behind_spring(
@@ -70,10 +66,12 @@ def behind_spring(
     with_motor : float, optional
         Inertia in the load that turns with the motor instead, kg·m².
     """
+    # Least inertia of any load of an exoskeleton, kg·m².
+    least_inertia = 0.02
     torque, inertia, *slopes = load.on_coordinate(direction)
     torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
     along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]
-    least = LEAST_INERTIA * effect.scale.of("kg·m²")
+    least = least_inertia * effect.scale.of("kg·m²")
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
     joints = np.flatnonzero(direction.any(axis=0))
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]

@@ -18,15 +18,6 @@ from pipelines.model import Model, ParameterLayout, baseline
 
 CUTOFF_HZ = 5.0
 """Frequency that separates slow from fast motion."""
-LOOKED_S = 600.0
-"""Length of a run that is examined if it is read piece by piece; encoder noise does not change with
-time."""
-REAL = 0.5
-"""Least share of the predicted torque that must be measured: it is 1 if the fast part is motion, 0
-if it is noise."""
-LOUD = 1.0
-"""Least ratio of the noise torque to the slow fit's residual, rms. Less is under half of the
-error's power, and biases little."""
 IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles are mostly noise"
 
 
@@ -57,11 +48,14 @@ def is_loud(runs: Sequence[Run]) -> bool:
 
 def _beginning(run: Run) -> Iterator[Piece]:
     """Yield a run's pieces, with margins for the filters, until enough of it was examined."""
+    # Length of a run that is examined if it is read piece by piece; encoder noise does not change
+    # with time.
+    looked_s = 600.0
     rate, seen = run.sample_rate_hz, 0
     for piece in run.pieces(edge(rate, CUTOFF_HZ) + padding(run) + block_average(run).decimation):
         yield piece
         seen += piece.core.stop - piece.core.start
-        if seen > LOOKED_S * rate:
+        if seen > looked_s * rate:
             return
 
 
@@ -83,6 +77,12 @@ def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
 
 def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
     """Fit the slow motion, p columns, and compare predicted and measured fast torque."""
+    # Least share of the predicted torque that must be measured: it is 1 if the fast part is motion,
+    # 0 if it is noise.
+    real = 0.5
+    # Least ratio of the noise torque to the slow fit's residual, rms. Less is under half of the
+    # error's power, and biases little.
+    loud = 1.0
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]
     # A joint whose torque is always zero has no weight here; the fit itself refuses it.
@@ -96,4 +96,4 @@ def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
     residual = (
         torque - 2.0 * gram[:, :p, -1] @ values + np.einsum("i,jik,k->j", values, slow, values)
     )
-    return bool(np.any((measured < REAL * power) & (power > LOUD**2 * residual)))
+    return bool(np.any((measured < real * power) & (power > loud**2 * residual)))

@@ -8,9 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-WEAK = 10.0
-STRONG = 30.0
-"""Condition indices at which Belsley calls a dependence weak, and strong."""
 SHARE = 0.5
 """Share of a parameter's variance above which a dependence involves it."""
 
@@ -54,16 +51,18 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     names : sequence of str
         Names of the p parameters.
     """
+    # Condition indices at which Belsley calls a dependence weak, and strong.
+    weak, strong = 10.0, 30.0
     eigenvalues, vectors = np.linalg.eigh(_scaled_gram(gram))
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
     index = np.sqrt(eigenvalues[-1] / eigenvalues)
     variance = vectors**2 / eigenvalues
     shares = variance / variance.sum(axis=1, keepdims=True)
     sentences = []
-    for k in np.flatnonzero(index > WEAK):
+    for k in np.flatnonzero(index > weak):
         involved = [name for name, share in zip(names, shares[:, k], strict=True) if share > SHARE]
         if len(involved) > 1:
-            how = "hardly separates" if index[k] > STRONG else "separates only weakly"
+            how = "hardly separates" if index[k] > strong else "separates only weakly"
             sentences.append(
                 f"this motion {how} {_listed(involved)} (condition index {index[k]:.0f}): "
                 "the others compensate for an error in one"

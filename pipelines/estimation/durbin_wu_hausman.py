@@ -21,10 +21,6 @@ from pipelines.estimation.estimator import Fit
 from pipelines.estimation.long_run import long_run_covariance
 
 LEVEL = 0.05
-FAINT = 0.1
-"""Variance below which a combination of parameters is not tested, where each parameter scaled by
-its error has a mean variance of 1. Below it, second-order errors exceed the difference, and the
-covariance counts them twice."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +75,11 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
         its p-value.
     """
 
+    # Variance below which a combination of parameters is not tested, where each parameter scaled by
+    # its error has a mean variance of 1. Below it, second-order errors exceed the difference, and
+    # the covariance counts them twice.
+    faint = 0.1
+
     def influences() -> Iterator[tuple[Hashable, NDArray]]:
         for (name, ours), (_, theirs) in zip(one.scores(), other.scores(), strict=True):
             yield name, ours @ one.sensitivity.T - theirs @ other.sensitivity.T
@@ -87,7 +88,7 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     V, _, freedom = long_run_covariance(influences, len(difference))
     error = np.sqrt(np.diag(V))
     variance, directions = np.linalg.eigh(V / np.outer(error, error))
-    informed = variance > FAINT
+    informed = variance > faint
     square = float(
         np.sum((directions.T[informed] @ (difference / error)) ** 2 / variance[informed])
     )

@@ -28,10 +28,6 @@ ITERATIONS = 20
 SETTLED = 0.01
 """Largest change of a value at convergence, in standard errors of independent blocks."""
 
-SLIGHT = 0.1
-"""Share of the half-width of a parameter's 95 % interval within which a bias does not matter. The
-two estimates share their noise, so the test detects much less; yet the interval about either still
-covers the truth 94.5 times of 100."""
 
 SLIGHT_SHARE = 0.001
 """Share of a parameter within which a bias does not matter: no torque scale is known any better,
@@ -176,7 +172,11 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
 
 def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
     """Return which parameters' bias in least squares is large enough to matter, (k,) bool."""
+    # Share of the half-width of a parameter's 95 % interval within which a bias does not matter.
+    # The two estimates share their noise, so the test detects much less; yet the interval about
+    # either still covers the truth 94.5 times of 100.
+    slight = 0.1
     estimate = estimated(fit)
     reach = estimate.critical * np.sqrt(np.diag(estimate.covariance))
     off = np.abs(test.difference)
-    return np.asarray((off > SLIGHT * reach) & (off > SLIGHT_SHARE * np.abs(fit.values)))
+    return np.asarray((off > slight * reach) & (off > SLIGHT_SHARE * np.abs(fit.values)))

@@ -25,13 +25,7 @@ HUBER = 1.345
 BISQUARE = 4.685
 """Standard deviations at which Huber's weights begin to fall, and at which Tukey's are zero: 95 %
 efficiency on Gaussian noise."""
-MAD = 1.4826
-"""Standard deviation of Gaussian noise over its median absolute value."""
 ITERATIONS = 50
-SETTLED = 1e-3
-"""Largest change of a value at convergence, in standard errors of independent blocks."""
-WORTH_SAYING = 1e-3
-"""Share of rejected blocks above which the user is informed."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +115,13 @@ class IterativelyReweighted(Estimator):
 
 
 def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
+    # Share of rejected blocks above which the user is informed.
+    worth_saying = 1e-3
     return tuple(
         f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard"
         " deviations off and are ignored"
         for joint, share in shares.items()
-        if share > WORTH_SAYING
+        if share > worth_saying
     )
 
 
@@ -142,6 +138,8 @@ class _Iterated(NamedTuple):
 
 def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> _Iterated:
     """Fit and weight in turn until the values converge; the bisquare's scale is held."""
+    # Largest change of a value at convergence, in standard errors of independent blocks.
+    settled = 1e-3
     free, held = problem.fitted, problem.of_held
     for iteration in range(1, ITERATIONS + 1):
         sums = _sums(problem, values, scale, loss)
@@ -152,12 +150,14 @@ def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> 
         )
         if loss is Huber:
             scale = sums.scale
-        if np.all(np.abs(values - before) < SETTLED * np.sqrt(np.diag(sensitivity))):
+        if np.all(np.abs(values - before) < settled * np.sqrt(np.diag(sensitivity))):
             return _Iterated(values, scale, iteration, settled=True)
     return _Iterated(values, scale, ITERATIONS, settled=False)
 
 
 def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums:
+    # Standard deviation of Gaussian noise over its median absolute value.
+    mad = 1.4826
     every, p = problem.completed(values), len(problem.held)
     normal, slope, right = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     sizes: list[list[NDArray]] = [[] for _ in scale]
@@ -176,7 +176,7 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         normal,
         slope,
         right,
-        np.array([max(MAD * np.median(size), LEAST_NM) for size in residuals]),
+        np.array([max(mad * np.median(size), LEAST_NM) for size in residuals]),
         np.array([np.mean(size > BISQUARE * s) for size, s in zip(residuals, scale, strict=True)]),
     )
 

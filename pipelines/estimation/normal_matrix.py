@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 from pipelines.errors import NotIdentifiable
 from pipelines.estimation.collinearity import worst_direction
 
-SINGULAR = 1e7
-"""Condition number of the scaled regressor above which rounding errors decide."""
-
 
 def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
     """Return the inverse of a normal matrix.
@@ -31,6 +28,8 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
     NotIdentifiable
         If the motion does not separate the parameters; the message names them.
     """
+    # Condition number of the scaled regressor above which rounding errors decide.
+    singular = 1e7
     size = np.sqrt(np.diag(gram))
     if not np.all(size > 0):
         silent = [name for name, s in zip(names, size, strict=True) if s == 0]
@@ -40,7 +39,7 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         )
     scaled = gram / np.outer(size, size)
     eigenvalues = np.linalg.eigvalsh(scaled)
-    if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > SINGULAR:
+    if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > singular:
         mixed = worst_direction(scaled, names)
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"

@@ -30,14 +30,6 @@ PASSES = 2
 STEP = 0.5
 """Step for derivatives, in standard errors of the start. It is small enough that a joint does not
 stick noticeably longer or shorter."""
-SETTLED = 1e-5
-"""Relative decrease of the squared error at convergence; less than a tenth of a standard error."""
-RESTS = 0.01
-"""Relative step at convergence."""
-LEAST_RAD = 1e-9
-"""Least rms angle error for a weight; a perfect fit would have infinite weight."""
-RAN_AWAY = 10.0
-"""Angle error within a window, rad (m), above which no such machine can exist."""
 
 
 class OutputError(Estimator):
@@ -104,8 +96,10 @@ def _slopes(
 
 
 def _weights(errors: Sequence[NDArray]) -> NDArray:
+    # Least rms angle error for a weight; a perfect fit would have infinite weight.
+    least_rad = 1e-9
     squares = np.concatenate([error.reshape(-1, error.shape[-1]) ** 2 for error in errors])
-    return np.asarray(1.0 / np.maximum(squares.mean(axis=0), LEAST_RAD**2))
+    return np.asarray(1.0 / np.maximum(squares.mean(axis=0), least_rad**2))
 
 
 def _searched(
@@ -122,6 +116,12 @@ def _searched(
     converged : bool
         Whether the search converged.
     """
+    # Relative decrease of the squared error at convergence; less than a tenth of a standard error.
+    settled = 1e-5
+    # Relative step at convergence.
+    rests = 0.01
+    # Angle error within a window, rad (m), above which no such machine can exist.
+    ran_away = 10.0
     unit, root = size[problem.fitted], np.sqrt(weights)
     outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
 
@@ -139,7 +139,7 @@ def _searched(
             return np.full(outputs, np.nan)
         return (
             residual
-            if np.all(np.abs(residual) < RAN_AWAY * root.max())
+            if np.all(np.abs(residual) < ran_away * root.max())
             else np.full_like(residual, np.nan)
         )
 
@@ -149,7 +149,7 @@ def _searched(
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
     solution = least_squares(
-        residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None
+        residual, np.zeros(len(unit)), jacobian, method="trf", xtol=rests, ftol=settled, gtol=None
     )
     return (
         values + unit * solution.x,

@@ -33,9 +33,6 @@ FUNCTIONS = (
 )
 """Functions that an equation may call, and that every format can write."""
 
-MOST_BRANCHES = 64
-"""Most paths through one kernel."""
-
 
 class NotWritable(ExoidError):
     """A kernel that no formula can express, such as one that reads its own past."""
@@ -249,14 +246,16 @@ def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
     NotWritable
         If no formula can express the kernel.
     """
+    # Most paths through one kernel.
+    most_branches = 64
     function = _plain(kernel.py_func, {})
     paths = 0
 
     def walk(choices: dict[str, bool]):
         nonlocal paths
         paths += 1
-        if paths > MOST_BRANCHES:
-            raise NotWritable(f"it has more than {MOST_BRANCHES} paths")
+        if paths > most_branches:
+            raise NotWritable(f"it has more than {most_branches} paths")
         inputs, out = arguments()
         try:
             with _choosing(choices):

@@ -12,8 +12,6 @@ from pipelines.export.exported import Exported
 from pipelines.export.format import Format, Holding, exact
 from pipelines.model import Term
 
-CONTRACT = "model/1"
-
 CONVENTIONS = {
     "units": "SI",
     "angles": (
@@ -51,9 +49,10 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     mapping
         Text by suffix, ``.json``.
     """
+    contract = "model/1"
     table = exported.table
     document = {
-        "contract": CONTRACT,
+        "contract": contract,
         "name": stem,
         "provenance": describe([table.path] if table.path else []),
         "run": exported.run,

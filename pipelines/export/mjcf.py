@@ -21,8 +21,6 @@ from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
-OFF_CENTRE_M = 0.01
-"""Shift of the centre of mass of a body on two slides."""
 TIMESTEP_S = 0.001
 
 
@@ -97,6 +95,8 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
+    # Shift of the centre of mass of a body on two slides.
+    off_centre_m = 0.01
     element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
     hinge = {
         "type": "hinge" if body.joint.kind == "revolute" else "slide",
@@ -111,7 +111,7 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     # MuJoCo treats two slides of a body centred at their frame as independent. The shift has no
     # effect on the motion of a slide.
     offset = (
-        OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
+        off_centre_m * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
     )
     centre = numbers(*(body.centre + offset))
     ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)

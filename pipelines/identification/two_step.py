@@ -41,8 +41,6 @@ STEP = 0.25
 """Difference step of a shape, in its standard errors."""
 ROUNDS = 12
 """Most iterations of loads and rigid bodies."""
-TOLERANCE = 1e-3
-"""Relative change of rigid bodies at which the iteration has converged."""
 NOT_CONVERGED = (
     f"rigid bodies and loads did not converge in {ROUNDS} iterations, so these values are not"
     " reliable. A fixed shape, such as a soft spring's, may not fit these runs"
@@ -226,6 +224,8 @@ def _with_consistent_loads(
     The iteration starts from ``bodies``. Behind an elastic joint fixed-point steps overshoot, so
     their length follows from the last two (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
     """
+    # Relative change of rigid bodies at which the iteration has converged.
+    tolerance = 1e-3
     kinds = _body_keys(training)
     sizes = np.cumsum([len(bodies[kind]) for kind in kinds])[:-1]
     values = np.concatenate([bodies[kind] for kind in kinds])
@@ -237,7 +237,7 @@ def _with_consistent_loads(
         )
         fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - values
-        if np.all(np.abs(step) < TOLERANCE * np.abs(values)):
+        if np.all(np.abs(step) < tolerance * np.abs(values)):
             return training, True
         growth = 0.0
         if last_step is not None:

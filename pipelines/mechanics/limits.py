@@ -10,9 +10,6 @@ from pipelines.settings.design import JointBounds
 
 QUANTITIES = ("angle", "velocity", "acceleration")
 
-TOLERANCE = 1e-9
-"""Excess over a bound that is rounding error."""
-
 
 @dataclass(frozen=True)
 class Margin:
@@ -36,7 +33,9 @@ class Margin:
     @property
     def kept(self) -> bool:
         """Whether the motion stays within the bounds."""
-        return self.margin >= -TOLERANCE
+        # Excess over a bound that is rounding error.
+        tolerance = 1e-9
+        return self.margin >= -tolerance
 
     def __str__(self) -> str:
         """Describe the margin in one sentence."""

@@ -20,20 +20,6 @@ from pipelines.mechanics.units import Scale
 from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
-LOAD_CUTOFF_HZ = 5.0
-"""Cut-off of a load before it is differentiated twice. Noise at 25 Hz would otherwise have 600
-times the weight of noise at 1 Hz."""
-
-MOST_UNREAD_S = 0.1
-"""Longest interval between two force readings that is interpolated, s. A leg that moves at 1 Hz
-covers a tenth of its range in it."""
-
-SHORTEST_PERIOD = 4
-"""Least number of samples in a period."""
-
-IGNORED_PERIOD = 10
-"""Ratio of period to recording above which the period is ignored."""
-
 KEPT = ("transmitted", "motor_temperature", "held_forces")
 """Cached properties that do not depend on the kinematics, and are costly to compute."""
 
@@ -141,9 +127,12 @@ class Motion:
 
         NaN where readings are too far apart; None without readings.
         """
+        # Longest interval between two force readings that is interpolated, s. A leg that moves at 1
+        # Hz covers a tenth of its range in it.
+        most_unread_s = 0.1
         if self.forces is None or np.isfinite(self.forces).all():
             return self.forces
-        forces, longest = self.forces.copy(), max(round(MOST_UNREAD_S * self.sample_rate_hz), 1)
+        forces, longest = self.forces.copy(), max(round(most_unread_s * self.sample_rate_hz), 1)
         for stretch in self.segments():
             for cuff in range(len(CUFFS)):
                 forces[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
@@ -237,8 +226,11 @@ class Motion:
 
     @property
     def _load_cutoff_hz(self) -> float:
+        # Cut-off of a load before it is differentiated twice. Noise at 25 Hz would otherwise have
+        # 600 times the weight of noise at 1 Hz.
+        load_cutoff_hz = 5.0
         # After averaging over long blocks, a motion's rate may be below the cut-off of loads.
-        return min(self.cutoff_hz, LOAD_CUTOFF_HZ, 0.4 * self.sample_rate_hz)
+        return min(self.cutoff_hz, load_cutoff_hz, 0.4 * self.sample_rate_hz)
 
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Smooth and differentiate; the derivatives of the raw torque are noise."""
@@ -323,13 +315,17 @@ def _period(table: Table) -> float | None:
     InputError
         If the period is shorter than a few samples.
     """
+    # Least number of samples in a period.
+    shortest_period = 4
+    # Ratio of period to recording above which the period is ignored.
+    ignored_period = 10
     period_s, rate_hz = table.metadata.get("period_s"), float(table.metadata["sample_rate_hz"])
-    if period_s is None or period_s * rate_hz > IGNORED_PERIOD * len(table.frame):
+    if period_s is None or period_s * rate_hz > ignored_period * len(table.frame):
         return None
-    if period_s * rate_hz < SHORTEST_PERIOD:
+    if period_s * rate_hz < shortest_period:
         raise InputError(
             f"{table.path or 'recording'}: period_s is {period_s:g} s, at {rate_hz:g} Hz less than"
-            f" {SHORTEST_PERIOD} samples, expected the period of the excitation; correct or"
+            f" {shortest_period} samples, expected the period of the excitation; correct or"
             " remove it"
         )
     return float(period_s)

@@ -20,7 +20,6 @@ RUNS = ("exo_alone", "with_human")
 
 WINDOW = 2**16
 """Samples in a piece."""
-FITTED = ("angle", "velocity", "acceleration", "torque")
 
 
 class Run(Protocol):
@@ -131,7 +130,8 @@ class StoredRun:
     @cached_property
     def _columns(self) -> list[str]:
         """Columns that a fit needs, with temperatures if the file has them."""
-        quantities = [joint.column(quantity) for quantity in FITTED for joint in self.rows.joints]
+        fitted = ("angle", "velocity", "acceleration", "torque")
+        quantities = [joint.column(quantity) for quantity in fitted for joint in self.rows.joints]
         read = [joint.column("temperature") for joint in self.rows.joints]
         return [
             "time_s",

@@ -16,9 +16,6 @@ from pipelines.mechanics.one_machine import refuse_several_machines
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.units import Scale
 
-TORQUE_NM, SPEED_RAD_S, TRAVEL_RAD = 20.0, 0.7, 1.2
-"""Rms torque, rms speed and range of angles of an exoskeleton's joint in an identification run."""
-
 Measured = TypeVar("Measured", bound=Run)
 
 
@@ -41,6 +38,8 @@ def on_one_scale(runs: Sequence[Measured]) -> list[Measured]:
 
 
 def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
+    # Rms torque, rms speed and range of angles of an exoskeleton's joint in an identification run.
+    torque_nm, speed_rad_s, travel_rad = 20.0, 0.7, 1.2
     joints, count = len(runs[0].joints), 0
     squares, low, high = np.zeros((2, joints)), np.full(joints, np.inf), np.full(joints, -np.inf)
     for run in runs:
@@ -57,10 +56,10 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
     # A joint at rest or a dead channel has no scale; such runs are refused elsewhere.
     return tuple(
         Scale(
-            torque=float(torque[j]) / TORQUE_NM if torque[j] > 0 else 1.0,
-            speed=float(speed[j]) / SPEED_RAD_S if speed[j] > 0 else 1.0,
+            torque=float(torque[j]) / torque_nm if torque[j] > 0 else 1.0,
+            speed=float(speed[j]) / speed_rad_s if speed[j] > 0 else 1.0,
             # Angles do not scale with the machine, because its equations contain their sines.
-            travel=float(high[j] - low[j]) / TRAVEL_RAD
+            travel=float(high[j] - low[j]) / travel_rad
             if joint.kind == "prismatic" and high[j] > low[j]
             else 1.0,
         )

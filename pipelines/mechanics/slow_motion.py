@@ -9,9 +9,6 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import dilate
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
-EDGE_PERIODS = 1.5
-"""Periods of the cut-off at each end of a stretch where the filter lacks one side."""
-
 
 def edge(rate_hz: float, cutoff_hz: float) -> int:
     """Return the length of a stretch's ends, where the filter lacks one side.
@@ -26,7 +23,9 @@ def edge(rate_hz: float, cutoff_hz: float) -> int:
     int
         Samples at each end.
     """
-    return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
+    # Periods of the cut-off at each end of a stretch where the filter lacks one side.
+    edge_periods = 1.5
+    return int(np.ceil(edge_periods * rate_hz / cutoff_hz))
 
 
 def unsure(motion: Motion, cutoff_hz: float) -> NDArray:

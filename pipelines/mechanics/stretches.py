@@ -8,12 +8,6 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError
 
-GAP = 1.5
-"""Sample periods between two samples that make a gap, unless it is bridged."""
-BRIDGED_S = 0.022
-"""Length of a gap that is bridged by interpolation. No leg moves noticeably in it, and a bus that
-loses single samples, or a clock that is late once, would otherwise leave no stretch long enough for
-the filter."""
 JITTER = 0.02
 """Deviation from the uniform grid, in sample periods, above which samples are interpolated."""
 
@@ -79,6 +73,12 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
     InputError
         If the times do not advance at about ``rate_hz``.
     """
+    # Sample periods between two samples that make a gap, unless it is bridged.
+    gap = 1.5
+    # Length of a gap that is bridged by interpolation. No leg moves noticeably in it, and a bus
+    # that loses single samples, or a clock that is late once, would otherwise leave no stretch long
+    # enough for the filter.
+    bridged_s = 0.022
     starts: list[int] = []
     origins: list[float] = []
     strayed: list[float] = []
@@ -87,7 +87,7 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
     for time in times:
         step = np.diff(time, prepend=before)
         steps += [float(np.median(step[np.isfinite(step)]))] if np.isfinite(step).any() else []
-        begins = np.flatnonzero(step > max(GAP / rate_hz, BRIDGED_S))
+        begins = np.flatnonzero(step > max(gap / rate_hz, bridged_s))
         # The first entry continues the stretch of the piece before, even without rows here.
         start_of, origin_of = np.append(start, row + begins), np.append(origin, time[begins])
         number = np.searchsorted(begins, np.arange(len(time)), "right")

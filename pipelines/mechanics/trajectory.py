@@ -17,10 +17,6 @@ from pipelines.validation.suggestion import similar_file
 
 Trajectory = FourierTrajectory | SampledTrajectory
 
-COEFFICIENTS = ("omega_rad_s", "theta0_rad", "a", "b")
-
-ROUNDING_RAD = 1e-5
-"""Greatest difference, rad, between samples and their coefficients that is rounding error."""
 
 Row = tuple[float, ...]
 
@@ -105,8 +101,9 @@ def _trajectory_from_table(table: Table) -> Trajectory:
     Its coefficients are used if it has them, and its samples otherwise. Samples repeat if the
     metadata hold ``omega_rad_s``, and run once if they do not.
     """
+    coefficients = ("omega_rad_s", "theta0_rad", "a", "b")
     metadata = table.metadata
-    missing = [key for key in COEFFICIENTS if metadata.get(key) is None]
+    missing = [key for key in coefficients if metadata.get(key) is None]
     if missing:
         return _sampled(table)
     trajectory = FourierTrajectory(
@@ -140,6 +137,8 @@ def _sampled(table: Table) -> SampledTrajectory:
 
 def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
     """Refuse a table whose coefficients and samples are different motions."""
+    # Greatest difference, rad, between samples and their coefficients that is rounding error.
+    rounding_rad = 1e-5
     if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (
         len(table.joints),
     ):
@@ -151,7 +150,7 @@ def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
     stated = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
     angles = table.stacked("angle")
     row, joint = np.unravel_index(np.argmax(np.abs(angles - stated)), angles.shape)
-    if abs(angles[row, joint] - stated[row, joint]) > ROUNDING_RAD:
+    if abs(angles[row, joint] - stated[row, joint]) > rounding_rad:
         raise ContractError(
             f"{table.path}: column {table.joints[joint].column('angle')}, row {row}: found"
             f" {angles[row, joint]:.6g}, but the metadata's coefficients give"

@@ -6,10 +6,6 @@ from itertools import combinations
 from pipelines.errors import InputError
 from pipelines.mechanics.run import Run
 
-IN_ORDER = 20
-"""Rows that may overlap between adjacent spans, because an import sorts as many that arrived
-late."""
-
 
 def refuse_seen(runs: Sequence[Run]) -> None:
     """Refuse a training and a validation run that were imported from the same rows of a log.
@@ -21,9 +17,12 @@ def refuse_seen(runs: Sequence[Run]) -> None:
     InputError
         If two runs share rows.
     """
+    # Rows that may overlap between adjacent spans, because an import sorts as many that arrived
+    # late.
+    in_order = 20
     for one, other in combinations(runs, 2):
         shared = _shared_rows(one, other) if one.purpose != other.purpose else 0
-        if shared > IN_ORDER:
+        if shared > in_order:
             raise InputError(
                 f"{other.file} ({other.purpose}) and {one.file} ({one.purpose}) have {shared} rows"
                 f" of {one.metadata['imported']['source']} in common, expected none: validation"

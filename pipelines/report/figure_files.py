@@ -13,9 +13,6 @@ from pipelines.report.sections.error_budget import budget, falls
 from pipelines.report.session import Session
 from pipelines.report.session_charts import charts
 
-DPI = 200
-"""Resolution of PNG files."""
-
 Drawings = dict[str, Callable[[], Figure]]
 """Functions that draw a figure, by the name of its file."""
 
@@ -33,7 +30,9 @@ def draw(
     drawings: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]
 ) -> None:
     """Write figures as PDF and PNG into a folder; ``report`` receives the number written."""
-    with plt.rc_context(STYLE | {"savefig.dpi": DPI}):
+    # Resolution of PNG files.
+    dpi = 200
+    with plt.rc_context(STYLE | {"savefig.dpi": dpi}):
         for number, name in enumerate(names):
             figure = drawings[name]()
             # Computes the layout, which `save` measures.

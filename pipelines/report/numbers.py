@@ -4,8 +4,6 @@ from math import floor, isfinite, log10
 
 DIGITS = 3
 """Significant digits of a number without an interval."""
-HALF_DIGITS = 2
-"""Significant digits of half an interval, to which its middle and ends are rounded."""
 PLAIN = (1e-4, 1e6)
 """Range of magnitudes written without a power of ten."""
 
@@ -27,9 +25,11 @@ def digits_for(value: float, half: float | None) -> str:
     half : float or None
         Half-width of its interval; like ``digits`` without one.
     """
+    # Significant digits of half an interval, to which its middle and ends are rounded.
+    half_digits = 2
     if not half or not isfinite(half):
         return digits(value)
-    return _written(value, _decimals(half, HALF_DIGITS))
+    return _written(value, _decimals(half, half_digits))
 
 
 def _decimals(value: float, significant: int) -> int:

@@ -12,7 +12,6 @@ from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 
-DOCUMENTS = ("verdict/1", "detectability/1")
 CONTRACT_KEY = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
 """Recognizes a damaged document of exoid."""
 
@@ -316,6 +315,7 @@ def _artifact(path: Path) -> Artifact | None:
 
 
 def _document(path: Path) -> Artifact | None:
+    documents = ("verdict/1", "detectability/1")
     try:
         content = verdicts.parsed(path)
     except ContractError:
@@ -325,7 +325,7 @@ def _document(path: Path) -> Artifact | None:
             raise
         return None  # Not written by exoid.
     contract = content.get("contract") if isinstance(content, dict) else None
-    if contract not in DOCUMENTS:
+    if contract not in documents:
         return None
     if contract == "verdict/1":
         verdicts.check(content, str(path))

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from pipelines.rig.plant import Samples
 from pipelines.signals.interpolation import cubic_weights
 
-DELAY = 2.5
-"""Samples of the plant from a device's sampling instant until the sample is available."""
 KEPT = 16
 """Earlier samples of the plant that the interpolation keeps."""
 
@@ -39,8 +37,10 @@ class OwnClock:
         Samples
             Interpolated at the device's instants; none between two of them.
         """
+        # Samples of the plant from a device's sampling instant until the sample is available.
+        delay = 2.5
         self._seen.append(chunk)
-        latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
+        latest = (chunk.sequence[-1] + 1 - delay) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
         if count <= self._sampled:
             return _last(chunk, 0)

@@ -8,8 +8,6 @@ EXTRAPOLATED = 5
 """Cycles for which a drive continues at its set-points' speed without one; then it slows down."""
 EARLY, LATE = 0.25, 0.5
 """Shares of a cycle by which a set-point may come early or late and still be identified."""
-CATCH = 0.02
-"""Gain by which the drive's cycles follow the set-points' instants."""
 
 
 class Servo:
@@ -84,6 +82,8 @@ class Servo:
         control : int
             Control word.
         """
+        # Gain by which the drive's cycles follow the set-points' instants.
+        catch = 0.02
         # NaN would remain in the arithmetic for ever, so the drive holds instead.
         set_point = reference if isfinite(reference) else self._last
         cycles = self._cycles_to(set_point)
@@ -94,7 +94,7 @@ class Servo:
             self._pace = 0.0
         # One cycle after the last set-point's; CATCH slowly adapts this to when set-points come.
         way = self._way - self._since + cycles * self._cycle
-        self._from, self._way = self._last, max(way + CATCH * (self._cycle - way), 1.0)
+        self._from, self._way = self._last, max(way + catch * (self._cycle - way), 1.0)
         self._since = 0
         if control == self._map.fault_reset:
             self.fault = False

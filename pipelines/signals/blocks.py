@@ -12,9 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-HALF_POWER = 0.443
-"""Half-power frequency of a running mean times its length."""
-
 
 @dataclass(frozen=True)
 class BlockAverage:
@@ -48,7 +45,9 @@ class BlockAverage:
         float
             Hz.
         """
-        return HALF_POWER * rate_hz / self.decimation
+        # Half-power frequency of a running mean times its length.
+        half_power = 0.443
+        return half_power * rate_hz / self.decimation
 
     def as_metadata(self, rate_hz: float) -> dict[str, Any]:
         """Return the filter's entry in the metadata of ``motion/1``."""

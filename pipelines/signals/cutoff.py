@@ -10,23 +10,12 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from pipelines.signals.welch import Welch
 
 WINDOW_S = 10.0
-NOISE_BAND = (0.6, 0.96)
-"""Band, as shares of the Nyquist frequency, in which an angle holds only noise."""
 HIGHEST_HZ = 12.5
 """Highest cut-off, within the limits of ``HIGHEST_SHARE``. Above it is only the motion of joints
 that stick at reversals, and no fit uses that."""
 HIGHEST_SHARE = (0.125, 0.25)
 """Limits of the highest cut-off as shares of the Nyquist frequency. They act above 200 Hz and below
 100 Hz."""
-SLOW_SHARE = 0.9999
-"""Share of the signal's power that counts as motion; the filter must not change it."""
-BEFORE_NOISE = 0.7
-"""Cut-off over the frequency where signal and noise meet. In acceleration, noise exceeds the signal
-well below that frequency."""
-QUIET_HZ = 3.0
-"""Width of a noise band above which no more signal is expected."""
-CLEAR = 3.0
-"""Ratio to the noise floor above which a spectrum is signal."""
 
 
 @dataclass(frozen=True)
@@ -62,16 +51,24 @@ def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
     rate_hz : float
         Sample rate.
     """
+    # Band, as shares of the Nyquist frequency, in which an angle holds only noise.
+    noise_band = (0.6, 0.96)
+    # Share of the signal's power that counts as motion; the filter must not change it.
+    slow_share = 0.9999
+    # Width of a noise band above which no more signal is expected.
+    quiet_hz = 3.0
+    # Ratio to the noise floor above which a spectrum is signal.
+    clear = 3.0
     nyquist = rate_hz / 2
-    band = (frequency >= NOISE_BAND[0] * nyquist) & (frequency <= NOISE_BAND[1] * nyquist)
+    band = (frequency >= noise_band[0] * nyquist) & (frequency <= noise_band[1] * nyquist)
     floor = float(np.median(density[band]))
-    above = uniform_filter1d(density, max(1, len(frequency) // 100), mode="nearest") > CLEAR * floor
+    above = uniform_filter1d(density, max(1, len(frequency) // 100), mode="nearest") > clear * floor
     # A periodic motion has gaps between its lines: it ends where a wide band holds only noise.
-    ahead = max(1, int(QUIET_HZ / frequency[1]))
+    ahead = max(1, int(quiet_hz / frequency[1]))
     quiet = ~maximum_filter1d(above, ahead, origin=-(ahead // 2), mode="nearest")
     meets = frequency[np.argmax(quiet)] if quiet.any() else nyquist
     power = np.cumsum(np.maximum(density - floor, 0.0))
-    motion = frequency[np.searchsorted(power, SLOW_SHARE * power[-1])] if power[-1] > 0 else 0.0
+    motion = frequency[np.searchsorted(power, slow_share * power[-1])] if power[-1] > 0 else 0.0
     return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
 
 
@@ -94,6 +91,9 @@ def choose_cutoff(
     channels : tuple of str
         Names of the channels, for the reason.
     """
+    # Cut-off over the frequency where signal and noise meet. In acceleration, noise exceeds the
+    # signal well below that frequency.
+    before_noise = 0.7
     welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
     for piece in pieces:
         welch.add(piece)
@@ -105,7 +105,7 @@ def choose_cutoff(
     fastest = int(np.argmax([s.motion_hz for s in spectra]))
     needed = min(2.0 * spectra[fastest].motion_hz, highest)
     reason = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
-    chosen = BEFORE_NOISE * meets
+    chosen = before_noise * meets
     if chosen < needed:
         return Cutoff(
             needed, f"{reason}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz"

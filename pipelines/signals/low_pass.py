@@ -12,9 +12,6 @@ ORDER = 4
 DERIVATIVE_STENCIL = 5
 """Samples in the difference formula; it is exact for polynomials of degree 4."""
 
-NEGLIGIBLE = 1e-18
-"""Share of a cut's influence that is ignored; it is below rounding."""
-
 
 def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
     """Return the number of samples over which a cut in the data influences the filter.
@@ -33,10 +30,12 @@ def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
     int
         Samples on each side of the cut.
     """
+    # Share of a cut's influence that is ignored; it is below rounding.
+    negligible = 1e-18
     from scipy.signal import butter
 
     _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
-    fading = int(np.ceil(np.log(NEGLIGIBLE) / np.log(np.max(np.abs(poles)))))
+    fading = int(np.ceil(np.log(negligible) / np.log(np.max(np.abs(poles)))))
     return (
         max(fading, shortest(rate_hz, cutoff_hz), _padding(rate_hz, cutoff_hz)) + DERIVATIVE_STENCIL
     )

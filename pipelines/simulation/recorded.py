@@ -20,8 +20,6 @@ from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult, known_temperature
 from pipelines.mechanics.motion import Motion
 
-NO_LIMIT_NM = 1e9
-
 
 @dataclass(frozen=True)
 class UnderReferences:
@@ -86,11 +84,12 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
 
 
 def _drives(motion: Motion) -> Drives:
+    no_limit_nm = 1e9
     of_joints = [motion.metadata["controller"][joint] for joint in motion.joints]
     return make_drives(
         kp=np.array([c["kp_nm_rad"] for c in of_joints], dtype=float),
         kd=np.array([c["kd_nm_s_rad"] for c in of_joints], dtype=float),
-        limit=np.array([c.get("limit_nm") or NO_LIMIT_NM for c in of_joints]),
+        limit=np.array([c.get("limit_nm") or no_limit_nm for c in of_joints]),
         counts_per_turn=np.zeros(len(of_joints)),
         rate_hz=max(c.get("rate_hz") or motion.sample_rate_hz for c in of_joints),
         sample_rate_hz=motion.sample_rate_hz,

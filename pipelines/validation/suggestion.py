@@ -14,7 +14,9 @@ def suggestion(word: str, known: list[str]) -> str:
 
 def closest(word: str, known: Sequence[str]) -> str | None:
     """Return the known name most similar to a mistyped or shortened word, if any is similar."""
-    similar = (name for name in known if _likeness(word, name) > LIKE)
+    # Likeness above which a name is suggested, as in difflib.
+    like = 0.6
+    similar = (name for name in known if _likeness(word, name) > like)
     return max(similar, key=partial(_likeness, word), default=None)
 
 
@@ -29,10 +31,6 @@ def similar_file(path: Path) -> str:
     # Names of runs of one kind are similar, but not mistyped.
     near = difflib.get_close_matches(path.name, names, 1, cutoff=0.85)
     return f"did you mean {path.parent / near[0]}?" if near else ""
-
-
-LIKE = 0.6
-"""Likeness above which a name is suggested, as in difflib."""
 
 
 def _likeness(word: str, name: str) -> float:

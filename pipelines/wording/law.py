@@ -7,8 +7,6 @@ LAW = "law:"
 """Prefix of the label of an unlisted law."""
 UNLISTED = "unlisted_"
 """Prefix of the kind of an unlisted effect that resembles a listed cause, before its family."""
-OTHER = "other"
-"""Word in the kind of a law of the other joint's motion."""
 FAMILIES = {
     "angle": "angle",
     "other_angle": "angle",
@@ -93,7 +91,9 @@ def law_in_words(label: str, machine: Machine | None = None) -> str:
 
 def is_of_other_joint(label: str) -> bool:
     """Return whether a law depends on the other joint's motion."""
-    return OTHER in kind_and_joint(label)[0].split("_")
+    # Word in the kind of a law of the other joint's motion.
+    other = "other"
+    return other in kind_and_joint(label)[0].split("_")
 
 
 def family_in_words(

@@ -79,6 +79,14 @@ def graph(
     imported : ImportedRuns, optional
         Runs whose recordings were imported: no step makes these, see ``with_imported``.
     """
+    identified = ("residuals.parquet",)
+    # Files that these commands always write next to their target; figures are not checked.
+    diagnosed = (
+        "parameters.parquet",
+        "residuals.parquet",
+        "candidates.parquet",
+        "detectability.json",
+    )
     config_option, runs = ("--config", config.as_posix()), experiment.run
     validate = [run for run in runs if run.purpose == "validate"]
     recordings = {run.name: out / "recordings" / f"{run.name}.parquet" for run in runs}
@@ -116,13 +124,13 @@ def graph(
     counted: tuple[str, ...] = ("identify", "mechanism")
     words = ("identify", *_words(motions))
     steps.append(
-        step("identify", parameters, motions.values(), counted, *words, other_outputs=IDENTIFIED)
+        step("identify", parameters, motions.values(), counted, *words, other_outputs=identified)
     )
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
         verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
         words = ("diagnose", *_words(recordings))
         steps.append(
-            step("diagnose", verdict, recordings.values(), counted, *words, other_outputs=DIAGNOSED)
+            step("diagnose", verdict, recordings.values(), counted, *words, other_outputs=diagnosed)
         )
         extended = verdict.with_name("parameters.parquet")
 
@@ -164,9 +172,6 @@ def graph(
 
 
 LOOP, SWEEP, WHOLE_FOLDER = "rbf.parquet", "kv-sweep.csv", ("identify", "diagnose")
-IDENTIFIED = ("residuals.parquet",)
-DIAGNOSED = ("parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json")
-"""Files that these commands always write next to their target; figures are not checked."""
 
 
 def _output(stage: str, target: Path) -> str:

@@ -37,15 +37,13 @@ class ImportedRuns:
 
 def damage(files: Sequence[Path]) -> str:
     """Return a message on recordings that cannot be read, with a remedy."""
+    damaged = "damaged or truncated"
     names, several = ", ".join(file.as_posix() for file in files), len(files) > 1
     return (
-        f"{names}: {DAMAGED}, and nothing is done without {'them' if several else 'it'};"
+        f"{names}: {damaged}, and nothing is done without {'them' if several else 'it'};"
         f" {'import them' if several else 'import it'} again, or remove"
         f" {'them' if several else 'it'}"
     )
-
-
-DAMAGED = "damaged or truncated"
 
 
 def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, ImportedRuns]:

@@ -11,9 +11,6 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.probe import Probe
 
-MOST_LATE = 0.05
-"""Largest allowed share of cycles that take longer than a sample: a run misses those."""
-
 
 @dataclass(frozen=True)
 class Rate:
@@ -81,9 +78,11 @@ def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
     Finding
         At most one, with a remedy.
     """
-    if rate.cycles_hz >= rate_hz and rate.late <= MOST_LATE:
+    # Largest allowed share of cycles that take longer than a sample: a run misses those.
+    most_late = 0.05
+    if rate.cycles_hz >= rate_hz and rate.late <= most_late:
         return
-    enough = drives.cycles_hz >= rate_hz and drives.late <= MOST_LATE
+    enough = drives.cycles_hz >= rate_hz and drives.late <= most_late
     remedy = (
         "raise `every` of the sensors"
         if enough

@@ -25,9 +25,6 @@ from pipelines.acquisition.pacing import SLOW
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
-READS = 200
-READS_S = 2.0
-"""Readings of each device alone, and their longest duration."""
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
 """Durations of cycles with all devices, and with the drives alone."""
@@ -151,14 +148,16 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
 
 async def _measure_device(probe: Probe, report: DeviceReport) -> None:
     """Read a device's identity, then its block many times."""
+    # Readings of each device alone, and their longest duration.
+    reads, reads_s = 200, 2.0
     device, loop = probe.part.device, asyncio.get_running_loop()
     report.connected = True
     for entry in probe.part.map.identity:
         (value,) = await device.read(entry.address, 1)
         report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
     await device.check_identity(probe.part.map.identity)
-    until = loop.time() + READS_S
-    for k in range(READS):
+    until = loop.time() + reads_s
+    for k in range(reads):
         if k and loop.time() > until:
             break
         await probe.read()

@@ -15,10 +15,6 @@ BUCKET_S = 0.5
 """Time within which a drift may be neglected: 50 ppm are 25 us then."""
 FLOOR = 0.01
 """Smallest credible width of bounds, in samples: request and reply take different times."""
-MEMORY_S = 300.0
-"""Time constant with which old bounds are forgotten: a quartz depends on its temperature."""
-USUAL = 200e-6
-"""Prior standard deviation of the relative difference of two clocks' rates."""
 
 
 class Bounds:
@@ -108,8 +104,10 @@ class Drift:
     """A straight line through a drive's leads, fitted with exponentially fading weights."""
 
     def __init__(self, rate_hz: float) -> None:
+        # Prior standard deviation of the relative difference of two clocks' rates.
+        usual = 200e-6
         self._rate_hz = rate_hz
-        self._prior = np.diag([0.0, (USUAL * rate_hz) ** -2])
+        self._prior = np.diag([0.0, (usual * rate_hz) ** -2])
         self._sums = np.zeros((2, 2))
         self._moment = np.zeros(2)
         self._buckets = 0.0
@@ -126,6 +124,8 @@ class Drift:
         first, other : tuple of float
             Origin and width, s.
         """
+        # Time constant with which old bounds are forgotten: a quartz depends on its temperature.
+        memory_s = 300.0
         lead = (first[0] - other[0]) * self._rate_hz
         width = np.hypot(first[1], other[1]) * self._rate_hz
         if self._origin is None:
@@ -133,7 +133,7 @@ class Drift:
         # Uniform between the bounds: their width is sqrt(12) standard deviations.
         weight = 12.0 / (width**2 + 12.0 * FLOOR**2)
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
-        memory = np.exp(-BUCKET_S / MEMORY_S)
+        memory = np.exp(-BUCKET_S / memory_s)
         self._sums = memory * self._sums + weight * np.outer(row, row)
         self._moment = memory * self._moment + weight * row * (lead - self._origin[1])
         self._buckets = memory * self._buckets + 1.0

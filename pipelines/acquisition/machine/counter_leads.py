@@ -7,11 +7,6 @@ from pipelines.acquisition.machine.clock_offset import Bounds
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.reading import Reading
 
-SAME_TIME = 0.1
-"""Largest difference, in samples, between clocks that count as showing the same time."""
-MOST_LOOKS = 200
-"""Most readings of each drive."""
-
 
 async def find_leads(drives: Sequence[Drive], rate_hz: float) -> list[int | None]:
     """Return the samples by which each drive is ahead of the first.
@@ -31,12 +26,14 @@ async def find_leads(drives: Sequence[Drive], rate_hz: float) -> list[int | None
     list
         Samples, 0 for the first; None where a lead is unclear.
     """
+    # Most readings of each drive.
+    most_looks = 200
     all_bounds = [Bounds(1.0 / rate_hz) for _ in drives]
     for drive, bounds in zip(drives, all_bounds, strict=True):
         drive.bounds = bounds
     leads: list[int | None] = []
     try:
-        for _ in range(MOST_LOOKS):
+        for _ in range(most_looks):
             readings = await asyncio.gather(*(drive.look() for drive in drives))
             leads = [
                 _lead(all_bounds[0], bounds, readings[0], reading, rate_hz)
@@ -53,11 +50,13 @@ async def find_leads(drives: Sequence[Drive], rate_hz: float) -> list[int | None
 def _lead(
     first_bounds: Bounds, bounds: Bounds, first: Reading, other: Reading, rate_hz: float
 ) -> int | None:
+    # Largest difference, in samples, between clocks that count as showing the same time.
+    same_time = 0.1
     (first_origin, first_width), (origin, width) = first_bounds.now(), bounds.now()
     bounded = (first_origin - origin) * rate_hz
     margin = (first_width + width) * rate_hz / 2
     by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
     nearest = round(by_clock)
-    if abs(by_clock - nearest) < SAME_TIME and abs(nearest - bounded) <= margin + 0.5:
+    if abs(by_clock - nearest) < same_time and abs(nearest - bounded) <= margin + 0.5:
         return nearest
     return round(bounded) if margin <= 0.5 else None

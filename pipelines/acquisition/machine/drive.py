@@ -16,9 +16,6 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import DriveSettings
 
-MUST_BE_FINITE = ("sequence", "time", "status", "velocity", "temperature", "reference")
-"""Quantities that must be finite: NaN would mean that the drive does not report them."""
-
 
 class Drive:
     """One drive: set-points out, readings in."""
@@ -258,7 +255,9 @@ class Drive:
         return self._refuse_not_finite(block.decode(words))
 
     def _refuse_not_finite(self, values: Mapping[str, float]) -> Mapping[str, float]:
-        for name in MUST_BE_FINITE:
+        # Quantities that must be finite: NaN would mean that the drive does not report them.
+        must_be_finite = ("sequence", "time", "status", "velocity", "temperature", "reference")
+        for name in must_be_finite:
             if not isfinite(values.get(name, 0.0)):
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {values[name]}, expected a number; compare"

@@ -9,18 +9,10 @@ from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
 from pipelines.errors import DeviceError, Refused, SettingsError
 
-STATUS_PAUSE_S = 0.002
-"""Pause between two readings of a status word that has not changed yet."""
 EMPTYING_S = 10.0
 """Longest time to empty a drive's queue: thousands of records, a few with each read."""
-RATE_S = 0.5
-"""How long a drive's counter and clock are watched before a run."""
 WATCH_S = 0.5
 """How long an enabled drive is watched before a run for another program that drives it."""
-WATCH_PAUSE_S = 0.05
-"""Pause between two readings while it is watched."""
-DRIVEN_RAD = 0.005
-"""Change of its angle within ``WATCH_S`` that means that another program drives it."""
 
 
 async def is_driven(drive: Drive) -> bool:
@@ -29,15 +21,19 @@ async def is_driven(drive: Drive) -> bool:
     A drive that reports that it is disabled is not driven. Nothing is written: a torque that is
     taken away comes back with the other program's next set-point.
     """
+    # Pause between two readings while it is watched.
+    watch_pause_s = 0.05
+    # Change of its angle within WATCH_S that means that another program drives it.
+    driven_rad = 0.005
     values = await drive.read_values()
     if drive.map.enabled_mask and not drive.says_enabled(int(values["status"])):
         return False
     until = time.monotonic() + WATCH_S
     first_words, first_angle = await _set_point_and_angle(drive)
     while time.monotonic() < until:
-        await asyncio.sleep(WATCH_PAUSE_S)
+        await asyncio.sleep(watch_pause_s)
         words, angle = await _set_point_and_angle(drive)
-        if words != first_words or not abs(angle - first_angle) <= DRIVEN_RAD:
+        if words != first_words or not abs(angle - first_angle) <= driven_rad:
             return True
     return False
 
@@ -106,6 +102,8 @@ async def reset_fault(drive: Drive) -> None:
 
 async def _wait_for(drive: Drive, is_done: Callable[[int], bool], purpose: str) -> None:
     """Read the status word until it confirms a control word."""
+    # Pause between two readings of a status word that has not changed yet.
+    status_pause_s = 0.002
     until = time.monotonic() + drive.control_s
     while True:
         status = await drive.read_status()
@@ -116,7 +114,7 @@ async def _wait_for(drive: Drive, is_done: Callable[[int], bool], purpose: str) 
                 f"{drive.device.label}: was sent the word {purpose}, but its status word is still"
                 f" 0x{status:04X} after {drive.control_s:g} s (safety.control_s); see its manual"
             )
-        await asyncio.sleep(STATUS_PAUSE_S)
+        await asyncio.sleep(status_pause_s)
 
 
 async def refuse_other_rate(drive: Drive, rate_hz: float, setting: str) -> None:
@@ -127,10 +125,12 @@ async def refuse_other_rate(drive: Drive, rate_hz: float, setting: str) -> None:
     DeviceError
         Names the ``setting`` with the expected rate.
     """
+    # How long a drive's counter and clock are watched before a run.
+    rate_s = 0.5
     asked = time.perf_counter()
     first = await drive.look()
     answered = time.perf_counter()
-    await asyncio.sleep(RATE_S)
+    await asyncio.sleep(rate_s)
     asked_again = time.perf_counter()
     last = await drive.look()
     longest, shortest = time.perf_counter() - asked, asked_again - answered

@@ -13,11 +13,6 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import SensorSettings
 
-SETTLED_S = 0.5
-"""Time from which on the rate of a sensor's counter is known."""
-LEAP = 2.0
-"""Factor by which a counter may exceed its rate between two samples, and samples added to that."""
-
 
 class Sensor:
     """One 3-axis force sensor."""
@@ -90,8 +85,13 @@ class Sensor:
 
         Unlimited in lockstep, where no time passes, and until the rate is known.
         """
+        # Time from which on the rate of a sensor's counter is known.
+        settled_s = 0.5
+        # Factor by which a counter may exceed its rate between two samples, and samples added to
+        # that.
+        leap = 2.0
         assert self._first and self._last  # this is not the first sample
         (first, since), (last, until) = self._first, self._last
-        if self._in_lockstep or until - since < SETTLED_S:
+        if self._in_lockstep or until - since < settled_s:
             return inf
-        return LEAP * (1.0 + (last - first) / (until - since) * (now - until + self._reply_s))
+        return leap * (1.0 + (last - first) / (until - since) * (now - until + self._reply_s))

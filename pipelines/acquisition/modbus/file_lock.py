@@ -11,9 +11,6 @@ try:
 except ImportError:  # on Windows
     fcntl = None  # type: ignore[assignment]
 
-FAR = 1 << 40
-"""Offset of the byte that Windows locks, beyond any content: no one else can read locked bytes."""
-
 
 def take(file: IO[bytes], *, wait: bool) -> bool:
     """Lock an open file; return False, or ``wait``, where another process holds the lock."""
@@ -27,10 +24,12 @@ def take(file: IO[bytes], *, wait: bool) -> bool:
 
 
 def _take_a_byte(file: IO[bytes], *, wait: bool) -> bool:
+    # Offset of the byte that Windows locks, beyond any content: no one else can read locked bytes.
+    far = 1 << 40
     import msvcrt  # its contents are known to mypy only on Windows
 
     place = file.tell()
-    file.seek(FAR)
+    file.seek(far)
     try:
         how = msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK  # type: ignore[attr-defined]
         msvcrt.locking(file.fileno(), how, 1)  # type: ignore[attr-defined]

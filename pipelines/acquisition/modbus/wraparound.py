@@ -2,8 +2,6 @@
 
 RATE_TOLERANCE = 0.05
 """Largest relative difference between a device's rate and the expected one."""
-CLOCK_SAMPLES = 0.5
-"""Further difference allowed between clock and counter of two samples, in samples."""
 
 
 def unwrap(value: float, near: float, span: float) -> float:
@@ -46,4 +44,6 @@ def keeps_time(samples: float, seconds: float, rate_hz: float) -> bool:
     rate_hz : float
         Sample rate, Hz.
     """
-    return abs(seconds * rate_hz - samples) <= CLOCK_SAMPLES + RATE_TOLERANCE * abs(samples)
+    # Further difference allowed between clock and counter of two samples, in samples.
+    clock_samples = 0.5
+    return abs(seconds * rate_hz - samples) <= clock_samples + RATE_TOLERANCE * abs(samples)

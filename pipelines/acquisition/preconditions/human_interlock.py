@@ -3,8 +3,6 @@
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
-LIMITS = ("speed_rad_s", "torque_nm")
-
 
 def unmonitored(rig: RigSettings) -> list[str]:
     """Return in words which dangers go unnoticed on a rig while it moves a person."""
@@ -38,10 +36,11 @@ def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
     SettingsError
         Names the missing key, or a sensor that is read too seldom.
     """
+    limits = ("speed_rad_s", "torque_nm")
     if rig.plant is not None:
         return
     for i, drive in enumerate(rig.drive):
-        for limit in LIMITS:
+        for limit in limits:
             if getattr(drive.with_human, limit) is None:
                 raise SettingsError(
                     f"drive[{i}].with_human.{limit}: missing; a run with_human needs the"

@@ -15,8 +15,6 @@ from pipelines.errors import DeviceError
 
 REHEARSED_S, FEWEST = 0.5, 20
 """Duration of the rehearsal, and its fewest cycles."""
-MOST_LATE = 0.1
-"""Largest allowed share of late cycles: the computer may be busy for a moment."""
 
 
 async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
@@ -27,8 +25,10 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
     DeviceError
         Gives the number of late cycles.
     """
+    # Largest allowed share of late cycles: the computer may be busy for a moment.
+    most_late = 0.1
     cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
-    allowed = MOST_LATE * cycles
+    allowed = most_late * cycles
     late, done = await _late(machine, cycle_hz, cycles, allowed)
     if late <= allowed:
         return

@@ -6,9 +6,6 @@ from pipelines.errors import SettingsError
 from pipelines.settings.rig import Register, RigSettings
 from pipelines.settings.rig.register_map import DriveMap
 
-SAME_SCALE = 1e-3
-"""Relative difference of scales that are equal but for their number of digits."""
-
 
 def refuse_contradictory_set_points(rig: RigSettings) -> None:
     """Refuse a rig with a drive that would leap from where it stands when it is enabled.
@@ -49,11 +46,13 @@ def _contradiction(map_: DriveMap) -> str | None:
 
 def _difference(written: Register, read: Register) -> tuple[str, str, str] | None:
     """Return a key in which two registers of an angle differ, with both values; None for none."""
+    # Relative difference of scales that are equal but for their number of digits.
+    same_scale = 1e-3
     for key in ("type", "word_order", "byte_order"):
         one, other = getattr(written, key), getattr(read, key)
         if one != other and not (key == "word_order" and written.registers == 1):
             return key, one, other
-    if abs(written.si[0] / read.si[0] - 1.0) > SAME_SCALE:
+    if abs(written.si[0] / read.si[0] - 1.0) > same_scale:
         if written.scale == read.scale:
             return "unit", written.unit, read.unit
         return "scale", f"{written.scale:g} {written.unit}", f"{read.scale:g} {read.unit}"

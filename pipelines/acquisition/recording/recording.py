@@ -18,8 +18,6 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import aborted_of
 from pipelines.errors import ContractError
 
-PIECE_ROWS = 32768
-"""Samples that are held in memory at once."""
 LARGEST = 1e9
 """Largest credible rate, Hz, and duration, s."""
 
@@ -138,12 +136,14 @@ def write_recording(journal: JournalFile, path: Path, summary: JournalSummary, *
     **more
         Further metadata.
     """
+    # Samples that are held in memory at once.
+    piece_rows = 32768
     metadata = journal.metadata | summary.metadata | {"gaps": summary.gaps}
     if summary.abort:
         metadata["abort"] = summary.abort
     metadata |= more
     rows = (batch.rows for batch in valid_batches(journal))
-    RECORDING.write_pieces(path, in_pieces(rows, PIECE_ROWS), metadata)
+    RECORDING.write_pieces(path, in_pieces(rows, piece_rows), metadata)
 
 
 def recording_path(output: Path, abort: str | None) -> Path:

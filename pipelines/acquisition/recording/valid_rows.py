@@ -10,9 +10,6 @@ from pipelines.acquisition.modbus.wraparound import keeps_time
 from pipelines.acquisition.recording.journal_file import Batch, JournalFile
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 
-ALWAYS_MEASURED = ("_angle_rad", "_torque_nm")
-"""Endings of the columns that hold a number in every row."""
-
 
 def valid_batches(journal: JournalFile) -> Iterator[Batch]:
     """Yield a journal's batches without rows of impossible values or with a wrong counter or clock.
@@ -30,10 +27,12 @@ def valid_batches(journal: JournalFile) -> Iterator[Batch]:
 
 def _are_possible(rows: pa.RecordBatch) -> NDArray:
     """Mark the rows (n,) that have only values which a recording may hold."""
+    # Endings of the columns that hold a number in every row.
+    always_measured = ("_angle_rad", "_torque_nm")
     possible = np.ones(rows.num_rows, bool)
     for name, column in zip(rows.schema.names, rows.columns, strict=True):
         values = column.to_numpy(zero_copy_only=False)
-        if name.endswith(ALWAYS_MEASURED) or name == "time_s":
+        if name.endswith(always_measured) or name == "time_s":
             possible &= np.isfinite(values)
         else:
             possible &= ~np.isinf(values)

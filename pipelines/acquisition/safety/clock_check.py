@@ -3,17 +3,16 @@
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE, keeps_time
 
-SETTLED_CYCLES = 50
-"""Cycles after which a clock's rate is checked; by then a step differs from a wrong unit."""
-
 
 class ClockCheck:
     """The clock of one drive since its first sample."""
 
     def __init__(self, label: str, samples_per_cycle: int, rate_hz: float) -> None:
         """Check a drive with a label, which takes samples at a rate."""
+        # Cycles after which a clock's rate is checked; by then a step differs from a wrong unit.
+        settled_cycles = 50
         self._label, self._rate = label, rate_hz
-        self._fewest = SETTLED_CYCLES * samples_per_cycle
+        self._fewest = settled_cycles * samples_per_cycle
         self._first: Reading | None = None
 
     def begin(self, reading: Reading) -> None:

@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 from pipelines.acquisition.safety.stuck_register import STUCK_CYCLES, STUCK_RAD, StuckValue
 from pipelines.mechanics.motion import CUFFS
 
-LEAST_FORCE_N = 1e-6
-"""No sensor resolves less; a float whose words are swapped often is."""
-
 
 class CuffChecks:
     """The last readings of each cuff sensor."""
@@ -32,10 +29,12 @@ class CuffChecks:
         sent_travel : float
             How far the joints were sent up to then, rad.
         """
+        # No sensor resolves less; a float whose words are swapped often is.
+        least_force_n = 1e-6
         for force, name in zip(forces.tolist(), CUFFS, strict=True):
             if any(map(isnan, force)):
                 continue
-            if any(abs(axis) < LEAST_FORCE_N and axis != 0.0 for axis in force):
+            if any(abs(axis) < least_force_n and axis != 0.0 for axis in force):
                 return (
                     f"sensor {name}: reports forces of {_three(force)} N, smaller than any sensor"
                     " resolves; check the word order in the rig file"

@@ -12,7 +12,6 @@ from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DriveSettings, SensorSettings
 
-ROUNDING_RAD = 1e-9
 HOLD_SAMPLES = 20
 """Samples for which a stopped drive holds before its torque is taken away."""
 
@@ -199,13 +198,14 @@ def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: 
     DeviceError
         Names the joint, the set-point and the limit.
     """
+    rounding_rad = 1e-9
     low, high = drive.angle_rad
     if not low <= reference <= high:
         raise DeviceError(
             f"{drive.joint}: a set-point of {reference:.3f} rad was due, outside its limits {low:g}"
             f" to {high:g} rad; it was not sent"
         )
-    if not abs(reference - last) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD:
+    if not abs(reference - last) <= drive.speed_rad_s * allowed_s + rounding_rad:
         raise DeviceError(
             f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with"
             f" {allowed_s:.3f} s to get there, faster than its limit of {drive.speed_rad_s:g}"

@@ -3,9 +3,6 @@
 from pipelines.errors import SettingsError
 from pipelines.settings.rig import RigSettings
 
-FEWEST_SAMPLES = 3
-"""Samples that the watchdog waits for at least: a late one and a lost one are no reason to stop."""
-
 
 def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
     """Refuse a watchdog that expires between two samples.
@@ -15,11 +12,13 @@ def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
     SettingsError
         With the shortest time that is allowed.
     """
-    least = FEWEST_SAMPLES / sample_rate_hz
+    # Samples that the watchdog waits for at least: a late one and a lost one are no reason to stop.
+    fewest_samples = 3
+    least = fewest_samples / sample_rate_hz
     if rig.safety.watchdog_s < least:
         raise SettingsError(
             f"safety.watchdog_s: found {rig.safety.watchdog_s:g}, expected at least {least:.3g},"
-            f" {FEWEST_SAMPLES} samples at {sample_rate_hz:g} Hz, or it stops every run; raise it"
+            f" {fewest_samples} samples at {sample_rate_hz:g} Hz, or it stops every run; raise it"
         )
 
 

@@ -11,9 +11,6 @@ from pipelines.importing.guess.motion import TURNS
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
 
-FEW = 0.001
-"""Least share of rows in the upper half of a signed register; fewer may be outliers."""
-
 
 @dataclass(frozen=True)
 class Counting:
@@ -84,6 +81,8 @@ def lost_sign(values: NDArray) -> int | None:
     values : (n,) array
         Readings, NaN where missing.
     """
+    # Least share of rows in the upper half of a signed register; fewer may be outliers.
+    few = 0.001
     known = values[np.isfinite(values)]
     if np.any(known < 0) or not are_whole(known):
         return None
@@ -94,7 +93,7 @@ def lost_sign(values: NDArray) -> int | None:
         upper = np.count_nonzero(held >= full / 2)
         lower = np.count_nonzero(held < full / 2)
         empty = np.count_nonzero((held > 0.4 * full) & (held < 0.6 * full)) < 0.01 * len(known)
-        common = upper >= FEW * len(known) or (bits == 32 and upper)
+        common = upper >= few * len(known) or (bits == 32 and upper)
         if common and lower and empty and len(held) > 0.98 * len(known):
             return bits
     return None

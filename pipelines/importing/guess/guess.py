@@ -24,8 +24,6 @@ from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
-MOST_NAMES = 20
-"""Greatest number of columns in a message."""
 MOTION = ("angle", "reference")
 """Quantities that show the motion of a joint."""
 
@@ -112,8 +110,10 @@ def _check_columns(path: Path, first: Source) -> None:
 
 
 def _in_short(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    # Greatest number of columns in a message.
+    most_names = 20
+    more = f" and {len(names) - most_names} more" if len(names) > most_names else ""
+    return ", ".join(names[:most_names]) + more
 
 
 def _goes_back(values: NDArray) -> bool:

@@ -21,10 +21,6 @@ from pipelines.settings.units import UNITS
 
 FOLLOWS = 0.7
 """Least share of a torque's variance that the motion must explain before its sign is judged."""
-SWINGS_RAD = 2.0
-"""Least reach of a joint from which gravity shows the direction down."""
-HANGS_RAD = 0.15
-"""Error of that direction by friction and backlash; within it the log's zero hangs down."""
 
 
 def write_joint(
@@ -261,17 +257,21 @@ class _JointWriter:
         self.proposal.key("gear_ratio", ratio, why, sure=False)
 
     def _write_zero(self, fit: TorqueFit | None) -> None:
+        # Least reach of a joint from which gravity shows the direction down.
+        swings_rad = 2.0
+        # Error of that direction by friction and backlash; within it the log's zero hangs down.
+        hangs_rad = 0.15
         shows_gravity = (
             fit is not None
             and fit.explained >= FOLLOWS
             and fit.gravity_share >= 0.3
-            and fit.reach_rad >= SWINGS_RAD
+            and fit.reach_rad >= swings_rad
         )
         if fit is None or not shows_gravity:
             self.proposal.key("zero", 0.0, "reading where the joint is at zero", sure=False)
             return
         down = float(np.angle(-np.exp(1j * fit.down_rad))) if fit.backwards else fit.down_rad
-        if abs(down) < HANGS_RAD:
+        if abs(down) < hangs_rad:
             why = f"gravity's torque vanishes at {down:.2f} rad: zero hangs down"
             self.proposal.key("zero", 0.0, why)
             return

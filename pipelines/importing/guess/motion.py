@@ -14,14 +14,8 @@ FROM_NAME = "from its name"
 """Reason for a unit that is in the name of its column."""
 NEAR = 0.12
 """Largest relative error of a slope, as drives filter their velocities."""
-MANY = 100.0
-"""Least reach of whole numbers that are surely counts, not degrees."""
 CLEAR = 0.7
 """Least share of the variance that angle and velocity share if they are of one joint."""
-LEAST_GEAR, MOST_GEAR = 1.5, 1000.0
-"""Usual ratios of a gear between motor and joint."""
-WHOLE = 0.01
-"""Relative distance within which a gear ratio is rounded to a whole number."""
 VELOCITY_OF = {
     "rad": "rad/s",
     "mrad": "mrad/s",
@@ -140,11 +134,15 @@ def _turns(slope: float, unit: str, velocity: str) -> float:
 
 def _gear(slope: float, unit: str, velocity: str) -> float | None:
     """Return the gear ratio of a slope where both units are known; None if it is unusual."""
+    # Usual ratios of a gear between motor and joint.
+    least_gear, most_gear = 1.5, 1000.0
+    # Relative distance within which a gear ratio is rounded to a whole number.
+    whole = 0.01
     if UNITS[unit].dimension != "angle" or UNITS[velocity].dimension != "angular velocity":
         return None
     ratio = _turns(slope, unit, velocity)
-    near = round(ratio) if abs(ratio - round(ratio)) < WHOLE * ratio else float(f"{ratio:.3g}")
-    return float(near) if LEAST_GEAR < ratio < MOST_GEAR else None
+    near = round(ratio) if abs(ratio - round(ratio)) < whole * ratio else float(f"{ratio:.3g}")
+    return float(near) if least_gear < ratio < most_gear else None
 
 
 def counts_in_a_turn(
@@ -172,12 +170,14 @@ def counts_in_a_turn(
 
 
 def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
+    # Least reach of whole numbers that are surely counts, not degrees.
+    many = 100.0
     if named is not None:
         return named, FROM_NAME, True
     known = angle[np.isfinite(angle)]
     reach = float(np.max(np.abs(known)))
     if are_whole(known):
-        return "counts", "whole numbers only", reach > MANY
+        return "counts", "whole numbers only", reach > many
     by_step = _by_encoder_step(known)
     if by_step is not None:
         return by_step

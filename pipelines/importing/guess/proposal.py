@@ -4,9 +4,6 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-COLUMN = 44
-"""Column of the text at which reasons begin."""
-
 
 @dataclass(frozen=True)
 class Doubt:
@@ -59,4 +56,6 @@ class Proposal:
 
 
 def _with_reason(text: str, why: str) -> str:
-    return f"{text.ljust(COLUMN)}# {why}" if why else text
+    # Column of the text at which reasons begin.
+    column = 44
+    return f"{text.ljust(column)}# {why}" if why else text

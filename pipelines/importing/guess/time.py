@@ -17,8 +17,6 @@ ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
-UNEVEN = 0.1
-"""Largest share of stamps of a coarse clock that are not usual."""
 NEAR = 0.1
 """Largest relative difference between the rates of two clocks of the same rows."""
 TYPES = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
@@ -244,8 +242,10 @@ def _near_median(numbers: NDArray) -> NDArray:
 
 def _is_even(values: NDArray) -> bool:
     """Return whether most stamps of a coarse clock (n,) have a similar number of rows."""
+    # Largest share of stamps of a coarse clock that are not usual.
+    uneven = 0.1
     rows, _ = _stamps(values)
-    return not len(rows) or bool(np.mean(~_near_median(rows)) <= UNEVEN)
+    return not len(rows) or bool(np.mean(~_near_median(rows)) <= uneven)
 
 
 def _longest_pause(values: NDArray) -> float:

@@ -10,16 +10,10 @@ SPAN = 20
 """Samples over which a velocity is integrated: long against noise, short against drift."""
 MOST = 200_000
 """Greatest number of rows that are compared, from the middle of the log."""
-MOST_SCREENED = 2_000_000
-"""Greatest number of values, of all columns together, by which all pairs are compared."""
-FEWEST_SCREENED = 1_000
-"""Rows of each column that are compared at least."""
 BLOCK = 256
 """Columns that are compared with all others at a time."""
 LIKELY = 0.5
 """Share of the variance above which a pair of columns is a candidate."""
-MOST_LIKELY = 100
-"""Greatest number of candidate pairs."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +66,16 @@ def likeliest_integrals(
     list of (int, int)
         Indices of the angle and the velocity of each pair.
     """
+    # Greatest number of values, of all columns together, by which all pairs are compared.
+    most_screened = 2_000_000
+    # Rows of each column that are compared at least.
+    fewest_screened = 1_000
+    # Greatest number of candidate pairs.
+    most_likely = 100
     time_s, *columns = _middle(time_s, *angles, *velocities)
     if len(time_s) < 5 * SPAN or not angles or not velocities:
         return []
-    some = slice(None, None, -(-len(time_s) // max(FEWEST_SCREENED, MOST_SCREENED // len(columns))))
+    some = slice(None, None, -(-len(time_s) // max(fewest_screened, most_screened // len(columns))))
     whole = [_interpolated(column) for column in columns]
     steps = _unit_rows([(angle[SPAN:] - angle[:-SPAN])[some] for angle in whole[: len(angles)]])
     travels = _unit_rows([_travel(time_s, velocity)[some] for velocity in whole[len(angles) :]])
@@ -83,12 +83,12 @@ def likeliest_integrals(
     for first in range(0, len(steps), BLOCK):  # thousands of columns have millions of pairs
         # A velocity cannot integrate to the negative angle.
         shares = np.square(np.maximum(steps[first : first + BLOCK] @ travels.T, 0.0))
-        best = np.argsort(shares, axis=None)[-MOST_LIKELY:]
+        best = np.argsort(shares, axis=None)[-most_likely:]
         rows, others = np.unravel_index(best[shares.flat[best] > LIKELY], shares.shape)
         candidates = (
             (float(shares[i, j]), first + int(i), int(j)) for i, j in zip(rows, others, strict=True)
         )
-        likely = sorted([*likely, *candidates], reverse=True)[:MOST_LIKELY]
+        likely = sorted([*likely, *candidates], reverse=True)[:most_likely]
     return sorted((angle, velocity) for _, angle, velocity in likely)
 
 

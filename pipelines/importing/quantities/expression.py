@@ -20,8 +20,6 @@ OPERATORS: dict[type, Callable] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
-MOST_OPERATIONS = 100
-"""In one expression; nobody could check a longer one."""
 LARGEST = sys.float_info.max
 QUOTED = re.compile(r"`([^`]*)`")
 
@@ -72,6 +70,8 @@ class Expression:
                 return float(node.value)
 
     def _check(self, tree: ast.expr) -> None:
+        # In one expression; nobody could check a longer one.
+        most_operations = 100
         for node in ast.walk(tree):
             number = isinstance(node, ast.Constant) and _is_number(node.value)
             known = (
@@ -80,9 +80,9 @@ class Expression:
             )
             if not (number or known) or (hasattr(node, "op") and type(node.op) not in OPERATORS):
                 raise self._refusal()
-        if sum(hasattr(node, "op") for node in ast.walk(tree)) > MOST_OPERATIONS:
+        if sum(hasattr(node, "op") for node in ast.walk(tree)) > most_operations:
             raise self._refusal(
-                f", at most {MOST_OPERATIONS} of them; compute a column of its own instead"
+                f", at most {most_operations} of them; compute a column of its own instead"
             )
         if not self.names:
             raise self._refusal(", one column at least")

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from pipelines.importing.finding import Note, counted, unnoted
 
-LONGEST = 20
-"""Greatest length of a text in a finding."""
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
 """A number with marks between its thousands."""
 DAYS_FIRST = re.compile(r"^\s*(\d\d)\.(\d\d)\.(\d{4})")
@@ -32,6 +30,8 @@ def numbers(values: NDArray, note: Note = unnoted) -> NDArray:
     (n,) array of float64
         NaN where there is no number.
     """
+    # Greatest length of a text in a finding.
+    longest = 20
     if values.dtype.kind in "biuf":
         return values.astype(float, copy=False)
     # As text, because pandas would convert dates to nanoseconds. A date in a column for an angle is
@@ -46,7 +46,7 @@ def numbers(values: NDArray, note: Note = unnoted) -> NDArray:
         row = int(np.argmax(words))
         seen = (
             f"{counted(int(words.sum()), 'row')} with text, the first"
-            f" {str(values[row])[:LONGEST]!r} in row {row}"
+            f" {str(values[row])[:longest]!r} in row {row}"
         )
         note(seen, TAKEN_FOR_MISSING)
     return result

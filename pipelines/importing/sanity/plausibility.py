@@ -11,18 +11,12 @@ from pipelines.importing.quantities.consistency import MOST, integral_agreement,
 from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
-LEAST_EXPLAINED = 0.5
-"""Share of the variance that velocity and angle must share before their slope is judged."""
-SLOPE_TOLERANCE = 0.15
-"""Largest deviation of that slope from 1, for a filter in the drive or a late sample."""
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
 """Least motion of a joint from which inertia can be seen, about the play of a gear or screw."""
 FAR = 20.0
 """Distance from the median, relative to that of 99 % of the rows, that marks an outlier."""
-GIVES_BACK = 0.2
-"""Share of the mean magnitude of power that the drives may absorb on average."""
 
 
 def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
@@ -123,13 +117,17 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
 
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    # Share of the variance that velocity and angle must share before their slope is judged.
+    least_explained = 0.5
+    # Largest deviation of that slope from 1, for a filter in the drive or a late sample.
+    slope_tolerance = 0.15
     name, angle = joint.joint.column("velocity"), joint.joint.column("angle")
     if name not in columns:
         return
     agreement = integral_agreement(columns["time_s"], columns[angle], columns[name])
-    if agreement is None or agreement.explained <= LEAST_EXPLAINED:
+    if agreement is None or agreement.explained <= least_explained:
         return
-    if abs(agreement.slope - 1.0) > SLOPE_TOLERANCE:
+    if abs(agreement.slope - 1.0) > slope_tolerance:
         seen = f"integrates to {agreement.slope:.3g} times the change of {angle}"
         yield Finding(
             name, seen, "kept; check unit, sign and gear_ratio of both, and the unit of time"
@@ -138,6 +136,8 @@ def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
     """Report drives that brake on average; a single one may, where another one moves it."""
+    # Share of the mean magnitude of power that the drives may absorb on average.
+    gives_back = 0.2
     powers = [
         mean_power(
             columns["time_s"],
@@ -147,6 +147,6 @@ def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> I
         for joint in joints
     ]
     mean, size = (sum(values) for values in zip(*powers, strict=True))
-    if mean < -GIVES_BACK * size:
+    if mean < -gives_back * size:
         seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")

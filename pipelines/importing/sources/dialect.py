@@ -11,18 +11,12 @@ from pipelines.errors import InputError
 from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import unit_named
 
-LOOKED_AT = 2**16
-"""Bytes at the beginning of a file from which its dialect is derived."""
 DELIMITERS = (",", ";", "\t", "|", " ")
 RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|\0]")
 """Other delimiters, tried where none of ``DELIMITERS`` gives a table."""
 COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
-STRAY = 0.1
-"""Share of NUL bytes up to which a file may be a damaged text; UTF-16 has half."""
-ENOUGH = 0.5
-"""Least share of numbers among the fields of a row of data; others are dates and states."""
 
 UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
 """Pattern of a possible unknown unit: in brackets, or short."""
@@ -61,8 +55,10 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     InputError
         If the file is no text, or has no table of numbers.
     """
+    # Bytes at the beginning of a file from which its dialect is derived.
+    looked_at = 2**16
     with open(path, "rb") as file:
-        start = file.read(LOOKED_AT)
+        start = file.read(looked_at)
         whole = not file.read(1)
     encoding = settings.encoding or _encoding(start)
     try:
@@ -134,7 +130,9 @@ def _encoding(start: bytes) -> str:
 
 def _is_stray(nuls: int, start: bytes) -> bool:
     """Return whether NUL bytes are faults in a text, as of a full disk: few, none in the header."""
-    return nuls < STRAY * len(start) and b"\0" not in start.partition(b"\n")[0]
+    # Share of NUL bytes up to which a file may be a damaged text; UTF-16 has half.
+    stray = 0.1
+    return nuls < stray * len(start) and b"\0" not in start.partition(b"\n")[0]
 
 
 def _comment(lines: Sequence[str]) -> str | None:
@@ -230,8 +228,10 @@ def _is_comment(line: str) -> bool:
 
 
 def _are_numbers(fields: list[str], decimal: str) -> bool:
+    # Least share of numbers among the fields of a row of data; others are dates and states.
+    enough = 0.5
     numbers = sum(_is_number(field, decimal) for field in fields)
-    return numbers >= 2 and numbers >= ENOUGH * sum(
+    return numbers >= 2 and numbers >= enough * sum(
         field.lower() not in NOT_A_NUMBER for field in fields
     )
 

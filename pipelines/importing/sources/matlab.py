@@ -11,8 +11,6 @@ from pipelines.importing.sources.source import Source
 from pipelines.settings.import_map import SourceSettings
 from pipelines.validation.suggestion import suggestion
 
-V73 = b"MATLAB 7.3"
-
 
 def open_matlab(path: Path, settings: SourceSettings) -> Source:
     """Return the log in a .mat file.
@@ -24,8 +22,9 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
     InputError
         If the file is damaged, or lacks the variable that the map names.
     """
+    v73 = b"MATLAB 7.3"
     with open(path, "rb") as file:
-        if file.read(len(V73)) == V73:
+        if file.read(len(v73)) == v73:
             return open_hdf5(path, settings, "MATLAB v7.3")
     try:
         content = scipy.io.loadmat(path, simplify_cells=True)

@@ -12,7 +12,6 @@ from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 from pipelines.validation.suggestion import suggestion
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
 QUANTITIES = ("position", "velocity", "effort")
 
 
@@ -49,10 +48,11 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
 
 def _topic(reader: Any, named: str | None) -> str:
     """Return the topic in the map, or the only one with joint states."""
-    topics = list(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == JOINT_STATE))
+    joint_state = "sensor_msgs/msg/JointState"
+    topics = list(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == joint_state))
     if not topics:
         others = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections) or "nothing"
-        raise InputError(f"holds no {JOINT_STATE}, but {others}; record the joint states too")
+        raise InputError(f"holds no {joint_state}, but {others}; record the joint states too")
     if named is None:
         if len(topics) > 1:
             raise InputError(

@@ -12,11 +12,6 @@ from pipelines.importing.sources.dialect import Dialect, find_dialect
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
-BEYOND = "\0beyond"
-"""A column after the last, which must be empty."""
-CHUNK = 2**17
-"""Rows that are parsed at a time, to keep only the columns that are needed."""
-
 
 def open_text(path: Path, settings: SourceSettings) -> Source:
     """Return the log in a text file.
@@ -45,6 +40,10 @@ def open_text(path: Path, settings: SourceSettings) -> Source:
 
 
 def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
+    # A column after the last, which must be empty.
+    beyond = "\0beyond"
+    # Rows that are parsed at a time, to keep only the columns that are needed.
+    chunk = 2**17
     parts: list[Columns] = []
     wanted = list(dict.fromkeys(names))
     try:
@@ -55,18 +54,18 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
             decimal=dialect.decimal,
             comment=dialect.comment,
             header=None,
-            names=[*dialect.names, BEYOND],
+            names=[*dialect.names, beyond],
             skiprows=dialect.rows_before,
             encoding=dialect.encoding,
             encoding_errors="replace",
-            chunksize=CHUNK,
+            chunksize=chunk,
             skipinitialspace=True,
             index_col=False,
             low_memory=False,
         )
         with reader:
             for part in reader:
-                excess = part[BEYOND].notna()
+                excess = part[beyond].notna()
                 if excess.any():
                     raise InputError(_too_many_fields(f"row {excess.idxmax()}", dialect))
                 # Copies, as slicing one column from a table of thousands is slow later on.

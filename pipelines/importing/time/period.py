@@ -11,29 +11,12 @@ from scipy.signal import argrelmin, correlate
 
 from pipelines.importing.quantities.consistency import whole_rows
 
-POINTS = 20_000
-"""Greatest number of instants that are compared."""
 DIFFERENT = 0.5
 """Half mean squared difference, in variances, above which a motion differs from its beginning."""
 SIMILAR = 0.5
 """The same, below which it may repeat."""
-REPEATS = 5e-4
-"""The same for the median pair of neighbouring periods of a periodic motion: 3 % in rms.
-
-Drives repeat their errors, too. A machine that swings freely does not repeat so well.
-"""
 AS_GOOD = 3.0
 """Factor on the least difference up to which a shorter lag is preferred."""
-AS_ROUND = 1.1
-"""Factor on the least difference up to which a lag of fewer digits is preferred."""
-EQUAL = 1e-8
-"""Difference due to a sensor's resolution and interpolation alone."""
-AT_REST = 0.01
-"""Share of the variance below which a period has too little motion to be compared."""
-MOST_LAGS = 100
-"""Greatest number of lags that are refined."""
-SMEARED = 0.01
-"""Share of a lag by which a ramp or drift may shift it."""
 
 
 def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
@@ -52,6 +35,15 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         Period, s. None if the run is shorter than two periods, or its periods differ by more than a
         drive's errors.
     """
+    # Greatest number of instants that are compared.
+    points = 20_000
+    # Difference of the median pair of neighbouring periods of a periodic motion: 3 % in rms. Drives
+    # repeat their errors, too. A machine that swings freely does not repeat so well.
+    repeats = 5e-4
+    # Factor on the least difference up to which a lag of fewer digits is preferred.
+    as_round = 1.1
+    # Difference due to a sensor's resolution and interpolation alone.
+    equal = 1e-8
     moving = [
         column
         for column in motion.T
@@ -62,7 +54,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     time_s, *moving = whole_rows(time_s, *moving)
     if len(time_s) < 40:
         return None
-    step = max(float(np.median(np.diff(time_s))), (time_s[-1] - time_s[0]) / POINTS)
+    step = max(float(np.median(np.diff(time_s))), (time_s[-1] - time_s[0]) / points)
     grid = np.arange(time_s[0], time_s[-1] + 0.5 * step, step)
     columns = np.column_stack([np.interp(grid, time_s, column) for column in moving])
     columns = (columns - columns.mean(axis=0)) / np.maximum(columns.std(axis=0), 1e-300)
@@ -74,13 +66,13 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         if difference_at(lag) < SIMILAR
     ]
     best = min((difference for _, difference in near), default=np.inf)
-    if best > REPEATS:
+    if best > repeats:
         return None
     lag, least = min(
-        (lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, EQUAL)
+        (lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, equal)
     )
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
-    limit = max(AS_ROUND * least, EQUAL)
+    limit = max(as_round * least, equal)
     as_good = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
     return next(as_good, float(f"{step * lag:.6g}"))
 
@@ -111,12 +103,14 @@ def _mean_differences(columns: NDArray) -> NDArray:
 
 def _candidates(differences: NDArray) -> list[float]:
     """Return the lags of minima below SIMILAR after the first above DIFFERENT, the best first."""
+    # Greatest number of lags that are refined.
+    most_lags = 100
     different = np.flatnonzero(differences > DIFFERENT)
     if not len(different):
         return []
     (lags,) = argrelmin(np.append(differences, np.inf))
     lags = lags[(lags > different[0]) & (differences[lags] < SIMILAR)]
-    return [float(lag) for lag in lags[np.argsort(differences[lags])[:MOST_LAGS]]]
+    return [float(lag) for lag in lags[np.argsort(differences[lags])[:most_lags]]]
 
 
 def _median_difference(columns: NDArray, lag: float) -> float:
@@ -132,12 +126,14 @@ def _median_difference(columns: NDArray, lag: float) -> float:
     lag : float
         Length of a period in samples; values between samples are interpolated.
     """
+    # Share of the variance below which a period has too little motion to be compared.
+    at_rest = 0.01
     n, length = len(columns), int(lag)
     count = int(n / lag + 1e-6)
     begins = 0.5 * (n - count * lag) + lag * np.arange(count)
     at = begins[:, np.newaxis] + np.arange(length)
     periods = np.stack([np.interp(at, np.arange(n), column) for column in columns.T], axis=-1)
-    moving = [period for period in periods if (period.var(axis=0) > AT_REST).all()]
+    moving = [period for period in periods if (period.var(axis=0) > at_rest).all()]
     pairs = sorted(
         float(np.max((b - a).var(axis=0) / (a.var(axis=0) + b.var(axis=0))))
         for a, b in pairwise(moving)
@@ -147,6 +143,8 @@ def _median_difference(columns: NDArray, lag: float) -> float:
 
 def _refined(difference: Callable[[float], float], lag: float) -> tuple[float, float]:
     """Return the lag near a whole one, between samples, of least difference, and the difference."""
-    bounds = (1.0 - SMEARED) * lag - 1.0, (1.0 + SMEARED) * lag + 1.0
+    # Share of a lag by which a ramp or drift may shift it.
+    smeared = 0.01
+    bounds = (1.0 - smeared) * lag - 1.0, (1.0 + smeared) * lag + 1.0
     best = minimize_scalar(difference, bounds=bounds, method="bounded", options={"xatol": 0.02})
     return float(best.x), float(best.fun)

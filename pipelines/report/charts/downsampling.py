@@ -3,9 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-EACH = 3
-"""Rows per column and stretch: its lowest, its highest, and one without a value."""
-
 
 def extremes(columns: NDArray, rows: int) -> NDArray[np.intp]:
     """Return the indices of the rows to keep.
@@ -26,10 +23,12 @@ def extremes(columns: NDArray, rows: int) -> NDArray[np.intp]:
     (m,) array of int
         Increasing.
     """
+    # Rows per column and stretch: its lowest, its highest, and one without a value.
+    each = 3
     n, k = columns.shape
     if n <= rows:
         return np.arange(n)
-    stretches = max(1, (rows - 2) // (EACH * k))
+    stretches = max(1, (rows - 2) // (each * k))
     kept = _of_stretches(columns, stretches)
     # Extremes of smooth curves share rows, which leaves room for more stretches.
     finer = kept

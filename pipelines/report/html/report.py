@@ -27,8 +27,6 @@ from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.report.session_charts import charts
 
-FEWEST_VALUES = 20_000
-"""Numbers in all charts below which thinning no longer makes the page smaller."""
 SECTIONS = (
     headline,
     decision,
@@ -62,9 +60,11 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
     output : Path, optional
         Where the page is written, for the command line that repeats it.
     """
+    # Numbers in all charts below which thinning no longer makes the page smaller.
+    fewest_values = 20_000
     values = VALUES
     page = _page(session, title, output, values)
-    while len(page.encode()) > LARGEST_BYTES and values > FEWEST_VALUES:
+    while len(page.encode()) > LARGEST_BYTES and values > fewest_values:
         values //= 2
         page = _page(session, title, output, values)
     return page

@@ -21,8 +21,6 @@ DRAWN: dict[tuple[Kind, ...], str] = {
     ("prismatic",): "slider",
 }
 """Drawings by the kinds of a machine's joints."""
-SHANK_TO_THIGH = 1.05
-"""Assumed ratio of lengths: no file holds the shank's, and no torque depends on it."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +92,8 @@ def _frames(time: NDArray, error: NDArray) -> NDArray:
 
 
 def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
+    # Assumed ratio of lengths: no file holds the shank's, and no torque depends on it.
+    shank_to_thigh = 1.05
     drawn = _drawn_as(session)
     if drawn == "slider":
         return drawn, (float(np.abs(measured).max()) or 1.0,)
@@ -101,4 +101,4 @@ def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tu
         return drawn, (1.0,)
     geometry = table.metadata.get("plant", {}).get("geometry", {})
     thigh = geometry.get("thigh_length_m") or 0.4
-    return drawn, (thigh, SHANK_TO_THIGH * thigh)
+    return drawn, (thigh, shank_to_thigh * thigh)

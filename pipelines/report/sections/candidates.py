@@ -10,8 +10,6 @@ from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
 
-MOST_CANDIDATES = 12
-"""Sets in sight; the others unfold."""
 TONES = {
     "named": "good",
     "indistinguishable": "warn",
@@ -25,7 +23,9 @@ Row = dict[Any, Any]
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's table of candidates."""
-    return {"candidates": _candidates(content.session), "most_candidates": MOST_CANDIDATES}
+    # Sets in sight; the others unfold.
+    most_candidates = 12
+    return {"candidates": _candidates(content.session), "most_candidates": most_candidates}
 
 
 def _candidates(session: Session) -> list[dict[str, Any]]:

@@ -12,8 +12,6 @@ from pipelines.settings import Experiment
 
 SECTIONS = ("mechanism", "design", "filter", "identify", "simulate")
 """Sections of exoid.toml that a stage's file repeats."""
-FEW = 3
-"""Number of files that a warning names."""
 REMEDY = "`exoid run` or `make` makes them again"
 
 
@@ -139,8 +137,10 @@ def _stale(session: Session) -> list[str]:
 
 def _few(files: Sequence[str]) -> str:
     """Return the first files by name, and the number of the others."""
-    more = [f"{len(files) - FEW} more files"] if len(files) > FEW else []
-    *most, last = [*files[:FEW], *more]
+    # Number of files that a warning names.
+    few = 3
+    more = [f"{len(files) - few} more files"] if len(files) > few else []
+    *most, last = [*files[:few], *more]
     return f"{', '.join(most)} and {last}" if most else last
 
 

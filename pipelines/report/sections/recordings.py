@@ -9,8 +9,6 @@ from pipelines.contracts import MOTION, RECORDING
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 
-RATE_TOLERANCE = 0.005
-"""Relative difference of sampling rates that counts as equal."""
 ROUNDING = 1e-4
 """Unevenness that rounding explains, in sample periods."""
 
@@ -46,7 +44,9 @@ class Run:
     @property
     def rate_is_off(self) -> bool:
         """Whether the time stamps contradict the stated rate."""
-        return abs(self.measured_rate_hz / self.rate_hz - 1.0) > RATE_TOLERANCE
+        # Relative difference of sampling rates that counts as equal.
+        rate_tolerance = 0.005
+        return abs(self.measured_rate_hz / self.rate_hz - 1.0) > rate_tolerance
 
     @property
     def is_even(self) -> bool:

@@ -18,8 +18,6 @@ from pipelines.signals.binned_mean import FEWEST, binned_mean
 
 DOTS = 2500
 """Most dots of a chart; more would hide the shape of the cloud."""
-REACH_PERCENTILE = 99.5
-"""Percentile of the residual's magnitude that a panel must show."""
 DEPENDENCES = {
     "angle": "angle",
     "velocity": "speed",
@@ -119,8 +117,10 @@ def residual_charts(session: Session) -> Iterator[Chart]:
 
 
 def _reach(frame: pd.DataFrame, joint: Joint) -> float | None:
+    # Percentile of the residual's magnitude that a panel must show.
+    reach_percentile = 99.5
     size = np.abs(frame[joint.column("residual")].to_numpy())
-    return 1.1 * float(np.percentile(size, REACH_PERCENTILE)) if len(size) else None
+    return 1.1 * float(np.percentile(size, reach_percentile)) if len(size) else None
 
 
 def _chart(

@@ -7,11 +7,6 @@ from typing import Any
 
 from pipelines.report.session import Session
 
-SECTIONS = ("mechanism", "design", "acquire", "filter", "identify", "simulate")
-"""Sections of exoid.toml that files repeat."""
-OF_DRAWING = ("identify.figures", "simulate.figures")
-"""Settings of figures, on which no number depends."""
-
 
 @dataclass(frozen=True)
 class SettingDifference:
@@ -28,19 +23,23 @@ def settings_diff(first: Session, second: Session) -> list[SettingDifference]:
 
     If files of one session disagree, all their values are listed.
     """
+    # Settings of figures, on which no number depends.
+    of_drawing = ("identify.figures", "simulate.figures")
     one, other = _settings(first), _settings(second)
     return [
         SettingDifference(name, " and ".join(one[name]), " and ".join(other[name]))
         for name in one
-        if name in other and set(one[name]) != set(other[name]) and name not in OF_DRAWING
+        if name in other and set(one[name]) != set(other[name]) and name not in of_drawing
     ]
 
 
 def _settings(session: Session) -> dict[str, list[str]]:
+    # Sections of exoid.toml that files repeat.
+    sections = ("mechanism", "design", "acquire", "filter", "identify", "simulate")
     by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}
-        for section in SECTIONS:
+        for section in sections:
             for name, value in _flat(section, config.get(section)):
                 by_setting.setdefault(name, {})[value] = None
     return {name: list(values) for name, values in by_setting.items()}

@@ -17,8 +17,6 @@ from pipelines.report.session import Session
 
 SLOW = 0.1
 """Share of its rms speed below which a joint counts as standing."""
-OVER_S = 0.1
-"""Time over which speed is measured, s, so that encoder noise does not count as motion."""
 NOTABLE = 1.1
 """Factor by which a simulation's error must grow to be mentioned."""
 
@@ -36,9 +34,11 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     -------
     (n,) array of bool
     """
+    # Time over which speed is measured, s, so that encoder noise does not count as motion.
+    over_s = 0.1
     time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
     windows = frame["window"].to_numpy()
-    span = max(1, round(OVER_S / float(np.median(np.diff(time)))))
+    span = max(1, round(over_s / float(np.median(np.diff(time)))))
     moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
     slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
     return ~np.isin(windows, windows[span:][within & slow])

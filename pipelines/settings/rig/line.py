@@ -9,12 +9,6 @@ from pydantic import Field, model_validator
 from pipelines.errors import SettingsError
 from pipelines.settings.base import NotNegative, Settings
 
-FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
-"""Above this rate the silence between RTU frames is a fixed time, else 3.5 characters.
-
-Source: "Modbus over serial line specification and implementation guide" V1.02, 2.5.1.1.
-"""
-
 
 class Line(Settings):
     """Settings of lines of every kind."""
@@ -152,9 +146,12 @@ class RtuLine(Line):
     @property
     def quiet_s(self) -> float:
         """Quiet time before each frame, s."""
+        # Above this rate the silence between RTU frames is a fixed time, else 3.5 characters.
+        # Source: "Modbus over serial line specification and implementation guide" V1.02, 2.5.1.1.
+        fixed_silence_baud, fixed_silence_s = 19200, 0.00175
         if self.silence_s is not None:
             return self.silence_s
-        return 3.5 * self._character_s if self.baud_rate <= FIXED_SILENCE_BAUD else FIXED_SILENCE_S
+        return 3.5 * self._character_s if self.baud_rate <= fixed_silence_baud else fixed_silence_s
 
     def exchange_s(self, characters: int) -> float:
         """Return the least time of a request and its reply.

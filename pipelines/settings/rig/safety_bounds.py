@@ -17,9 +17,6 @@ SAFETY = {
 }
 """The most that each may be."""
 
-STOP_S = 1.0
-"""The longest that a stop may take from the highest speed."""
-
 
 def check_safety_bounds(drives: Iterable[DriveSettings], safety: SafetySettings) -> None:
     """Refuse limits that are too wide to protect a wearer.
@@ -54,12 +51,14 @@ def _check_at_most(key: str, value: float, most: float) -> None:
 
 def _check_stop(drive: DriveSettings, safety: SafetySettings, run: str) -> None:
     """Refuse a stop that takes too long, or farther than the joint's range."""
+    # The longest that a stop may take from the highest speed.
+    stop_s = 1.0
     speed, slowing = drive.speed_rad_s, safety.deceleration_rad_s2
     room = drive.angle_rad[1] - drive.angle_rad[0]
-    needed = max(speed / STOP_S, speed**2 / 2.0 / room)
+    needed = max(speed / stop_s, speed**2 / 2.0 / room)
     if slowing < needed:
         raise ValueError(
             f"safety.deceleration_rad_s2: found {slowing:g}, expected at least {needed:.3g}. To"
             f" stop from {speed:g} rad/s ({run}) the {drive.joint} takes {speed / slowing:.3g} s"
-            f" and {speed**2 / 2.0 / slowing:.3g} rad, more than {STOP_S:g} s or its angle_rad"
+            f" and {speed**2 / 2.0 / slowing:.3g} rad, more than {stop_s:g} s or its angle_rad"
         )
