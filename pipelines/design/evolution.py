@@ -10,12 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-POPULATION = 24
-# The decomposition costs as much as several candidates, and the covariance changes slowly.
-GENERATIONS_PER_DECOMPOSITION = 5
-PATIENCE = 60
-LEAST_GAIN = 1e-6
-
 
 def polish(
     start: NDArray,
@@ -49,9 +43,14 @@ def polish(
     cost : float
         Its cost.
     """
+    population = 24
+    # The decomposition costs as much as several candidates, and the covariance changes slowly.
+    generations_per_decomposition = 5
+    # Generations without this relative gain after which the cost stagnates.
+    patience, least_gain = 60, 1e-6
     size = len(start)
-    rank = np.arange(1, POPULATION // 2 + 1)
-    weights = np.log(POPULATION / 2 + 0.5) - np.log(rank)
+    rank = np.arange(1, population // 2 + 1)
+    weights = np.log(population / 2 + 0.5) - np.log(rank)
     weights /= weights.sum()
     mu = 1.0 / np.sum(weights**2)
     c_c = (4 + mu / size) / (size + 4 + 2 * mu / size)
@@ -65,18 +64,18 @@ def polish(
     path_c, path_sigma = np.zeros(size), np.zeros(size)
     best, best_cost, last_gain = start.copy(), np.inf, 0
     for generation in range(generations):
-        if generation % GENERATIONS_PER_DECOMPOSITION == 0:
+        if generation % generations_per_decomposition == 0:
             eigenvalues, axes = np.linalg.eigh(covariance)
             lengths = np.sqrt(np.maximum(eigenvalues, 1e-20))
-        steps = (rng.standard_normal((POPULATION, size)) * lengths) @ axes.T
+        steps = (rng.standard_normal((population, size)) * lengths) @ axes.T
         candidates = mean + sigma * steps
         cost = costs(candidates)
         order = np.argsort(cost)
-        if not cost[order[0]] >= best_cost - LEAST_GAIN * abs(best_cost):
+        if not cost[order[0]] >= best_cost - least_gain * abs(best_cost):
             last_gain = generation
         if cost[order[0]] < best_cost:
             best, best_cost = candidates[order[0]].copy(), float(cost[order[0]])
-        if generation - last_gain > PATIENCE or out_of_time():
+        if generation - last_gain > patience or out_of_time():
             break
         chosen = steps[order[: len(weights)]]
         step = weights @ chosen

@@ -18,10 +18,6 @@ from pipelines.mechanics.trajectory import Trajectory
 from pipelines.model import Model, baseline
 from pipelines.settings.design import DesignSettings, NoiseSettings
 
-JOINTS = ("hip", "knee")
-SAMPLES = 1000
-"""Samples of one period in the reported numbers."""
-
 
 @dataclass(frozen=True)
 class Quality:
@@ -73,12 +69,13 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
         If it moves joints other than hip and knee.
     """
     names = tuple(joint.name for joint in trajectory.joints)
-    if names != JOINTS:
+    if names != ("hip", "knee"):
         raise InputError(
             f"the excitation moves the joints {', '.join(names)}, expected hip and knee"
         )
     span = trajectory.period_s or trajectory.duration_s
-    A = regressor(trajectory, geometry, np.arange(SAMPLES) * span / SAMPLES)
+    samples = 1000
+    A = regressor(trajectory, geometry, np.arange(samples) * span / samples)
     stacked = A.reshape(-1, A.shape[2])
     size = np.linalg.norm(stacked, axis=0)
     parameters = _parameters()
@@ -87,7 +84,7 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
         condition=_condition(stacked),
         inertial_condition=_condition(stacked[:, : len(INERTIAL)]),
         scaled_condition=_condition(stacked / np.where(size > 0.0, size, 1.0)),
-        log_det=float(np.linalg.slogdet(stacked.T @ stacked / SAMPLES)[1]),
+        log_det=float(np.linalg.slogdet(stacked.T @ stacked / samples)[1]),
         standard_errors=dict(zip(parameters, errors.tolist(), strict=True)),
         units=parameters,
         margins=margins(trajectory, settings.bounds),

@@ -17,22 +17,6 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings
 
-# The swarm only has to find the region. A coarse grid is five times as fast, and its bounds are
-# as strict.
-COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC = 200, 40
-FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC = 1000, 100
-
-ITERATIONS_PER_LOOK = 25
-PATIENCE = 8
-"""Number of checks without gain after which the swarm stops."""
-LEAST_GAIN = 1e-4
-
-POLISHED = 3
-"""Number of polished particles: the best of as many arcs of the ring, which may be in different
-valleys."""
-GENERATIONS = 2000
-POLISH_SPREAD = 0.05
-
 Report = Callable[[float, str], None]
 
 
@@ -66,8 +50,10 @@ def search(
         If no motion within the bounds separates the parameters.
     """
     rng = np.random.default_rng(settings.seed)
-    coarse = _problem(settings, geometry, COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC)
-    fine = _problem(settings, geometry, FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC)
+    # The swarm only has to find the region. A coarse grid is five times as fast, and its bounds
+    # are as strict.
+    coarse = _problem(settings, geometry, samples=200, samples_per_harmonic=40)
+    fine = _problem(settings, geometry, samples=1000, samples_per_harmonic=100)
     spread = spread_of(fine)
 
     def note(cost: float) -> str:
@@ -80,20 +66,22 @@ def search(
         swarm, coarse, settings, rng, deadline, lambda done, cost: report(0.5 * done, note(cost))
     )
 
+    # Arcs of the ring may be in different valleys, so the best particle of each is polished.
+    arcs = 3
     best, best_cost = swarm.best_position[0], np.inf
-    for i, arc in enumerate(np.array_split(np.arange(settings.particles), POLISHED)):
+    for i, arc in enumerate(np.array_split(np.arange(settings.particles), arcs)):
         start = swarm.best_position[arc[np.argmin(swarm.best_cost[arc])]]
         candidate, cost = polish(
             start,
-            POLISH_SPREAD * spread,
+            0.05 * spread,
             lambda positions: costs(positions, fine),
             rng,
-            GENERATIONS,
+            generations=2000,
             out_of_time=lambda: time.monotonic() > deadline,
         )
         if cost < best_cost:
             best, best_cost = candidate, cost
-        report(0.5 + 0.5 * (i + 1) / POLISHED, note(best_cost))
+        report(0.5 + 0.5 * (i + 1) / arcs, note(best_cost))
     if not np.isfinite(best_cost):
         raise NotIdentifiable(
             "no excitation within the bounds separates the parameters; widen [design.bounds] or"
@@ -186,17 +174,20 @@ def _let_fly(
     report: Callable[[float, float], None],
 ) -> str:
     """Move the swarm until it stagnates, and return the reason for the end."""
+    iterations_per_look = 25
+    # Number of looks without this relative gain after which the swarm stops.
+    patience, least_gain = 8, 1e-4
     best, last_gain = swarm.best_cost.min(), 0
-    looks = -(-settings.iterations // ITERATIONS_PER_LOOK)
+    looks = -(-settings.iterations // iterations_per_look)
     for look in range(looks):
-        fly(swarm, problem, settings.topology == "ring", ITERATIONS_PER_LOOK, rng)
+        fly(swarm, problem, settings.topology == "ring", iterations_per_look, rng)
         lowest = swarm.best_cost.min()
-        if not lowest >= best - LEAST_GAIN * abs(best):
+        if not lowest >= best - least_gain * abs(best):
             best, last_gain = lowest, look
         report((look + 1) / looks, lowest)
         if time.monotonic() > deadline:
             return "seconds"
-        if look - last_gain >= PATIENCE:
+        if look - last_gain >= patience:
             return "stagnation"
     return "iterations"
 

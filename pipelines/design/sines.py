@@ -9,11 +9,9 @@ VECTORIZED = {"reassoc", "contract", "nsz", "arcp"}
 """Permitted changes of arithmetic: reordered sums and fused operations, but no change of NaN or
 infinity."""
 
-# Taylor's series about 0, enough terms for 1e-15 on [-pi/2, pi/2].
-_SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
-_COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(12))
-S0, S1, S2, S3, S4, S5, S6, S7, S8, S9, S10 = _SINE
-C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11 = _COSINE
+SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
+COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(12))
+"""Taylor's series about 0, enough terms for 1e-15 on [-pi/2, pi/2]."""
 
 
 @njit(cache=True, fastmath=VECTORIZED, error_model="numpy")
@@ -27,16 +25,18 @@ def sines(x, sine, cosine):
     sine, cosine : (n,) array
         Written.
     """
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10 = SINE
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11 = COSINE
     for i in range(x.size):
         half_turns = np.floor(x[i] * (1.0 / math.pi) + 0.5)
         r = x[i] - math.pi * half_turns
         sign = 1.0 - 2.0 * (half_turns - 2.0 * np.floor(0.5 * half_turns))
         y = r * r
-        odd = S7 + y * (S8 + y * (S9 + y * S10))
-        odd = S0 + y * (S1 + y * (S2 + y * (S3 + y * (S4 + y * (S5 + y * (S6 + y * odd))))))
-        even = C8 + y * (C9 + y * (C10 + y * C11))
-        even = C0 + y * (
-            C1 + y * (C2 + y * (C3 + y * (C4 + y * (C5 + y * (C6 + y * (C7 + y * even))))))
+        odd = s7 + y * (s8 + y * (s9 + y * s10))
+        odd = s0 + y * (s1 + y * (s2 + y * (s3 + y * (s4 + y * (s5 + y * (s6 + y * odd))))))
+        even = c8 + y * (c9 + y * (c10 + y * c11))
+        even = c0 + y * (
+            c1 + y * (c2 + y * (c3 + y * (c4 + y * (c5 + y * (c6 + y * (c7 + y * even))))))
         )
         sine[i] = sign * r * odd
         cosine[i] = sign * even
