@@ -214,7 +214,6 @@ class Console:
     def live(self, picture: "RenderableType") -> Iterator[None]:
         """Keep a picture on the terminal while the block runs, drawn ten times a second.
 
-        A thread of its own draws it on the alternate screen, so that it survives a resized window.
         The last picture is printed below the earlier output.
         """
         # Longest time that drawing a live picture may delay other threads, s.
@@ -227,6 +226,7 @@ class Console:
         interval = sys.getswitchinterval()
         sys.setswitchinterval(drawing_s)
         try:
+            # On the alternate screen, so that the picture survives a resized window.
             with Live(picture, console=self.err, screen=True, refresh_per_second=10):
                 yield
         finally:

@@ -150,8 +150,10 @@ def cost(candidate, problem, work):
     fill_columns(problem, work)
     gram = gram_matrix(work.columns)
     if problem.criterion == LOG_DET:
+        # The search minimizes, and a large determinant is good.
         return -_log_determinant(gram)
     if problem.criterion == SCALED_CONDITION:
+        # Columns have different units; at unit norm, the condition shows the motion alone.
         size = np.sqrt(np.diag(gram))
         if size.min() <= 0.0:
             return np.inf

@@ -146,6 +146,7 @@ def spread_of(problem: Problem) -> NDArray:
     """
     half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
     powers = problem.speeds ** np.arange(3)[:, np.newaxis]
+    # A coordinate alone reaches the tightest of its three bounds first.
     reach = (half[:, :, np.newaxis] / powers[:, np.newaxis, :]).min(axis=0)
     coordinates = np.einsum("pkf,jk->pjf", np.abs(problem.basis), reach).ravel()
     return np.append(coordinates, half[0]) if problem.theta0_is_free else coordinates

@@ -59,6 +59,7 @@ def fly(swarm, problem, ring, iterations, rng):
     """
     work = workspace(problem)
     particles, dimensions = swarm.position.shape
+    # Without a ring, all particles follow the best one.
     leader = int(np.argmin(swarm.best_cost))
     for _ in range(iterations):
         for i in range(particles):

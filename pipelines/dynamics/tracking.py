@@ -48,6 +48,7 @@ class ClosedLoop:
         """
         if self.ran_away:
             return np.full(len(self.joints), np.nan)
+        # Before that time the leg is still on its way from rest to the reference.
         return np.abs(self.error[self.time >= after_s]).max(axis=0)
 
     @property

@@ -95,6 +95,7 @@ class EncoderEccentricity(Effect):
         values, j = self.completed(shape), self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         true = q[:, j].copy()
+        # The error is a function of the true angle, and only the reading is known.
         for _ in range(NEWTON_STEPS):
             error, slope, _ = _errors(true, values)
             true -= (true + error - q[:, j]) / (1.0 + slope)

@@ -76,10 +76,8 @@ def _at_any_temperature(kernel):
 
 @cache
 def address(kernel) -> int:
-    """Return the address of a kernel's machine code.
-
-    Passing the kernels themselves to compiled code costs 60 µs each, at every call.
-    """
+    """Return the address of a kernel's machine code."""
+    # Passing the kernels themselves to compiled code costs 60 µs each, at every call.
     (compiled,) = kernel.overloads.values()
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 

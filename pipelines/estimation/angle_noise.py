@@ -40,6 +40,7 @@ def is_loud(runs: Sequence[Run]) -> bool:
     body = layout.bodies.ravel()
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):
+        # Such a filter has removed the band in which noise could be seen.
         if piece.motion.cutoff_hz <= CUTOFF_HZ:
             return False
         grams.append(_gram(piece, model, body))

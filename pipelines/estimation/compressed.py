@@ -74,6 +74,8 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
         rows = np.concatenate([r.regressor, r.torque[:, :, np.newaxis]], axis=2)
         triangles = triangles or [np.zeros((0, rows.shape[2]))] * rows.shape[1]
         for j, triangle in enumerate(triangles):
+            # The old triangle with new rows has the same R as all rows together (Demmel et al.,
+            # 2012).
             triangles[j] = qr(np.concatenate([triangle, rows[r.usable[:, j], j]]), mode="r")[0][
                 : rows.shape[2]
             ]

@@ -87,12 +87,14 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     difference = one.values - other.values
     V, _, freedom = long_run_covariance(influences, len(difference))
     error = np.sqrt(np.diag(V))
+    # In units of the errors, because parameters of different units have no common scale.
     variance, directions = np.linalg.eigh(V / np.outer(error, error))
     informed = variance > faint
     square = float(
         np.sum((directions.T[informed] @ (difference / error)) ** 2 / variance[informed])
     )
     k = int(informed.sum())
+    # With an estimated covariance the statistic is Hotelling's T², which this turns into F.
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
     return DurbinWuHausman(

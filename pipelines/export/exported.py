@@ -193,10 +193,8 @@ def exported(
 
 
 def _rigid(model: Model) -> Model:
-    """Return the model with rigid joints, whose springs each format lists or leaves out.
-
-    Cuffs stay, because the limb behind them has its own body.
-    """
+    """Return the model with rigid joints, whose springs each format lists or leaves out."""
+    # Cuffs stay, because the limb behind them has its own body.
     return Model(tuple(term for term in model if term.effect.spring is None or term.effect.at_cuff))
 
 

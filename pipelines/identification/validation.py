@@ -89,6 +89,7 @@ def validate(
                 _Sums.of(r, residual_of(r, model.linear_values))
                 for r in regressions(motion, model, cutoff_hz)
             )
+            # Sums of squares add up over runs and pieces; rms errors do not.
             sums[motion.run] = sum(of_run, before)
     pooled = sum(sums.values(), _Sums.none(len(joints)))
     return Validation(

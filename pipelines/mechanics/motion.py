@@ -246,8 +246,6 @@ class Motion:
     def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
         """Return the run with the loads of rigid bodies.
 
-        Loads from measured torques would bring their noise to both sides of a regression.
-
         Parameters
         ----------
         body : (p,) array
@@ -255,6 +253,7 @@ class Motion:
         limb : (p,) array
             Inertial parameters of the wearer's limb alone.
         """
+        # Loads from measured torques would bring their noise to both sides of a regression.
         of = self.load_columns.torque_of
         motion = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
         # The kinematics are the same, and so are the cached columns.

@@ -99,6 +99,7 @@ def below(motion: Motion, cutoff_hz: float) -> Motion:
         n samples, without loads; samples near ends and gaps are invalid.
     """
     rate = motion.sample_rate_hz
+    # Velocity and acceleration are differentiated again, so that all three have the same band.
     q, dq, ddq = filtered(motion, motion.q, cutoff_hz), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():
         if stretch.stop - stretch.start >= shortest(rate, cutoff_hz):

@@ -240,6 +240,7 @@ class Model:
             N·m.
         """
         torque = motion.torque
+        # Readings are undone in the opposite order of that in which they arise.
         for term in reversed(self.terms):
             torque = term.effect.delivered(torque, motion, term.values)
         return torque
@@ -264,11 +265,12 @@ def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     """Return an effect's columns along a motion, (n, J, k).
 
     Columns that depend on the motion alone, such as friction's, are computed once and kept with the
-    motion, because a diagnosis fits the same motion a thousand times. Rigid bodies are left out:
-    mostly they move differently from the motors, and that motion is new in each fit.
+    motion.
     """
+    # Mostly, rigid bodies move differently from the motors, and that motion is new in each fit.
     if effect.shape or effect.reads_load or effect.inertial:
         return effect.columns(motion, shape)
+    # A diagnosis fits the same motion a thousand times.
     if effect not in motion.columns_known:
         motion.columns_known[effect] = columns = effect.columns(motion, shape)
         columns.flags.writeable = False

@@ -77,7 +77,6 @@ def choose_cutoff(
 ) -> Cutoff:
     """Choose one cut-off for all channels of a signal.
 
-    The noisiest channel decides, because the acceleration of one joint enters the torque of both.
     Twice the highest frequency of the fastest motion always passes.
 
     Parameters
@@ -100,6 +99,8 @@ def choose_cutoff(
     spectra = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
     least, most = (share * rate_hz / 2 for share in HIGHEST_SHARE)
     highest = min(max(HIGHEST_HZ, least), most)
+    # The noisiest channel decides, because the acceleration of one joint enters the torque of
+    # both.
     noisiest = int(np.argmin([s.meets_floor_hz for s in spectra]))
     meets = spectra[noisiest].meets_floor_hz
     fastest = int(np.argmax([s.motion_hz for s in spectra]))

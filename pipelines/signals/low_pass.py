@@ -87,12 +87,10 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
 
 
+# The design takes longer than filtering a short stretch.
 @lru_cache
 def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
-    """Return the filter's second-order sections, (order / 2, 6).
-
-    They are cached because their design takes longer than filtering a short stretch.
-    """
+    """Return the filter's second-order sections, (order / 2, 6)."""
     from scipy.signal import butter
 
     return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))

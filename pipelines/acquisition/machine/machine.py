@@ -259,9 +259,9 @@ class Machine:
 async def _answers_or_timeouts(requests: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
     """Wait for all requests; return each answer, or the error of one that came too late.
 
-    All are awaited, so that no late answer is taken for that of a later request. Any other error
-    is raised.
+    Any other error is raised.
     """
+    # All are awaited, so that no late answer is taken for that of a later request.
     answers = await asyncio.gather(*requests, return_exceptions=True)
     results: list[Answer | Unanswered] = []
     for answer in answers:

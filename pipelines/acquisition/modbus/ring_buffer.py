@@ -24,10 +24,8 @@ NoteNewest = Callable[[float, float | None], int]
 
 
 def _most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
-    """Return the most reads of one drain; the rest waits for the next one, as set-points cannot.
-
-    They are twice the reads for the samples of a cycle, so that a backlog is worked off.
-    """
+    """Return the most reads of one drain; the rest waits for the next one, as set-points cannot."""
+    # Twice the reads for the samples of a cycle, so that a backlog is worked off.
     return max(FEWEST_READS, ceil(2 * samples_per_cycle / settings.records_per_read))
 
 

@@ -41,14 +41,11 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
 
 
 async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) -> tuple[int, int]:
-    """Make cycles as in a run in real time; return the number of late ones and of all.
-
-    It ends when more than ``allowed`` were late: with very slow devices, all of them would take
-    minutes.
-    """
+    """Make cycles as in a run in real time; return the number of late ones and of all."""
     pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
     sources = sources_of(machine, cycle_hz)
     late, done, last = 0, 0, await machine.count()
+    # With very slow devices, all cycles would take minutes.
     while done < cycles and late <= allowed:
         count = await pace.wait(last)
         late += count > last + 1

@@ -27,10 +27,8 @@ def step_to_plan(
 ) -> tuple[float, float]:
     """Return a set-point along the plan, or on the way back to it, and its speed.
 
-    The way back begins as fast as set-points move already, and goes faster and slower as gently as
-    a stop does: a drive that is sent from rest to its speed limit within a sample jerks the leg
-    with all of its torque. It is no longer than the time allows: after a late set-point the next
-    comes soon, and both may fall into one sample.
+    The way back begins as fast as set-points move already, goes faster and slower as gently as a
+    stop does, and is no longer than the time allows.
 
     Parameters
     ----------
@@ -62,11 +60,15 @@ def step_to_plan(
     deceleration = safety.deceleration_rad_s2
     # Half of what a stop slows down by is left for what samples make of a parabola.
     softly = min(abs(lag) * rate_hz, sqrt(deceleration * abs(lag)))
+    # A drive that is sent from rest to its speed limit within a sample jerks the leg with all of
+    # its torque.
     change = max(deceleration, abs(along - was) * rate_hz) * took_s
     fastest = max(abs(along), WALK * drive.speed_rad_s)
     next_speed = clamped(along + copysign(softly, lag), speed - change, speed + change)
     next_speed = clamped(next_speed, -fastest, fastest)
     is_on_plan = abs(lag) < NO_LAG_RAD and next_speed == along
+    # Not a whole cycle's way: after a late set-point the next comes soon, and both may fall into
+    # one sample.
     reference = base + (due - before if is_on_plan else next_speed * took_s)
     _refuse_to_lag(drive, safety, abs(due - reference))
     return (due if abs(reference - due) < NO_LAG_RAD else reference), next_speed

@@ -54,6 +54,7 @@ class SafeStop:
             return None
         base = self._trackers[joint].base
         reference = self._trackers[joint].slow_down(now)
+        # At rest, the set-point no longer changes.
         halt = reference == base
         self._samples_at_rest[joint] += halt
         return reference, halt

@@ -210,6 +210,7 @@ class SetPointTracker:
     def _move_base_on(self, cycle: int) -> None:
         """Move the base of a drive that goes on by itself, if it was asked within a cycle."""
         since = self._moving_since
+        # Asked longer ago than a sample, the drive may have done anything since.
         if since is not None and abs(cycle - since) <= 1.0:
             self.base += self._speed * (cycle - since) / self._rate
             self.in_force = self.base
@@ -223,11 +224,8 @@ class SetPointTracker:
         return self._send(reference, speed, now)
 
     def _elapsed_s(self, now: float) -> float:
-        """Return the time since the last set-point, s.
-
-        By the host's clock, or by cycles in lockstep: a counter that runs too fast does not make
-        time go by.
-        """
+        """Return the time since the last set-point, s."""
+        # Not by the drive's counter: one that runs too fast does not make time go by.
         if self._in_lockstep:
             return 1.0 / self._rate
         return (now - self.sent_at) * (1.0 + RATE_TOLERANCE)

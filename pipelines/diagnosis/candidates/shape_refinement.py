@@ -58,11 +58,8 @@ class CandidateFit:
 
     @property
     def score(self) -> float:
-        """The gain by which shapes are compared.
-
-        For a swinging load the amplitude is one: another amplitude would scale the twist, and the
-        load does not follow it.
-        """
+        """The gain by which shapes are compared."""
+        # Another amplitude than one would scale the twist, and a swinging load does not follow it.
         return self.gain_as_is if self.candidate.effect.swings else self.gain
 
     @property

@@ -126,15 +126,13 @@ def _count_of(angle: NDArray) -> float:
 
 
 def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
-    """Report an angle that is constant while the leg moves on.
-
-    Friction holds a joint too, but the joint then starts from where it stopped.
-    """
+    """Report an angle that is constant while the leg moves on."""
     if motion.measured_angle is None:
         return
     angle = motion.measured_angle[:, joint]
     still = constant_stretches(angle, round(STUCK_ANGLE_S * motion.sample_rate_hz))
     lasting = still[:, 1] - still[:, 0]
+    # Friction holds a joint too, but the joint then starts from where it stopped.
     stuck = still[
         [_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]
     ]

@@ -81,10 +81,8 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
 
 
 def _refuse_twins(motions: Sequence[Motion]) -> None:
-    """Raise InputError for one measurement under two names.
-
-    Its error would count as that of a run that no fit has seen.
-    """
+    """Raise InputError for one measurement under two names."""
+    # A copy's error would count as that of a run that no fit has seen.
     for one, other in combinations(motions, 2):
         if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
             raise InputError(

@@ -206,13 +206,11 @@ def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
-    """Return a piece's frequencies (Hz), power densities, and remaining shares of white noise.
-
-    Slow cosines are fitted and subtracted, because slow content leaks into the band through gaps.
-    They also remove some faster content; the share of white noise that remains is known.
-    """
+    """Return a piece's frequencies (Hz), power densities, and remaining shares of white noise."""
     known, n = np.isfinite(x), len(x)
     count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))
+    # Slow cosines are fitted and subtracted, because slow content leaks into the band through
+    # gaps. They also remove some faster content, whose share of white noise is known.
     slow = np.zeros((n, count))
     slow[known], _ = np.linalg.qr(_cosines(n, count)[known])
     value = np.where(known, x, 0.0)

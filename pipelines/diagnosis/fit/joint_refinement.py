@@ -40,13 +40,11 @@ class Refinement:
         self._runs, self._baseline, self._weights = runs, baseline, weights
 
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
-        """Return the fit with every shape at its best.
-
-        A swinging load is simulated with the rigid bodies of the fit itself. Where these do not
-        converge, and the cause would do harm, it is simulated with those of the library: the fit
-        may then predict other runs badly.
-        """
+        """Return the fit with every shape at its best."""
         start = self._start(causes)
+        # A swinging load is simulated with the rigid bodies of the fit itself. Where these do not
+        # converge, and the cause would do harm, it is simulated with those of the library: the fit
+        # may then predict other runs badly.
         still = [cause for cause in causes if not cause.effect.swings]
         if len(still) < len(causes):
             settled = self._at_rest(self._refined(self._at_rest(start)))

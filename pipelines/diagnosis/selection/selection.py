@@ -132,15 +132,15 @@ class Selection:
     def worst_harm(self, ratios: Mapping[str, float]) -> dict[str, float]:
         """Return the charges for the named cause that harms the validation runs most, by variant.
 
-        The result is empty if none does. A harmful cause's ties harm too, because these data cannot
-        separate them. A cause with a size of its own in each run is not charged: one run is no
-        evidence of another's.
+        The result is empty if none does.
 
         Parameters
         ----------
         ratios : mapping of str to float
             Log likelihood of the validation runs with a named cause over that without it, by label.
         """
+        # A cause with a size of its own in each run is not charged: one run is no evidence of
+        # another's.
         judged = [
             (ratios.get(one.element.label, 0.0), one.members)
             for one in self.answer.named
@@ -148,6 +148,7 @@ class Selection:
         ]
         harmful = [(ratio, members) for ratio, members in judged if ratio < 0.0]
         for ratio, members in sorted(harmful, key=lambda pair: pair[0]):
+            # A harmful cause's ties harm too, because these data cannot separate them.
             alike = {
                 e.variant for e in self._elements if e.label in members and not e.sized_each_run
             }

@@ -27,8 +27,7 @@ INERTIAL = ("X1", "X2", "X3", "X4")
 def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
     """Return the rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
 
-    Source: paper, appendix A, with row 2 corrected as in docs/errata.md. The rows are tuples,
-    because an array for every integration step would cost more than the equations.
+    Source: paper, appendix A, with row 2 corrected as in docs/errata.md.
 
     Parameters
     ----------
@@ -46,6 +45,7 @@ def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, 
         Two tuples of four floats, N·m per unit.
     """
     shank_gravity = gravity * sin_leg
+    # Tuples, because an array for every integration step would cost more than the equations.
     hip = (
         ddq[0],
         ddq[1],

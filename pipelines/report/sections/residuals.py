@@ -168,10 +168,8 @@ def _chart(
 
 
 def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """Return a running mean of y (n,) along x (n,): places and means, (k,) each.
-
-    The bins exclude the outermost 0.5 % at either end, which hold too few points for a mean.
-    """
+    """Return a running mean of y (n,) along x (n,): places and means, (k,) each."""
+    # The outermost bins would hold too few points for a mean.
     low, high = np.percentile(x, [0.5, 99.5])
     return binned_mean(x, y, low, high + 1e-12)
 
