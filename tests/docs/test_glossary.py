@@ -86,7 +86,9 @@ def avoided_by_file() -> Iterator[tuple[str, list[str]]]:
             words = avoided_in(path.read_text(encoding="utf-8"))
             words += [path.stem] * in_name(path.stem)
             yield path.relative_to(ROOT).as_posix(), words
-    for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+    assets = ROOT / "pipelines" / "report" / "assets"
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *assets.glob("*.html")]
+    for path in (*pages, assets / "page.js"):
         if path != GLOSSARY:
             text = re.sub(r"```.*?```", " ", path.read_text(encoding="utf-8"), flags=re.DOTALL)
             yield path.relative_to(ROOT).as_posix(), in_text(text)

@@ -98,12 +98,12 @@ def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_
     )
     assert '<p class="lead">Found.</p>' in top(folder)
     assert (
-        "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s"
+        "3 faults of acquisition, the first: run_1.parquet, hip_angle_rad: the hip&#39;s"
         " angle" in top(folder)
     )
     assert 'href="#faults"' in top(folder)
     write_verdict(folder, finding="Found.", data_faults=[FAULT])
-    assert "Beside it, a fault of acquisition: run_1.parquet" in top(folder)
+    assert "Also a fault of acquisition: run_1.parquet" in top(folder)
     assert 'href="#faults"' not in top(folder)
 
 
@@ -173,7 +173,7 @@ def test_where_nothing_is_missing_the_first_screen_says_how_sure_that_is(tmp_pat
     shown = text_of(top(folder))
     assert "nothing 0.95" in shown
     assert "What, and where" not in shown
-    assert "detectability.json tells how large each cause must be" in shown
+    assert "detectability.json has the size from which each cause shows" in shown
 
 
 def test_of_an_unlisted_law_the_headline_says_what_it_is_a_law_of(tmp_path):

@@ -105,7 +105,7 @@ def test_the_page_asks_for_nothing_outside_itself(page_file):
 @pytest.mark.parametrize(
     ("gone", "says"),
     [
-        ("diagnosed", "a verdict, so nobody knows yet"),
+        ("diagnosed", "a verdict on what the model misses"),
         ("identified", "the model of rigid body and friction"),
         ("simulated", "replays, so nothing can be shown in motion"),
         ("recordings", "Not here yet: recordings"),
@@ -173,7 +173,7 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
         "a log",
         (f"recordings/{RUN}",),
     )
-    assert "Made of files that are not in these folders" in report(find([folder]))
+    assert "Inputs that are not in these folders" in report(find([folder]))
     (folder / "machine.toml").write_text("[joint]\n")
     assert "--map old/machine.toml" in commands.commands(find([folder]))[0].line
 
@@ -213,8 +213,8 @@ def test_a_set_that_holds_what_is_named_tells_what_it_adds_in_words(tmp_path):
     )
     CANDIDATES.write(path, rows, table.metadata)
     line = re.search(r"<tr><td class=\"n\">2</td>.*?</tr>", report(find([folder])))[0]
-    assert "<small>what is named, and</small><br>base tilt</td>" in line
-    assert "0.0200<br><small>beyond what is named</small>" in line
+    assert "<small>the named causes, and</small><br>base tilt</td>" in line
+    assert "0.0200<br><small>beyond the named causes</small>" in line
     assert '<td class="reason">adds too little beside cogging at the knee</td>' in line
 
 
@@ -358,7 +358,7 @@ def test_what_is_taken_has_a_unit_in_the_heading_and_none_an_interval_of_no_widt
     table.frame[["gain_nm", "gain_low_nm", "gain_high_nm"]] = 0.41
     CANDIDATES.write(path, table.frame, table.metadata)
     page = report(find([folder]))
-    assert "taken, 95 %, N·m" in page
+    assert "gain, 95 %, N·m" in page
     assert "0.410 (no interval)" in page
     assert "0.410 (0.410" not in page
 
@@ -368,7 +368,7 @@ def test_every_symbol_is_explained_by_the_effect_it_belongs_to(page_file):
     assert "tau = Ks sgn(v) + Km v" in page
     assert '<abbr title="friction torque once the joint moves">' in page
     assert "inertia about the hip with the knee at a right angle" in page
-    foreseen = re.search(r"standard error foreseen.*?</table>", page, re.S)[0]
+    foreseen = re.search(r"expected standard error.*?</table>", page, re.S)[0]
     assert re.search(r"<td>X1</td>.*?<td class=\"nowrap\">kg·m²</td>", foreseen)
 
 

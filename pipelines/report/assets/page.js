@@ -15,8 +15,8 @@
   }
   // uPlot draws a gap where a value is null; NaN it would join over.
   // A mean's curve goes on over rows that are not its own (undefined).
-  function column(told) {
-    const values = numbers(told.values, Float32Array), none = told.mark === "mean" ? undefined : null;
+  function column(curve) {
+    const values = numbers(curve.values, Float32Array), none = curve.mark === "mean" ? undefined : null;
     return values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : none));
   }
   const shown = (v) => (v == null ? "" : Math.abs(v) >= 1e5 || (v !== 0 && Math.abs(v) < 1e-3) ? v.toExponential(2) : String(+v.toPrecision(4)));
@@ -29,13 +29,13 @@
   }
 
   const WIDTHS = { measured: 1, wanted: 1, before: 2.2, after: 1.3 };
-  function seriesOf(told) {
-    const stroke = () => css(told.role);
-    const points = { show: told.mark === "dots", size: 2.6, width: 0, stroke, fill: () => css(told.role) + (told.mark === "dots" ? "88" : "") };
+  function seriesOf(curve) {
+    const stroke = () => css(curve.role);
+    const points = { show: curve.mark === "dots", size: 2.6, width: 0, stroke, fill: () => css(curve.role) + (curve.mark === "dots" ? "88" : "") };
     return {
-      label: told.label, stroke, points, spanGaps: false,
-      width: told.mark === "mean" ? 2.4 : WIDTHS[told.role],
-      ...(told.mark === "dots" ? { paths: () => null } : {}),
+      label: curve.label, stroke, points, spanGaps: false,
+      width: curve.mark === "mean" ? 2.4 : WIDTHS[curve.role],
+      ...(curve.mark === "dots" ? { paths: () => null } : {}),
     };
   }
 
@@ -72,9 +72,9 @@
   function panelLegend(panel, chart) {
     const line = element("div", "panel-label");
     line.append(element("span", "", panel.label));
-    const outputs = panel.series.map((told) => {
-      if (!told.label) return null;
-      const item = element("span", `key line ${told.role}`, told.label);
+    const outputs = panel.series.map((curve) => {
+      if (!curve.label) return null;
+      const item = element("span", `key line ${curve.role}`, curve.label);
       const output = element("output");
       item.append(output);
       line.append(item);
@@ -171,7 +171,7 @@
     }
   }
   // A plot that has not been drawn yet has no scale to redraw at; it will take the colours that there are.
-  // Axes are laid out anew too: without, uPlot forgets that a plot has just been given another size.
+  // Axes are laid out again too: without, uPlot forgets that a plot has just been given another size.
   const redraw = () => { for (const made of plots.values()) for (const u of made) if (u.status === 1) u.redraw(true, true); for (const stage of stages) stage.draw(); };
   new ResizeObserver(() => fit()).observe(document.querySelector("main"));
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", () => fit());
@@ -199,11 +199,11 @@
   // The machine in motion.
   const LINE_PX = { measured: 14, before: 7, after: 3 };
   class Stage {
-    constructor(box, told) {
-      this.told = told;
-      this.time = numbers(told.time, Float64Array);
-      this.joints = told.lengths.length;
-      this.moves = Object.entries(told.angles).map(([role, coded]) => [role, numbers(coded, Float32Array)]);
+    constructor(box, motion) {
+      this.motion = motion;
+      this.time = numbers(motion.time, Float64Array);
+      this.joints = motion.lengths.length;
+      this.moves = Object.entries(motion.angles).map(([role, coded]) => [role, numbers(coded, Float32Array)]);
       this.canvas = box.querySelector("canvas");
       this.slider = box.querySelector("input");
       this.button = box.querySelector("button");
@@ -248,7 +248,7 @@
       return Array.from({ length: this.joints }, (_, j) => measured[k + j] + times * (values[k + j] - measured[k + j]));
     }
     draw() {
-      const { canvas, told } = this, scale = devicePixelRatio || 1;
+      const { canvas, motion } = this, scale = devicePixelRatio || 1;
       const width = canvas.clientWidth, height = canvas.clientHeight;
       if (!width) return;
       canvas.width = width * scale;
@@ -259,7 +259,7 @@
       for (const [role, values] of this.moves) {
         ctx.strokeStyle = ctx.fillStyle = css(role);
         ctx.lineWidth = LINE_PX[role];
-        const points = told.kind === "slider" ? this.slide(values, width, height) : this.hang(values, width, height);
+        const points = motion.kind === "slider" ? this.slide(values, width, height) : this.hang(values, width, height);
         ctx.beginPath();
         points.forEach(([x, y], i) => (i ? ctx.lineTo(x, y) : ctx.moveTo(x, y)));
         ctx.stroke();
@@ -280,8 +280,8 @@
       const points = [[x, y]];
       this.angles(values).forEach((q, j) => {
         angle += q;
-        x += size * this.told.lengths[j] * Math.sin(angle);
-        y += size * this.told.lengths[j] * Math.cos(angle);
+        x += size * this.motion.lengths[j] * Math.sin(angle);
+        y += size * this.motion.lengths[j] * Math.cos(angle);
         points.push([x, y]);
       });
       return points;
@@ -295,8 +295,8 @@
         let x = 0, y = 0, angle = 0;
         for (let j = 0; j < this.joints; j++) {
           angle += measured[k + j] + times * (values[k + j] - measured[k + j]);
-          x += this.told.lengths[j] * Math.sin(angle);
-          y += this.told.lengths[j] * Math.cos(angle);
+          x += this.motion.lengths[j] * Math.sin(angle);
+          y += this.motion.lengths[j] * Math.cos(angle);
           box[0] = Math.max(box[0], -x); box[1] = Math.max(box[1], x); box[2] = Math.max(box[2], -y); box[3] = Math.max(box[3], y);
         }
       }
@@ -304,7 +304,7 @@
       return box;
     }
     slide(values, width, height) {
-      const x = width * (0.5 + 0.42 * this.angles(values)[0] / this.told.lengths[0]);
+      const x = width * (0.5 + 0.42 * this.angles(values)[0] / this.motion.lengths[0]);
       return [[x, 0.3 * height], [x, 0.7 * height]];
     }
   }
