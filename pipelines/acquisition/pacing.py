@@ -6,8 +6,6 @@ from collections.abc import Awaitable, Callable
 
 LEAN = 0.005
 """Share of a sample period by which each look at the counter comes earlier than the last."""
-STEP_BACK = 0.1
-"""Share of a sample period to wait after a look that came too early."""
 SLOW = 0.3
 """Share of a sample period after which an answer is too old where the next sample is unknown."""
 
@@ -55,6 +53,8 @@ class PhaseLock:
         Return ``last`` if none is latched in time. A sample that was awaited and that no exchange
         read is not awaited again: its time has passed.
         """
+        # Share of a sample period to wait after a look that came too early.
+        step_back = 0.1
         began = time.perf_counter()
         looked = last if self._count is None else self._count
         before = max(last, looked)  # an exchange may have found a later one than the look before it
@@ -71,7 +71,7 @@ class PhaseLock:
             if now - began > self._patience_s:
                 return last
             self._early, looked = (asked, count), count
-            self._due = now + STEP_BACK * self._period
+            self._due = now + step_back * self._period
 
     def _fresh_until(self, count: int, asked: float) -> float:
         """Return until when a sample that a look found is surely the newest, host's clock, s;

@@ -10,9 +10,6 @@ from pipelines.errors import InputError
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.rig import RigSettings
 
-TOO_FAST = 1.05
-"""Times the speed limit that a motion may reach between two set-points that keep it."""
-
 
 def refuse_run_outside(rig: RigSettings, run: NDArray, first: int, rate: float) -> None:
     """Refuse a piece of a run that leaves the drives' limits.
@@ -57,13 +54,15 @@ def refuse_fast_between_set_points(
     rate : float
         Set-points a second.
     """
+    # Times the speed limit that a motion may reach between two set-points that keep it.
+    too_fast = 1.05
     for share in (0.5, 0.75):  # where the one shows a standstill, the other does not
         instants = (np.arange(begin, end) + share) / rate
 
         def when(k: int, instants: NDArray = instants) -> str:
             return f"at {instants[k]:.3f} s, which {rate:g} set-points a second do not show"
 
-        _refuse_fast(rig, trajectory.at(instants)[1], TOO_FAST, when)
+        _refuse_fast(rig, trajectory.at(instants)[1], too_fast, when)
 
 
 def refuse_path_outside(rig: RigSettings, reference: SetPoints, rest: NDArray, rate: float) -> None:

@@ -26,10 +26,6 @@ from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
 """Least number of rows of a recording."""
-LARGEST_TORQUE = 1e6
-"""N·m or N; far more than any drive delivers at a joint."""
-LONGEST_PERIOD = 1.01
-"""In lengths of the run, as a run of one period ends a sample before the period does."""
 
 
 @dataclass(frozen=True)
@@ -269,6 +265,8 @@ def _note_period(
 
 def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     """Refuse an angle or torque that no joint has."""
+    # N·m or N; far more than any drive delivers at a joint.
+    largest_torque = 1e6
     for i, joint in enumerate(settings.joint):
         if joint.kind == "revolute":
             _check_most(
@@ -284,7 +282,7 @@ def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
             columns,
             f"joint[{i}].torque",
             joint.joint.column("torque"),
-            LARGEST_TORQUE,
+            largest_torque,
             unit,
             "scale or gains",
         )
@@ -305,8 +303,10 @@ def _check_most(
 
 
 def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:
+    # In lengths of the run, as a run of one period ends a sample before the period does.
+    longest_period = 1.01
     for recording in wanted:
-        if recording.period_s is not None and recording.period_s > LONGEST_PERIOD * duration_s:
+        if recording.period_s is not None and recording.period_s > longest_period * duration_s:
             raise SettingsError(
                 f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected"
                 f" at most the {duration_s:.6g} s of the run; correct it, or remove it"

@@ -23,18 +23,10 @@ from pipelines.settings.rig import RigSettings
 AMPLITUDE_RAD = 0.05
 PERIOD_S = 4.0
 """Period of the hip; the knee moves twice as fast, which distinguishes their answers."""
-ROOM_RAD = 0.1
-"""Distance beyond the movement at which it is stopped, within the rig's own limits."""
-SPEED_RAD_S = 1.0
-NEAR_ZERO_RAD = 0.1
-"""Largest angle at the start: a drive of wrong sign leaps by twice that when it is enabled."""
-LONGEST_DELAY_S = 0.3
 GAIN = 0.25
 """Largest deviation of the ratio of angle and set-point from one."""
 LITTLE, MUCH = -GAIN, 2.0
 """Range of that ratio for a joint that lags behind as it begins to move."""
-SEEN_RAD = 0.002
-"""Least movement of a set-point for a check of the answer."""
 LEAST_CORRELATION = 0.2
 """Least correlation of torque and speed that shows the torque's sign."""
 JOINTS = ("hip", "knee")
@@ -60,10 +52,12 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
     SettingsError
         Names a joint and its angle.
     """
+    # Largest angle at the start: a drive of wrong sign leaps by twice that when it is enabled.
+    near_zero_rad = 0.1
     for joint, angle in zip(JOINTS, angles, strict=True):
-        if abs(angle) > NEAR_ZERO_RAD:
+        if abs(angle) > near_zero_rad:
             raise SettingsError(
-                f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g}"
+                f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{near_zero_rad:g}"
                 " rad, as a drive of wrong sign leaps; let the leg hang straight, or add --by-hand"
             )
 
@@ -132,7 +126,10 @@ def _folder() -> Iterator[Path]:
 
 def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
     """Return the rig's settings with limits around the start, within those with a person."""
-    room, careful = AMPLITUDE_RAD + ROOM_RAD, rig.in_force("with_human")
+    # Distance beyond the movement at which it is stopped, within the rig's own limits.
+    room_rad = 0.1
+    speed_rad_s = 1.0
+    room, careful = AMPLITUDE_RAD + room_rad, rig.in_force("with_human")
     drives = tuple(
         drive.model_copy(
             update={
@@ -140,7 +137,7 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
                     max(drive.angle_rad[0], angle - room),
                     min(drive.angle_rad[1], angle + room),
                 ),
-                "speed_rad_s": min(drive.speed_rad_s, SPEED_RAD_S),
+                "speed_rad_s": min(drive.speed_rad_s, speed_rad_s),
             }
         )
         for drive, angle in zip(careful.drive, start, strict=True)
@@ -185,8 +182,9 @@ def _toml(value: Any) -> str:
 
 def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray, float]:
     """Fit angle(t) = gains @ reference(t - delay) + constant; return gains (J,) and delay (s)."""
+    longest_delay_s = 0.3
     fits = []
-    for lag in range(max(1, min(round(LONGEST_DELAY_S * rate_hz), len(angle) // 4))):
+    for lag in range(max(1, min(round(longest_delay_s * rate_hz), len(angle) // 4))):
         Y = np.column_stack([reference[: len(reference) - lag], np.ones(len(reference) - lag)])
         values = np.linalg.lstsq(Y, angle[lag:], rcond=None)[0]
         fits.append((float(np.mean((angle[lag:] - Y @ values) ** 2)), lag, values[:-1]))
@@ -235,11 +233,13 @@ def _check_answer(rig: RigSettings, j: int, gains: NDArray, torque: float) -> It
 
 def _check_stopped(rig: RigSettings, progress: Sequence[Progress]) -> Iterator[Finding]:
     """Check the answers before a movement was stopped."""
+    # Least movement of a set-point for a check of the answer.
+    seen_rad = 0.002
     rows = [report.row for report in progress if report.row is not None]
     for j in range(len(rig.drive)):
         reference = np.array([row.drives[j].reference for row in rows])
         angle = np.array([row.drives[j].angle for row in rows])
-        if len(rows) < 2 or np.ptp(reference) < SEEN_RAD:
+        if len(rows) < 2 or np.ptp(reference) < seen_rad:
             continue
         away = reference - reference[0]
         gains = np.zeros(len(rig.drive))

@@ -23,16 +23,8 @@ LOOK_S = 0.005
 """Pause between two readings."""
 STILL_S = 0.3
 """Time at rest after which a movement is over."""
-BACK = 0.3
-"""Largest distance from the start at rest, as a share of the movement."""
 SWING_RAD = (0.1, 1.0)
 """Credible angles of a movement of 10 to 40 degrees by hand."""
-PUSH_SHARE = 0.025
-"""Least force of a push, as a share of ``safety.cuff_force_n``."""
-CLEAR = 3.0
-"""Least ratio of the movements of the intended channel and another."""
-HARDLY_RAD = 1e-4
-"""Movement below which an angle counts as constant."""
 MOTIONS = {
     "hip": (
         ("keep the knee straight, swing the leg forward by 10 to 40 degrees and back"),
@@ -65,6 +57,8 @@ async def by_hand(
     rate_hz : float, optional
         Samples a second, in lockstep.
     """
+    # Least force of a push, as a share of safety.cuff_force_n.
+    push_share = 0.025
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
     await operator.ready("Hold the leg: its drives are now disabled. The machine must be empty.")
     for probe in probes:
@@ -83,7 +77,7 @@ async def by_hand(
         await operator.ready(
             f"{probe.place}: press on the inside of this cuff, {inside}, and let go."
         )
-        least = PUSH_SHARE * rig.safety.cuff_force_n
+        least = push_share * rig.safety.cuff_force_n
         pressed = await _watch(
             sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives
         )
@@ -102,6 +96,8 @@ async def _watch(
     Return the answers of each probe. Those of ``also`` are only advanced, since in lockstep no
     device goes on without all drives.
     """
+    # Largest distance from the start at rest, as a share of the movement.
+    back = 0.3
     for probe in probes:
         await probe.step()
         probe.take()
@@ -112,7 +108,7 @@ async def _watch(
         away = np.abs(np.concatenate([value(probe) for probe in probes]) - rest)
         largest = np.fmax(largest, away)
         which = int(np.nanargmax(np.nan_to_num(largest)))
-        if largest[which] < least or not away[which] < BACK * largest[which]:
+        if largest[which] < least or not away[which] < back * largest[which]:
             still_since = now
         elif now - still_since > STILL_S:
             break
@@ -132,17 +128,21 @@ def _check_motion(
     asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None
 ) -> Iterator[Finding]:
     """Yield findings about the drive whose joint a person was asked to move."""
+    # Least ratio of the movements of the intended channel and another.
+    clear = 3.0
+    # Movement below which an angle counts as constant.
+    hardly_rad = 1e-4
     peaks = {probe: _peak(series.of("angle")) for probe, series in moved.items()}
     largest = max(peaks, key=lambda probe: abs(peaks[probe]))
     peak, where = peaks[asked], f"{asked.map_path}.read"
-    if abs(peaks[largest]) < HARDLY_RAD:
+    if abs(peaks[largest]) < hardly_rad:
         yield asked.finding(
             f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is"
             f" frozen: compare {where}.angle with the device's manual",
             "angle",
         )
         return
-    if largest is not asked and abs(peaks[largest]) > CLEAR * abs(peak):
+    if largest is not asked and abs(peaks[largest]) > clear * abs(peak):
         yield asked.finding(
             f"the {asked.place} was moved, but the angle of {largest.name} changed, by"
             f" {peaks[largest]:+.3g} rad, and not this one ({peak:+.3g}): the two are swapped;"

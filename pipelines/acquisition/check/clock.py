@@ -14,8 +14,6 @@ from pipelines.settings.rig.register import DIMENSION, UNITS
 
 RATES_HZ = (0.5, 1e5)
 """Range of credible sample rates, where none is known."""
-OFTEN = 3.0
-"""Answers per change of the counter that prove that its steps are the device's own."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +83,13 @@ def check_clock(
 def _check_counter(
     probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
 ) -> Iterator[Finding]:
+    # Answers per change of the counter that prove that its steps are the device's own.
+    often = 3.0
     counter, where = series.counted("sequence"), f"{probe.map_path}.read.sequence"
     steps = np.diff(counter)
     if _counts(counter, seconds, rate_hz):
         changes = np.count_nonzero(steps)
-        if clock.step > 1 and not probe.in_lockstep and len(steps) > OFTEN * changes:
+        if clock.step > 1 and not probe.in_lockstep and len(steps) > often * changes:
             yield probe.finding(
                 f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample;"
                 f" correct {where}.scale, or let the device count samples",

@@ -12,7 +12,6 @@ from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, REGISTERS, RegisterType
 
-MOST_NAMED = 2
 _COST = {"word_order": 1, "type": 2}
 
 
@@ -93,6 +92,7 @@ def remedy(
     counts : bool
         Whether the register is a counter or clock, which wraps around.
     """
+    most_named = 2
     best: list[tuple[Interpretation, float]] = []
     for one in _interpretations(name, series.block):
         if best and one.cost > best[0][0].cost:
@@ -106,8 +106,8 @@ def remedy(
     if not best:
         return None
     named = ", or ".join(
-        f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:MOST_NAMED]
+        f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:most_named]
     )
-    if all(one.bytes_swapped for one, _ in best[:MOST_NAMED]):
+    if all(one.bytes_swapped for one, _ in best[:most_named]):
         return f"{named}: Modbus sends the high byte first; set the device so, or compare {where}"
     return f"{named}: correct {where}"

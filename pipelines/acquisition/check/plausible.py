@@ -13,15 +13,6 @@ from pipelines.acquisition.machine.drive import Drive
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DriveSettings
 
-TEMPERATURE_C = (-20.0, 150.0)
-TORQUE_AT_REST = 0.1
-"""Largest current of a disabled drive, as a share of its joint's torque limit."""
-SPEED_AT_REST = 2.0
-"""Largest speed of a leg that swings freely, as a multiple of its joint's limit."""
-STEP_RAD = 0.01
-"""Change of an angle between two samples that is allowed in addition to the speed limit."""
-TURN_RAD = np.pi
-"""Largest angle of a leg outside its limits; beyond it, the register is misread."""
 TINY, HUGE = 1e-20, 1e20
 """Range of credible magnitudes; other floats are misread words."""
 SI = {
@@ -75,11 +66,13 @@ class Expectation:
         period_s : float
             Time between samples, s.
         """
+        # Change of an angle between two samples that is allowed in addition to the speed limit.
+        step_rad = 0.01
         with np.errstate(invalid="ignore", over="ignore"):
             return bool(
                 (
                     np.abs(np.diff(values))
-                    > self.fastest * (np.diff(seconds) + period_s) + STEP_RAD
+                    > self.fastest * (np.diff(seconds) + period_s) + step_rad
                 ).any()
             )
 
@@ -129,9 +122,14 @@ def has_plausible_size(values: NDArray) -> NDArray:
 
 
 def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]:
+    temperature_c = (-20.0, 150.0)
+    # Largest current of a disabled drive, as a share of its joint's torque limit.
+    torque_at_rest = 0.1
+    # Largest speed of a leg that swings freely, as a multiple of its joint's limit.
+    speed_at_rest = 2.0
     low, high = drive.angle_rad
-    speed = SPEED_AT_REST * drive.speed_rad_s
-    current = TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere
+    speed = speed_at_rest * drive.speed_rad_s
+    current = torque_at_rest * drive.torque_nm / drive.torque_per_ampere
     return {
         "angle": Expectation(
             low,
@@ -151,8 +149,8 @@ def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]
             "does another master drive it? Else compare {where} with its manual",
         ),
         "temperature": Expectation(
-            *TEMPERATURE_C,
-            f"expected {TEMPERATURE_C[0]:g} to {TEMPERATURE_C[1]:g} °C",
+            *temperature_c,
+            f"expected {temperature_c[0]:g} to {temperature_c[1]:g} °C",
         ),
     }
 
@@ -166,6 +164,8 @@ def _of_sensor(rig: RigSettings) -> dict[str, Expectation]:
 def _check_register(
     probe: Probe, name: str, series: Series, expected: Expectation
 ) -> Iterator[Finding]:
+    # Largest angle of a leg outside its limits; beyond it, the register is misread.
+    turn_rad = np.pi
     values, seconds = series.of(name), series.answered
     came = np.diff(seconds[series.fresh])
     period_s = float(np.median(came)) if len(came) else 0.0
@@ -178,7 +178,7 @@ def _check_register(
     if not has_plausible_size(values).all():
         why = "which is not a credible value"
     # A leg may stand a little outside its limits; that is no misread register.
-    misread = name != "angle" or leaps or abs(value) > TURN_RAD or not np.isfinite(value)
+    misread = name != "angle" or leaps or abs(value) > turn_rad or not np.isfinite(value)
     mended = None
     if misread:
         mended = remedy(

@@ -14,9 +14,6 @@ from pipelines.acquisition.safety.sample_stream import SampleStream
 from pipelines.acquisition.safety.set_point_history import SetPointHistory
 from pipelines.errors import DeviceError, ExoidError
 
-DRAINS = 40
-"""Drains of each record, one a cycle."""
-
 
 async def check_rings(
     machine: Machine, probes: Sequence[Probe], rate_hz: float | None
@@ -50,11 +47,13 @@ async def _fault(
     machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float
 ) -> str | None:
     """Return the fault of one drive's record; None for a sound one."""
+    # Drains of each record, one a cycle.
+    drains = 40
     history, begun = SetPointHistory(), False
     stream = SampleStream(machine.rig, j, cycle_hz, history)
     agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
     await empty_recorder(drive)
-    for _ in range(DRAINS):
+    for _ in range(drains):
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
         agreement.add(reading)
@@ -70,7 +69,7 @@ async def _fault(
     for probe in drives:
         probe.take()
     if not begun:
-        return f"its record brought no sample in {DRAINS} cycles; correct {_where(drive)}"
+        return f"its record brought no sample in {drains} cycles; correct {_where(drive)}"
     return None
 
 

@@ -9,12 +9,7 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
-MOVED_RAD = 0.02
-"""Least travel for a comparison."""
 TOLERANCE = 0.25
-CORRELATED = 0.9
-STANDING_RAD = 0.05
-"""Largest integral of the velocity while the angle is constant."""
 
 
 def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
@@ -27,6 +22,12 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     rate_hz : float, optional
         Samples a second in lockstep; else the instants of the answers are used.
     """
+    # Least travel for a comparison.
+    moved_rad = 0.02
+    # Least correlation of angle and integral; below it, the register holds another quantity.
+    correlated = 0.9
+    # Largest integral of the velocity while the angle is constant.
+    standing_rad = 0.05
     register = series.block.registers.get("velocity")
     if register is None:
         return
@@ -39,8 +40,8 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
         return
     travel = np.r_[0.0, np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(t))]
     angle, integral = q - q.mean(), travel - travel.mean()
-    if np.ptp(q) < MOVED_RAD:
-        if np.ptp(travel) > STANDING_RAD + np.ptp(q):
+    if np.ptp(q) < moved_rad:
+        if np.ptp(travel) > standing_rad + np.ptp(q):
             yield probe.finding(
                 f"velocity integrates to {np.ptp(travel):.3g} rad, but the angle changed by"
                 f" {np.ptp(q):.2g} rad; compare {where}.velocity with the manual",
@@ -52,7 +53,7 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
         if integral.any()
         else 0.0
     )
-    if abs(correlation) < CORRELATED:
+    if abs(correlation) < correlated:
         yield probe.finding(
             f"velocity does not follow the angle (correlation {correlation:.2f}); compare"
             f" {where}.velocity with the device's manual",

@@ -10,11 +10,6 @@ from pipelines.acquisition.check.plausible import has_plausible_size
 from pipelines.acquisition.check.probe import Probe, Series
 
 AXES = ("force_x", "force_y", "force_z")
-ZERO_SHARE = 0.05
-"""Largest allowed zero, as a share of ``safety.cuff_force_n``."""
-ENOUGH = 20
-"""New samples without any noise that mean a disconnected sensor."""
-NEAR_END = 0.999
 
 
 def check_zeros(
@@ -29,6 +24,12 @@ def check_zeros(
     is_empty : bool
         Whether no person is in the machine; else the mean forces are not zeros.
     """
+    # Largest allowed zero, as a share of safety.cuff_force_n.
+    zero_share = 0.05
+    # New samples without any noise that mean a disconnected sensor.
+    enough = 20
+    # Share of the register's range from which a force counts as saturated.
+    near_end = 0.999
     forces = _fresh_forces(series)
     if not all(has_plausible_size(forces[:, i]).all() for i in range(len(AXES))):
         return  # the registers have to be corrected first
@@ -36,18 +37,18 @@ def check_zeros(
     for i, axis in enumerate(AXES):
         mean, full = float(forces[:, i].mean()), series.block.registers[axis].counts
         scale, offset = series.block.registers[axis].si
-        if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= NEAR_END * full[1]) > 0.5:
+        if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= near_end * full[1]) > 0.5:
             yield probe.finding(
                 f"{axis} is saturated at {mean:.4g} N, the end of its register; check the sensor's"
                 f" cable and amplifier, or compare {where}.{axis} with its manual",
             )
-        elif is_empty and abs(mean) > ZERO_SHARE * limit_n:
-            most = ZERO_SHARE * limit_n
+        elif is_empty and abs(mean) > zero_share * limit_n:
+            most = zero_share * limit_n
             yield probe.finding(
                 f"{axis} is {mean:.4g} N with nobody in the machine, expected within ±{most:g} N;"
                 f" tare the sensor, or correct {where}.{axis}.offset",
             )
-    if len(forces) >= ENOUGH and not np.ptp(forces, axis=0).any():
+    if len(forces) >= enough and not np.ptp(forces, axis=0).any():
         listed = ", ".join(f"{force:.4g}" for force in forces[0])
         yield probe.finding(
             f"all three forces are constant ({listed} N) over {len(forces)} samples, without any"

@@ -16,8 +16,6 @@ from pipelines.settings.rig.line import TcpLine
 
 START_S = 180.0
 """Longest start; the first one on a computer compiles the plant."""
-END_S = 3.0
-"""Longest end before the process is killed."""
 # Ctrl-C must not reach the rig, which has to live until its drives are disabled.
 _ON_ITS_OWN: dict[str, Any] = (
     {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -58,10 +56,12 @@ def embedded(
 
 def _end(process: subprocess.Popen) -> None:
     """End a process by closing its input; kill it if that takes too long."""
+    # Longest end before the process is killed.
+    end_s = 3.0
     assert process.stdin and process.stdout  # pipes
     process.stdin.close()
     try:
-        process.wait(END_S)
+        process.wait(end_s)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

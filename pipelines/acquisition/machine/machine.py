@@ -26,8 +26,6 @@ from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 
-LAG_PAUSE_S = 0.0002
-"""Pause before a drive is read again that has not latched the cycle's sample yet."""
 LOOKS = 9
 """Readings from which the offset between the drives' counters is determined."""
 
@@ -219,6 +217,8 @@ class Machine:
 
     async def _latch(self, readings: list[Reading]) -> bool:
         """Read drives again until all have latched the newest sample; return False if not."""
+        # Pause before a drive is read again that has not latched the cycle's sample yet.
+        lag_pause_s = 0.0002
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
             counts = [
@@ -230,7 +230,7 @@ class Machine:
                 return True
             if time.monotonic() > until:
                 raise DeviceError(self._out_of_step(readings, counts))
-            await asyncio.sleep(LAG_PAUSE_S)
+            await asyncio.sleep(lag_pause_s)
             for j in late:
                 # Read only, not sent again: by then another set-point is due.
                 try:

@@ -11,8 +11,6 @@ from zlib import crc32
 
 KEY = b"head"
 """Key of a copy in a batch's own metadata."""
-SEARCHED = 2**20
-"""Bytes at the beginning and at the end of a journal that are searched for a copy."""
 _COPY = re.compile(rb"exoid-head:([0-9a-f]{8}):([A-Za-z0-9+/]+=*)")
 
 
@@ -23,10 +21,12 @@ def head_as_text(head: bytes) -> str:
 
 def find_head(file: BinaryIO) -> bytes | None:
     """Return the head of the first undamaged copy in a journal; None for none."""
+    # Bytes at the beginning and at the end of a journal that are searched for a copy.
+    searched = 2**20
     length = file.seek(0, 2)
-    for place in (0, max(length - SEARCHED, 0)):
+    for place in (0, max(length - searched, 0)):
         file.seek(place)
-        for match in _COPY.finditer(file.read(SEARCHED)):
+        for match in _COPY.finditer(file.read(searched)):
             try:
                 head = b64decode(match[2])
             except ValueError:

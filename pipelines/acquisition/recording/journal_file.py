@@ -20,10 +20,6 @@ from pipelines.errors import ContractError, InputError
 
 MARK = re.compile(rb"\xff{4}(?!\xff)")
 """First bytes of every part of an Arrow stream; its length follows, a multiple of eight."""
-SCANNED = 65536
-"""Bytes that are searched at once for the next mark."""
-NO_SAMPLE = 512
-"""Length of a file that is too short for a sample: a head with columns and metadata is longer."""
 
 
 @dataclass(frozen=True)
@@ -113,11 +109,13 @@ def _disk_error(path: Path, error: OSError) -> InputError:
 
 
 def _why_no_journal(path: Path) -> str:
+    # Length of a file that is too short for a sample: a head with columns and metadata is longer.
+    no_sample = 512
     # Only a file with a journal's name can be the rest of one.
     if not path.name.endswith(JOURNAL):
         return f"is no journal of a run, nothing was changed; name a *{JOURNAL}"
     size = path.stat().st_size
-    if size <= NO_SAMPLE:
+    if size <= no_sample:
         return (
             "is no journal of a run, or not even its head was written and so no sample; delete it"
         )
@@ -154,7 +152,9 @@ def _between(file: BinaryIO, begin: int, end: int) -> bytes:
 
 def _next_mark(file: BinaryIO, begin: int) -> int | None:
     """Return the next place, from ``begin`` on, where a part may begin; None for none."""
-    while len(chunk := _between(file, begin, begin + SCANNED)) >= 4:
+    # Bytes that are searched at once for the next mark.
+    scanned = 65536
+    while len(chunk := _between(file, begin, begin + scanned)) >= 4:
         match = MARK.search(chunk)
         if match:
             return begin + match.start()

@@ -16,9 +16,6 @@ from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
 from pipelines.acquisition.states import State
 from pipelines.errors import DeviceError
 
-LONGEST_RETURN_S = 5.0
-"""How long set-points may take to the end of their path once it is due."""
-
 
 class PlanProgress:
     """The plan of a run, along the machine's cycles; instants ``now`` are the host's clock, s."""
@@ -76,10 +73,12 @@ class PlanProgress:
         DeviceError
             They are long overdue: more samples are lost than the way back makes up for.
         """
+        # How long set-points may take to the end of their path once it is due.
+        longest_return_s = 5.0
         cycles_past_end = row.sequence - self._first_cycle - self._length
-        if cycles_past_end > LONGEST_RETURN_S * self._rate_hz:
+        if cycles_past_end > longest_return_s * self._rate_hz:
             raise DeviceError(
-                f"the motion is {LONGEST_RETURN_S:g} s late and still not finished: too many"
+                f"the motion is {longest_return_s:g} s late and still not finished: too many"
                 " samples are lost; check the line, and the drives' sample counters"
             )
         pairs = zip(trackers, self._at(self._length).tolist(), strict=True)

@@ -11,16 +11,10 @@ from pipelines.acquisition.machine.reading import Reading
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
-MOST_HELD = 1000
-"""Exchanges that wait for their record; a run that falls further behind is stopped."""
 COMPARED = 50
 """Samples of both accounts after which the torques' ratio is looked at."""
 RATIO = 0.25
 """How far it may be from one: a record may hold a current before it was filtered, or after."""
-LITTLE_NM = 1.0
-"""rms of the torque below which its noise may be all there is, on an exoskeleton."""
-NEAR_RAD = 1e-3
-"""How far the angles of one sample may differ, on top of the joint's travel in 1.5 samples."""
 
 
 class RecordAgreement:
@@ -39,8 +33,10 @@ class RecordAgreement:
 
     def add(self, exchanged: Reading) -> None:
         """Take the sample of an exchange."""
+        # Exchanges that wait for their record; a run that falls further behind is stopped.
+        most_held = 1000
         self._exchanged[exchanged.sequence] = exchanged
-        while len(self._exchanged) > MOST_HELD:
+        while len(self._exchanged) > most_held:
             self._exchanged.popitem(last=False)
 
     def check(self, recorded: Reading) -> None:
@@ -56,12 +52,16 @@ class RecordAgreement:
         DeviceError
             Angles or torques differ.
         """
+        # rms of the torque below which its noise may be all there is, on an exoskeleton.
+        little_nm = 1.0
+        # How far the angles of one sample may differ, on top of the joint's travel in 1.5 samples.
+        near_rad = 1e-3
         exchanged = self._exchanged.pop(recorded.sequence, None)
         if exchanged is None:
             return
         apart = abs(recorded.angle - exchanged.angle)
         # NaN: nothing is known.
-        if apart > NEAR_RAD + 1.5 * abs(exchanged.velocity) / self._rate_hz:
+        if apart > near_rad + 1.5 * abs(exchanged.velocity) / self._rate_hz:
             raise DeviceError(
                 self._contradiction(
                     "angle", exchanged.angle, recorded.angle, "rad", recorded.sequence
@@ -74,7 +74,7 @@ class RecordAgreement:
         self._xx += exchanged.torque**2
         self._xy += exchanged.torque * recorded.torque
         self._yy += recorded.torque**2
-        if self._compared >= COMPARED and self._xx > self._compared * LITTLE_NM**2:
+        if self._compared >= COMPARED and self._xx > self._compared * little_nm**2:
             ratio = copysign(sqrt(self._yy / self._xx), self._xy)
             if not abs(ratio - 1.0) <= RATIO:
                 what = exchanged.torque, recorded.torque

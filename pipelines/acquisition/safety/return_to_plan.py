@@ -7,8 +7,6 @@ from pipelines.errors import DeviceError
 from pipelines.settings.rig.devices import DriveSettings
 from pipelines.settings.rig.safety import SafetySettings
 
-WALK = 0.8
-"""Share of the speed limit for the way back to the plan: a drive may overshoot."""
 NO_LAG_RAD = 1e-9
 """Rounding error between a set-point and the plan."""
 
@@ -53,6 +51,8 @@ def step_to_plan(
     DeviceError
         The way back is longer than the watchdog's time at the speed limit.
     """
+    # Share of the speed limit for the way back to the plan: a drive may overshoot.
+    walk = 0.8
     due, before, earlier = path
     along, was, lag = (due - before) * rate_hz, (before - earlier) * rate_hz, before - base
     if lag == 0.0 and speed == was:
@@ -63,7 +63,7 @@ def step_to_plan(
     # A drive that is sent from rest to its speed limit within a sample jerks the leg with all of
     # its torque.
     change = max(deceleration, abs(along - was) * rate_hz) * took_s
-    fastest = max(abs(along), WALK * drive.speed_rad_s)
+    fastest = max(abs(along), walk * drive.speed_rad_s)
     next_speed = clamped(along + copysign(softly, lag), speed - change, speed + change)
     next_speed = clamped(next_speed, -fastest, fastest)
     is_on_plan = abs(lag) < NO_LAG_RAD and next_speed == along

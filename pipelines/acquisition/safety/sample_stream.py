@@ -18,11 +18,6 @@ from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import MOST_REGISTERS
 
-SPEED_SHARE = 0.25
-"""How far a drive's speed may be from its angle's change, as a share of the speed limit."""
-ECHO_CYCLES = 8
-"""How far a drive's set-point may be from the sent one, in cycles at the speed limit."""
-
 
 class SampleStream:
     """The samples of one drive so far; instants ``now`` are the host's, s."""
@@ -168,6 +163,8 @@ class SampleStream:
 
     def _leap(self, before: Reading, reading: Reading) -> str | None:
         """Check an angle against the one before it, the speed limit and the measured velocity."""
+        # How far a drive's speed may be from its angle's change, as a share of the speed limit.
+        speed_share = 0.25
         samples = reading.sequence - before.sequence
         if samples <= 0:
             return None
@@ -180,8 +177,8 @@ class SampleStream:
                 " check the encoder, or the word order in the rig file"
             )
         measured = 0.5 * (before.velocity + reading.velocity)
-        if samples == 1 and abs(speed - measured) > SPEED_SHARE * limit:
-            mirrored = abs(speed + measured) < SPEED_SHARE * abs(speed)
+        if samples == 1 and abs(speed - measured) > speed_share * limit:
+            mirrored = abs(speed + measured) < speed_share * abs(speed)
             turn = "turn the sign of one of the two, or " if mirrored else ""
             return (
                 f"{self._label}: its angle went on at {speed:.3f} rad/s, but it reports a speed of"
@@ -195,8 +192,10 @@ class SampleStream:
 
     def _echo(self, before: Reading, reading: Reading) -> str | None:
         """Check the set-point that the drive reports against the one that was sent."""
+        # How far a drive's set-point may be from the sent one, in cycles at the speed limit.
+        echo_cycles = 8
         sent = self._history.at(reading.sequence).reference
-        cycles = ECHO_CYCLES + (reading.sequence - before.sequence) / self._cycle
+        cycles = echo_cycles + (reading.sequence - before.sequence) / self._cycle
         # NaN where the drive does not report it.
         if not abs(reading.reference - sent) > cycles * self._drive.speed_rad_s / self._cycle_hz:
             return None

@@ -15,14 +15,6 @@ from pipelines.settings.units import UNITS
 
 TURNING = ("torque", "current", "force", "voltage")
 """Quantities that show the torque of a revolute joint's drive, the best first."""
-SLIDING = ("force", "torque", "current", "voltage")
-"""Quantities that show the force of a prismatic joint's drive, the best first."""
-OBVIOUS = 0.9
-"""Least share of the variance by which a velocity is recognised without a name."""
-MANY = 100.0
-"""Least range of an encoder's counts; the level of a queue has a smaller one."""
-FROM_THE_BASE = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-"""Joints of limbs, of which each carries the following ones."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +31,9 @@ class JointColumns:
     @property
     def drive(self) -> str | None:
         """The quantity that shows best the torque or force of its drive, if any."""
-        quantities = SLIDING if self.slides else TURNING
+        # Quantities that show the force of a prismatic joint's drive, the best first.
+        sliding = ("force", "torque", "current", "voltage")
+        quantities = sliding if self.slides else TURNING
         return next((quantity for quantity in quantities if quantity in self.columns), None)
 
     @property
@@ -114,7 +108,9 @@ def _owner(meaning: Meaning, by_joint: Mapping[str, list[Meaning]]) -> str | Non
 
 def _place(joint: JointColumns) -> int:
     """Return the place of a joint in its limb; 0 where its name has none."""
-    places = (place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower())
+    # Joints of limbs, of which each carries the following ones.
+    from_the_base = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+    places = (place for place, name in enumerate(from_the_base, 1) if name in joint.name.lower())
     return next(places, 0)
 
 
@@ -128,8 +124,10 @@ def order_is_known(joints: Sequence[JointColumns]) -> bool:
 
 def _counted(meaning: Meaning, values: NDArray) -> Meaning:
     """Return a column as an angle if it may be an encoder's; counts of events never decrease."""
+    # Least range of an encoder's counts; the level of a queue has a smaller one.
+    many = 100.0
     known = values[np.isfinite(values)].astype(float)
-    swings = are_whole(known) and np.ptp(known) > MANY and np.any(np.diff(known) < 0.0)
+    swings = are_whole(known) and np.ptp(known) > many and np.any(np.diff(known) < 0.0)
     return (in_counts(meaning) or meaning) if swings else meaning
 
 
@@ -186,6 +184,8 @@ def _by_behaviour(
     usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
 ) -> list[JointColumns]:
     """Return one joint of columns without meaningful names, by integrals and by a torque fit."""
+    # Least share of the variance by which a velocity is recognised without a name.
+    obvious = 0.9
     pairs = []
     for angle, velocity in _pairs(usable, columns, time_s):
         agreement = integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))
@@ -193,7 +193,7 @@ def _by_behaviour(
         if agreement is not None and agreement.slope > 0.0:
             pairs.append((agreement.explained, angle, velocity))
     best = max(pairs, key=lambda pair: pair[0], default=None)
-    if best is None or best[0] < OBVIOUS:
+    if best is None or best[0] < obvious:
         return []
     share, angle, velocity = best
     rest = [m for m in usable if m not in (angle, velocity)]

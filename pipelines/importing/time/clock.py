@@ -16,22 +16,14 @@ from pipelines.settings.units import UNITS, unit_named
 
 RESTART_S, RESTART_PERIODS = 1.0, 20
 """A clock starts over that steps back by more than the longer of these, s and samples."""
-RESTART_ROWS = 20
-"""A clock that stays behind its latest stamp for more rows than these starts over, too."""
-LEAD_ROWS = 5
-"""At most so many rows at the beginning are left out if they are long before the rest."""
 LEAD_PERIODS, LEAD_S = 20, 0.2
 """Long before is more than the longer of these, samples and s."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
-FEW = 100
-"""Stamps from which the content of a text column is derived."""
 LONGEST = 29
 """Greatest length of a stamp in a message: a date to the nanosecond."""
 NEAR = 0.01
 """Distance from its modulus, as a share, within which a counter is full."""
-BACKWARDS = 0.9
-"""Share of steps back from which a clock runs backwards."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
 """Usual rates of machines: three decades, so that only one of s, ms, us and ns fits."""
 
@@ -117,9 +109,11 @@ def _likely_units(known: NDArray) -> list[str]:
 
 def _content(raw: NDArray) -> str:
     """Return the kind of stamps (n,): dates, durations or plain numbers; empty where unknown."""
+    # Stamps from which the content of a text column is derived.
+    few = 100
     if raw.dtype.kind in "biufmM":
         return {"M": "dates", "m": "durations"}.get(raw.dtype.kind, "plain numbers")
-    some = raw[~pd.isna(raw)][:FEW]
+    some = raw[~pd.isna(raw)][:few]
     if np.isfinite(numbers(some)).any():
         return "plain numbers"
     return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
@@ -291,8 +285,10 @@ def runs_backwards(time: NDArray) -> bool:
     time : (n,) array
         Stamps in any unit.
     """
+    # Share of steps back from which a clock runs backwards.
+    backwards = 0.9
     steps = np.diff(time)
-    return bool(len(steps)) and bool(np.mean(steps < 0.0) > BACKWARDS)
+    return bool(len(steps)) and bool(np.mean(steps < 0.0) > backwards)
 
 
 def _refuse_backwards(time: NDArray) -> None:
@@ -343,10 +339,12 @@ def _begins(time: NDArray) -> list[int]:
 
 def _stays_behind(time: NDArray) -> int | None:
     """Return the row from which time stays behind its maximum for many rows, if any."""
+    # A clock that stays behind its latest stamp for more rows than these starts over, too.
+    restart_rows = 20
     late = time < np.maximum.accumulate(time)
     edges = np.flatnonzero(np.diff(late, prepend=False, append=False))
     starts, ends = edges[::2], edges[1::2]
-    long = np.flatnonzero(ends - starts > RESTART_ROWS)
+    long = np.flatnonzero(ends - starts > restart_rows)
     return int(starts[long[0]]) if len(long) else None
 
 
@@ -405,7 +403,9 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
 
 def _lead(time: NDArray) -> int:
     """Return the number of rows at the beginning that are long before the rest."""
-    steps = np.diff(time[: LEAD_ROWS + 1])
+    # At most so many rows at the beginning are left out if they are long before the rest.
+    lead_rows = 5
+    steps = np.diff(time[: lead_rows + 1])
     far = np.flatnonzero(steps > max(LEAD_S, LEAD_PERIODS * _period(time)))
     return int(far[-1]) + 1 if len(far) else 0
 
