@@ -28,7 +28,6 @@ EXCEPTIONS = {
     ("pipelines/identification/parameter_rows.py", "friction"): STEP,
     ("exoid_cli/diagnose.py", "rotor_inertia"): EXAMPLE,
     ("exoid_cli/identify.py", "rotor_inertia"): EXAMPLE,
-    ("pipelines/settings/diagnose.py", "parallel_spring"): EXAMPLE,
     ("pipelines/settings/diagnose.py", "rotor_inertia"): EXAMPLE,
 }
 """Reasons by file and name. The classes in ``pipelines.effects.baseline`` are exceptions as well:
