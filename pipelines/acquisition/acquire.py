@@ -210,7 +210,8 @@ async def _ready(
     await machine.make_idle()
     await until_signal(machine.refuse_other_rate(rate_hz), stopped_by)
     start = np.array((await until_signal(machine.look(), stopped_by)).angle)
-    if why := check_start(machine.rig, start):
+    why = check_start(machine.rig, start)
+    if why:
         raise DeviceError(why)
     return start
 

@@ -74,7 +74,8 @@ class Loop:
         while True:
             self._exchange.refuse_signals()
             answers = await self._exchange.cycle(self._supervisor.enabling.set_point)
-            if row := self._supervisor.enabling.check(answers, time.monotonic() - began_at):
+            row = self._supervisor.enabling.check(answers, time.monotonic() - began_at)
+            if row:
                 break
             # Else the records of meanwhile would be in the way once the leg moves.
             await self._machine.forget_records()
@@ -101,7 +102,8 @@ class Loop:
             self._sampling.end()
             await outlive([follow], self._supervisor.abort)
             for task in ended:
-                if error := asyncio.CancelledError() if task.cancelled() else task.exception():
+                error = asyncio.CancelledError() if task.cancelled() else task.exception()
+                if error:
                     self._supervisor.abort(error)
 
     async def _follow(self, last: Row) -> None:

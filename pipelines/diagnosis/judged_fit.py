@@ -81,7 +81,8 @@ def judged_fit(selected: Selection, prepared: PreparedRuns, before: ValidationRe
                 label: float(np.sum(whole - log_likelihoods(less, prepared.noise)))
                 for label, less in without.items()
             }
-        if harm := selected.worst_harm(ratios):
+        harm = selected.worst_harm(ratios)
+        if harm:
             selected = selected.judged(harm, harms=True)
         elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
             selected = selected.judged(shortfalls)

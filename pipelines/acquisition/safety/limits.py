@@ -48,7 +48,8 @@ class Limits:
         samples_hz = self._rate * self._samples_per_cycle
         for j, (drive, reading) in enumerate(zip(self._rig.drive, samples.drives, strict=True)):
             if isinstance(reading, Reading):
-                if why := sample_violation(drive, self._last.get(j, reading), reading, samples_hz):
+                why = sample_violation(drive, self._last.get(j, reading), reading, samples_hz)
+                if why:
                     return why
                 self._last[j] = reading
         return self.cuff_violation(samples)

@@ -90,7 +90,8 @@ class SampleChecks:
         DeviceError
             Names the joint or cuff, its value and the limit.
         """
-        if reason := self._limits.violation(samples):
+        reason = self._limits.violation(samples)
+        if reason:
             raise DeviceError(reason)
 
     def check_at(self, answers: Answers, set_points: Sequence[float]) -> None:
@@ -175,7 +176,8 @@ class SampleChecks:
         row = answers.row
         if row is None or not is_new[0]:  # the first drive's counter is the machine's
             return None
-        if reason := self._cuffs.implausible(row.forces, row.sequence, self._sent_travel(row)):
+        reason = self._cuffs.implausible(row.forces, row.sequence, self._sent_travel(row))
+        if reason:
             raise DeviceError(reason)
         return row
 
@@ -237,7 +239,8 @@ class SampleChecks:
             stream.miss(answer)
             is_new = False
         else:
-            if is_new := stream.check(answer, now):
+            is_new = stream.check(answer, now)
+            if is_new:
                 tracker.meet(answer, cycle)
             # The set-point sent with the question takes effect after the sample of the answer.
             self._note_sent(joint, answer, tracker)

@@ -155,7 +155,8 @@ class SampleStream:
             self._echo,
             self._registers.check,
         ):
-            if reason := check(before, reading):
+            reason = check(before, reading)
+            if reason:
                 raise DeviceError(reason)
         self._last = reading
         self._watchdog.reset(now)

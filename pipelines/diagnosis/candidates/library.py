@@ -211,7 +211,8 @@ def _ripples(
     ripples, machine = [], prepared.baseline.machine
     tracked = [effect for effect in EFFECTS if effect.order_tracked]
     for effect, joint in product(tracked, prepared.baseline.joints):
-        if orders := orders_of(joint, prepared):
+        orders = orders_of(joint, prepared)
+        if orders:
             ripple = effect(joint, on=machine).with_parts(len(orders))
             fitted = alone.fit(Candidate(ripple, (orders,) * len(prepared.runs)))
             if fitted is not None:

@@ -57,7 +57,8 @@ def screened(
     list of CandidateFit
         Those that explain most first.
     """
-    if chosen := effect.directions([run.motion for run in runs]):
+    chosen = effect.directions([run.motion for run in runs])
+    if chosen:
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
     elif any(p.per_run for p in effect.shape) and not transforms_motion(effect):
         starts = [_from_the_begin(effect, len(runs))]

@@ -415,7 +415,8 @@ def _results_of(
 def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
     """Yield the effect with shapes that span its family."""
     probe = Candidate(effect, ())
-    if chosen := effect.directions([run.motion for run in runs]):
+    chosen = effect.directions([run.motion for run in runs])
+    if chosen:
         yield from (Candidate(effect, (shape,) * len(runs)) for shape in chosen[0])
         return
     if probe.transforms_motion:

@@ -104,7 +104,8 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
         _refuse_dead_angle(motions, j)
-        if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
+        lasts = _seconds(motions, [m[:, j] for m in moving])
+        if lasts < least:
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
@@ -114,7 +115,8 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
                 f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
-    if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
+    lasts = _seconds(motions, [m.all(axis=1) for m in moving])
+    if lasts < least:
         raise InputError(
             f"{files}: {' and '.join(machine.names)} move at once for {_rounded_down(lasts):.1f} s,"
             f" expected {least:.2g} s {together}: errors are scored there; excite both joints at"

@@ -128,7 +128,8 @@ class Refinement:
     def _onsets(self, best: Fit, runs: Sequence[Run]) -> Fit:
         """Move onsets to the instants at which they explain most, all else held."""
         for number, cause in enumerate(best.causes):
-            if (i := cause.onset) is None:
+            i = cause.onset
+            if i is None:
                 continue
             onsets = onsets_of(best, number, i, runs, self._baseline)
             acting = best.columns_of(number).runs

@@ -162,7 +162,8 @@ def _onsets(
     """Return the interval of each cause's onset, by (cause, shape parameter, run)."""
     ends: dict[tuple[int, int, int], tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
-        if (i := cause.onset) is not None:
+        i = cause.onset
+        if i is not None:
             onsets = onsets_of(fit, number, i, runs, baseline)
             ends |= {
                 (number, i, r): onsets[r].interval(runs[r], misfit)

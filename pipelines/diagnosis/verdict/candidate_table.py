@@ -112,7 +112,8 @@ def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterat
     yield f"its probability is {probability:.2g}"
     if any(label.startswith(LAW) for label in labels):
         yield "it contains a law that is no listed cause"
-    if doubted := sorted(labels & d.selected.doubted - set(d.causes)):
+    doubted = sorted(labels & d.selected.doubted - set(d.causes))
+    if doubted:
         yield f"the validation runs speak against {' and '.join(doubted)}"
 
 

@@ -107,7 +107,8 @@ def _nothing(d: Diagnosis) -> str:
         f" {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest"
         f" at {the(joint)}: {_size(d, place)}"
     )
-    if hiding := floor_that_hides(d).get(joint):
+    hiding = floor_that_hides(d).get(joint)
+    if hiding:
         text += f", but the floor itself is {hiding:.0%} of the {effort} and may hide effects"
     text = f"{text}.{_dropped(d) or _nearest(d)}"
     if d.is_mostly_unexplained:
