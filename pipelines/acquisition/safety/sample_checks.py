@@ -77,6 +77,16 @@ class SampleChecks:
             stream.refuse_silence(now)
         self.streams[0].refuse_count((cycle + 1) * self._samples_per_cycle - 1)
 
+    def leave_out(self, trackers: Sequence[SetPointTracker], since: int, until: int) -> None:
+        """Note that the drives were sent nothing between two cycles."""
+        for stream, record, tracker in zip(self.streams, self._records, trackers, strict=True):
+            first, last = (
+                cycle * self._samples_per_cycle + int(tracker.counter_lead)
+                for cycle in (since, until)
+            )
+            stream.leave_out(first, last)
+            record.leave_out(first, last)
+
     def check_limits(self, samples: Row | Answers) -> None:
         """Refuse samples that break a limit.
 
@@ -137,7 +147,7 @@ class SampleChecks:
         # The sample was latched before the set-point that was sent with the question takes effect.
         reason = self._limits.violation(answers) or self._limits.straying(answers, base, late=1)
         if reason:
-            raise DeviceError(reason)
+            raise DeviceError(self._with_jerk(reason))
         self._note_sent(joint, reading, trackers[joint])
 
     def check(
@@ -172,7 +182,7 @@ class SampleChecks:
         ]
         reason = self._limits.cuff_violation(answers) or self._straying(answers, trackers, cycle)
         if reason:
-            raise DeviceError(reason)
+            raise DeviceError(self._with_jerk(reason))
         row = answers.row
         if row is None or not is_new[0]:  # the first drive's counter is the machine's
             return None
@@ -256,6 +266,11 @@ class SampleChecks:
             return None
         late = abs(first.sequence // self._samples_per_cycle - cycle)
         return self._limits.straying(answers, [tracker.in_force for tracker in trackers], late)
+
+    def _with_jerk(self, reason: str) -> str:
+        """Return a reason with a possible jerk of any joint: one drive moves the whole leg."""
+        extended = (stream.after_jerk(reason) for stream in self.streams)
+        return next((text for text in extended if text != reason), reason)
 
     def _sent_travel(self, row: Row) -> float:
         """Return how far all joints together were sent up to a sample, rad."""

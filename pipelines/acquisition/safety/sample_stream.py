@@ -35,6 +35,10 @@ class SampleStream:
         self._history = history
         self._clock = ClockCheck(self._label, self._cycle, self._rate)
         self._registers = StuckRegisters(self._label, self._cycle, self._rate, history)
+        self._settle_s = rig.safety.settle_s
+        self._left_out: tuple[int, int] | None = None
+        """Samples between which the drive was sent nothing last: samples were missed, or set-points
+        left out."""
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
         self._unanswered: Unanswered | None = None
@@ -147,6 +151,9 @@ class SampleStream:
             self.begin(reading, now)
         elif reading.sequence == before.sequence:
             return False
+        # One more or less than a cycle is the host's doing.
+        if reading.sequence - before.sequence >= 2 * self._cycle:
+            self.leave_out(before.sequence, reading.sequence)
         for check in (
             self._clock.check_rate,
             self._limit,
@@ -175,7 +182,7 @@ class SampleStream:
             return (
                 f"{self._label}: its angle leapt from {before.angle:.4f} to {reading.angle:.4f} rad"
                 f" within {seconds:.4f} s, faster than its limit of {limit:g} rad/s;"
-                " check the encoder, or the word order in the rig file"
+                f" {self._or_else(reading)}check the encoder, or the word order in the rig file"
             )
         measured = 0.5 * (before.velocity + reading.velocity)
         if samples == 1 and abs(speed - measured) > speed_share * limit:
@@ -183,13 +190,40 @@ class SampleStream:
             turn = "turn the sign of one of the two, or " if mirrored else ""
             return (
                 f"{self._label}: its angle went on at {speed:.3f} rad/s, but it reports a speed of"
-                f" {measured:.3f} rad/s; {turn}check the encoder, or the registers of angle and"
-                " velocity in the rig file"
+                f" {measured:.3f} rad/s; {self._or_else(reading)}{turn}check"
+                " the encoder, or the registers of angle and velocity in the rig file"
             )
         return None
 
+    def leave_out(self, since: int, until: int) -> None:
+        """Note that the drive was sent nothing between two samples."""
+        self._left_out = since, until
+
+    def after_jerk(self, why: str, reading: Reading | None = None) -> str:
+        """Return a reason to stop, with a possible jerk of the leg shortly before a sample."""
+        jerked = self._jerked(reading or self._last)
+        return f"{why}; {jerked}" if jerked else why
+
     def _limit(self, before: Reading, reading: Reading) -> str | None:
-        return sample_violation(self._drive, before, reading, self._rate)
+        why = sample_violation(self._drive, before, reading, self._rate)
+        return why and self.after_jerk(why, reading)
+
+    def _or_else(self, reading: Reading) -> str:
+        jerked = self._jerked(reading)
+        return f"{jerked}; else " if jerked else ""
+
+    def _jerked(self, reading: Reading | None) -> str:
+        """Return that the leg may have jerked, where its drive was sent nothing shortly before."""
+        if self._left_out is None or reading is None or reading.sequence < self._left_out[0]:
+            return ""
+        seconds = max(reading.sequence - self._left_out[1], 0) / self._rate
+        if seconds > self._settle_s:
+            return ""
+        when = f"{seconds:.3f} s before it" if seconds else "before it"
+        return (
+            f"samples or set-points were missed {when}, which may jerk a leg: see why answers are"
+            " lost or late, or make the motion slower"
+        )
 
     def _echo(self, before: Reading, reading: Reading) -> str | None:
         """Check the set-point that the drive reports against the one that was sent."""

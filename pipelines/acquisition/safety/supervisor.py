@@ -212,7 +212,10 @@ class Supervisor:
         self._due = self.progress.state(cycle)
         while self.state is not self._due:
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        self.left_out += max(cycle - self.progress.cycle - 1, 0)
+        left_out = max(cycle - self.progress.cycle - 1, 0)
+        if left_out:
+            self.left_out += left_out
+            self.checks.leave_out(self.trackers, self.progress.cycle, cycle)
         self.progress.advance(cycle, now)
 
     def set_point(self, joint: int, now: float) -> float:

@@ -83,6 +83,53 @@ def test_one_damaged_sample_ends_the_run_before_it_is_kept(hip, damage, words):
         take(hip, replace(moved(BEGINS + 400), **damage))
 
 
+REGISTERS = "check the encoder, or the "
+
+
+@pytest.mark.parametrize(
+    ("after", "when", "damage"),
+    [
+        (0, "before it", {"angle": 0.9}),
+        (35, "0.035 s before it", {"angle": 0.7}),
+        (35, "0.035 s before it", {"velocity": -2.0}),
+    ],
+)
+def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(
+    hip, after, when, damage
+):
+    swing(hip, BEGINS + 400)
+    again = BEGINS + 420
+    take(hip, *(moved(number) for number in range(again, again + after)))
+    with pytest.raises(DeviceError) as raised:
+        take(hip, replace(moved(again + after), **damage))
+    told = (
+        f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers"
+        " are lost or late, or "
+    )
+    assert f"{told}make the motion slower; else {REGISTERS}" in str(raised.value)
+
+
+def test_a_limit_broken_after_set_points_were_left_out_is_reported_with_them(
+    hip,
+):
+    swing(hip, BEGINS + 400)
+    hip.leave_out(BEGINS + 380, BEGINS + 400)
+    take(hip, *(moved(number) for number in range(BEGINS + 400, BEGINS + 435)))
+    with pytest.raises(
+        DeviceError,
+        match=r"torque 900.0 N·m is above .*; samples or set-points were missed 0.035 s bef",
+    ):
+        take(hip, replace(moved(BEGINS + 435), torque=900.0))
+
+
+def test_samples_that_were_missed_long_before_are_no_reason(hip):
+    swing(hip, BEGINS + 100)
+    take(hip, *(moved(number) for number in range(BEGINS + 200, BEGINS + 1300)))
+    with pytest.raises(DeviceError) as raised:
+        take(hip, replace(moved(BEGINS + 1300), angle=0.7))
+    assert f"rad/s; {REGISTERS}" in str(raised.value)
+
+
 @pytest.mark.parametrize("name", ["angle", "velocity", "current"])
 def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_move_is_frozen(
     hip, name
@@ -158,3 +205,21 @@ def test_silence_is_borne_for_the_watchdogs_time_and_its_last_reason_told(hip):
     hip.miss(Unanswered("drive hip: did not answer"))
     with pytest.raises(Unanswered, match="did not answer"):
         hip.refuse_silence(10.26)
+
+
+def test_a_cycle_that_brings_a_sample_more_than_usual_is_no_jerk(hip):
+    """Where drives record themselves, the host's cycle takes one of their samples more now and
+    then."""
+    swing(hip, BEGINS + 100)
+    take(hip, moved(BEGINS + 105))
+    assert hip.after_jerk("too much") == "too much"
+    take(hip, moved(BEGINS + 115))
+    assert "too much; samples or set-points were missed before it" in hip.after_jerk("too much")
+
+
+def test_a_record_from_before_set_points_were_left_out_is_not_blamed_on_them(hip):
+    swing(hip, BEGINS + 100)
+    hip.leave_out(BEGINS + 110, BEGINS + 120)
+    assert hip.after_jerk("too much") == "too much"
+    take(hip, moved(BEGINS + 100))
+    assert hip.after_jerk("too much", moved(BEGINS + 112)) != "too much"

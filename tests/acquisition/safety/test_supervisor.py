@@ -229,7 +229,9 @@ def test_a_drive_that_followed_the_plan_through_a_silence_is_led_on_a_sample_lat
     assert sent == pytest.approx(path[113 - 101 : 120 - 101, 0], abs=1e-9)
 
 
-def test_set_points_that_are_left_out_are_counted(supervisor):
+def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_is_broken_then(
+    supervisor,
+):
     supervisor.load_plan(
         Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
     )
@@ -239,6 +241,26 @@ def test_set_points_that_are_left_out_are_counted(supervisor):
     assert supervisor.left_out == 0
     supervisor.advance(105, 10.0 + 5 / RATE)
     assert supervisor.left_out == 3
+    assert "set-points were missed before it" in supervisor.checks.streams[0].after_jerk(
+        "too much", row(105).drives[0]
+    )
+
+
+def test_a_cuff_that_is_pressed_after_one_drive_was_told_nothing_is_told_so_whichever_drive_it_was(
+    supervisor,
+):
+    supervisor.load_plan(
+        Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2)
+    )
+    enable(supervisor)
+    supervisor.begin(row(100), 10.0)
+    follow(supervisor, 101)
+    supervisor.checks.streams[1].leave_out(98, 100)
+    pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
+    with pytest.raises(
+        DeviceError, match=r"thigh_front force x 401 N .*; samples or set-points were missed"
+    ):
+        supervisor.check_answers(Answers((LOST, LOST), pressed, None), 10.0 + 1 / RATE)
 
 
 def test_what_is_due_at_a_sample_is_due_no_more_once_the_next_one_is_there(supervisor):
