@@ -59,20 +59,7 @@ class SampleChecks:
         self._histories[joint].add(reading.sequence, tracker.sent)
 
     def refuse_silence(self, cycle: int, now: float) -> None:
-        """Refuse too long a silence, and a counter that runs backwards or leaps.
-
-        Parameters
-        ----------
-        cycle : int
-            Cycle of the machine.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            Names the device and its silence, s, or its count.
-        """
+        """Refuse too long a silence, and a counter that runs backwards or leaps."""
         for stream in self.streams:
             stream.refuse_silence(now)
         self.streams[0].refuse_count((cycle + 1) * self._samples_per_cycle - 1)
@@ -88,58 +75,19 @@ class SampleChecks:
             record.leave_out(first, last)
 
     def check_limits(self, samples: Row | Answers) -> None:
-        """Refuse samples that break a limit.
-
-        Parameters
-        ----------
-        samples : Row or Answers
-            One sample of each drive, as far as they answered.
-
-        Raises
-        ------
-        DeviceError
-            Names the joint or cuff, its value and the limit.
-        """
+        """Refuse samples that break a limit."""
         reason = self._limits.violation(samples)
         if reason:
             raise DeviceError(reason)
 
     def check_at(self, answers: Answers, set_points: Sequence[float]) -> None:
-        """Refuse answers that break a limit, or are too far from set-points.
-
-        Parameters
-        ----------
-        answers : Answers
-            One of each drive, as far as they answered.
-        set_points : (J,) sequence of float
-            rad.
-
-        Raises
-        ------
-        DeviceError
-            Names the joint or cuff, its value and the limit.
-        """
+        """Refuse answers that break a limit, or are too far from set-points, (J,) rad."""
         reason = self._limits.violation(answers) or self._limits.straying(answers, set_points)
         if reason:
             raise DeviceError(reason)
 
     def check_held(self, joint: int, reading: Reading, trackers: Sequence[SetPointTracker]) -> None:
-        """Refuse an answer of a drive that is held while others are awaited, as for any other.
-
-        Parameters
-        ----------
-        joint : int
-            Number of the joint.
-        reading : Reading
-            The drive's answer.
-        trackers : sequence of SetPointTracker
-            Set-points of all drives.
-
-        Raises
-        ------
-        DeviceError
-            Names the joint, its value and the limit.
-        """
+        """Refuse an answer of a drive that is held while others are awaited, as for any other."""
         silent = Unanswered("others are awaited")
         of_drives = tuple(reading if j == joint else silent for j in range(len(trackers)))
         answers = Answers(of_drives, np.full((len(CUFFS), 3), np.nan), None)
@@ -153,29 +101,7 @@ class SampleChecks:
     def check(
         self, answers: Answers, trackers: Sequence[SetPointTracker], cycle: int, now: float
     ) -> Row | None:
-        """Return a cycle's sample where it is whole and new.
-
-        Parameters
-        ----------
-        answers : Answers
-            One of each drive, as far as they answered.
-        trackers : sequence of SetPointTracker
-            Set-points of all drives.
-        cycle : int
-            Cycle of the machine.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        Row or None
-            None where an answer is missing, or the sample is known.
-
-        Raises
-        ------
-        DeviceError
-            An answer is a reason to stop.
-        """
+        """Return a cycle's sample where it is whole and new; refuse answers that stop a run."""
         is_new = [
             self._is_new(joint, answer, trackers[joint], cycle, now)
             for joint, answer in enumerate(answers.drives)
@@ -194,27 +120,7 @@ class SampleChecks:
     def check_records(
         self, row: Row, records: Sequence[Sequence[Reading]], now: float
     ) -> list[list[Reading]]:
-        """Check the drives' own records next to the sample of a cycle.
-
-        Parameters
-        ----------
-        row : Row
-            The cycle's sample.
-        records : sequence of sequences of Reading
-            Samples of each drive's record.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        list of lists of Reading
-            The samples that are new, of each drive.
-
-        Raises
-        ------
-        DeviceError
-            A sample is a reason to stop.
-        """
+        """Check the drives' own records next to the sample of a cycle; return their new samples."""
         new = []
         of_drives = zip(self._records, self._agreements, row.drives, records, strict=True)
         for stream, agreement, newest, samples in of_drives:
@@ -226,13 +132,7 @@ class SampleChecks:
         return new
 
     def presses(self, forces: NDArray) -> bool:
-        """Return whether a cuff force is above its limit.
-
-        Parameters
-        ----------
-        forces : (4, 3) array
-            N.
-        """
+        """Return whether a cuff force of (4, 3) N is above its limit."""
         return self._limits.force_violation(forces) is not None
 
     def _is_new(

@@ -54,18 +54,7 @@ class SampleStream:
         self._unanswered = error
 
     def refuse_silence(self, now: float) -> None:
-        """Refuse to go on where no new sample has come for too long.
-
-        Parameters
-        ----------
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            Names the device and its silence, s.
-        """
+        """Refuse to go on where no new sample has come for too long."""
         if not self._watchdog.has_expired(now):
             return
         if self._unanswered:
@@ -77,18 +66,8 @@ class SampleStream:
         )
 
     def refuse_to_fall_behind(self, newest: int) -> None:
-        """Refuse to go on where the drive's own record does not keep up with its counter.
-
-        Parameters
-        ----------
-        newest : int
-            The counter.
-
-        Raises
-        ------
-        DeviceError
-            Names the device and both counts.
-        """
+        """Refuse to go on where the drive's own record does not keep up with its counter, which is
+        at ``newest``."""
         if self._newest_at_first is None:
             self._newest_at_first = newest
         last = self._newest_at_first if self._last is None else self._last.sequence
@@ -102,18 +81,7 @@ class SampleStream:
             )
 
     def refuse_count(self, count: int) -> None:
-        """Refuse a counter that runs backwards or leaps.
-
-        Parameters
-        ----------
-        count : int
-            The counter.
-
-        Raises
-        ------
-        DeviceError
-            Names the device and both counts.
-        """
+        """Refuse a counter that runs backwards or leaps."""
         if self._last is None:
             return
         last = self._last.sequence
@@ -130,20 +98,7 @@ class SampleStream:
             )
 
     def check(self, reading: Reading, now: float) -> bool:
-        """Return whether a sample is new.
-
-        Parameters
-        ----------
-        reading : Reading
-            The sample.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            The sample is a reason to stop.
-        """
+        """Return whether a sample is new; raise DeviceError where it is reason to stop."""
         self._unanswered = None
         self.refuse_count(reading.sequence)
         before = self._last or reading

@@ -84,15 +84,7 @@ class SetPointTracker:
         return now - self._answered_at > SLACK_SAMPLES / self._rate
 
     def resume(self, reading: Reading, now: float) -> None:
-        """Go on from where the drive is after a silence, in which some hold and others move on.
-
-        Parameters
-        ----------
-        reading : Reading
-            The drive's answer.
-        now : float
-            Host's clock, s.
-        """
+        """Go on from where the drive is after a silence, in which some hold and others move on."""
         self.mark_answered(now)
         silent_s, drift = now - self.sent_at, self._drift_speed
         if self._reports_reference:
@@ -123,25 +115,7 @@ class SetPointTracker:
         return self.follow(self.base, self._speed, now)
 
     def follow(self, reference: float, speed: float, now: float) -> float:
-        """Return a set-point of the plan or of the way back.
-
-        Parameters
-        ----------
-        reference, speed : float
-            rad and rad/s.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        float
-            The set-point, rad.
-
-        Raises
-        ------
-        DeviceError
-            It is beyond the limits.
-        """
+        """Return a set-point of the plan or of the way back; refuse one beyond the limits."""
         refuse_leap(self.drive, self.base, reference, 1.0 / self._rate)
         refuse_leap(self.drive, self.sent, reference, self._allowed_s(now))
         self.in_force = self.base
@@ -158,42 +132,11 @@ class SetPointTracker:
         return self.follow(*self._towards(path, cycle, now), now)
 
     def hold_to_plan(self, path: Path, cycle: int, now: float) -> float:
-        """Return the set-point towards the plan, within the limits, while others are awaited.
-
-        Parameters
-        ----------
-        path : Path
-            Set-points of the plan, rad.
-        cycle : int
-            Cycle of the machine.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        float
-            rad.
-
-        Raises
-        ------
-        DeviceError
-            The plan leaps there, or leaves its limits.
-        """
+        """Return the set-point towards the plan, within the limits, while others are awaited."""
         return self._send_limited(*self._towards(path, cycle, now), now)
 
     def slow_down(self, now: float) -> float:
-        """Return the set-point that slows the drive down, a sample after its last one.
-
-        Parameters
-        ----------
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        float
-            rad.
-        """
+        """Return the set-point that slows the drive down, a sample after its last one."""
         deceleration = self._safety.deceleration_rad_s2
         path, speed = slowed(self.base, self._speed, deceleration, 1.0 / self._rate)
         return self._send_limited(path, speed, now)

@@ -24,7 +24,10 @@ from pipelines.settings.rig.devices import SensorSettings
 
 
 class Supervisor:
-    """The state of one run: each drive's set-points, and why the run was stopped."""
+    """The state of one run: each drive's set-points, and why the run was stopped.
+
+    ``now`` is the host's clock, s. Methods raise DeviceError where there is a reason to stop.
+    """
 
     def __init__(
         self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()
@@ -73,33 +76,12 @@ class Supervisor:
         self._go(State.CHECK)
 
     def load_plan(self, plan: Plan, start: NDArray) -> None:
-        """Take the plan.
-
-        Parameters
-        ----------
-        plan : Plan
-            All set-points of the run.
-        start : (J,) array
-            Where the leg stood when it was made, rad.
-        """
+        """Take the plan, and where the leg stood when it was made, (J,) rad."""
         self.progress = PlanProgress(plan, start, self.rate)
         self.enabling.start_at(start.tolist())
 
     def begin(self, row: Row, now: float) -> None:
-        """Follow the plan from the first sample on at which the drives are enabled.
-
-        Parameters
-        ----------
-        row : Row
-            That sample.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            There is a reason to stop.
-        """
+        """Follow the plan from the first sample on at which the drives are enabled."""
         self.reason.refuse()
         self.progress.begin(row.sequence, now)
         for tracker, reading in zip(self.trackers, row.drives, strict=True):
@@ -110,19 +92,7 @@ class Supervisor:
     def has_missed(self, cycle: int, now: float) -> bool:
         """Return whether a drive may have been sent nothing for longer than a sample by a cycle.
 
-        A set-point without an answer may never have arrived, and a counter may have been set back.
-
-        Parameters
-        ----------
-        cycle : int
-            Cycle of the machine.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            There is a reason to stop, or the silence is too long.
+        What was sent and not answered may never have arrived, and a counter may have been set back.
         """
         self.reason.refuse()
         self.checks.refuse_silence(cycle, now)
@@ -135,47 +105,15 @@ class Supervisor:
         return follows and now - self.progress.followed_at > 1.0 / self.rate
 
     def resume(self, joint: int, reading: Reading, now: float) -> None:
-        """Go on from where a drive is after a silence.
-
-        Parameters
-        ----------
-        joint : int
-            Number of the joint.
-        reading : Reading
-            The drive's answer.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            The drive dropped out.
-        """
+        """Go on from where a drive is after a silence; raise DeviceError where it dropped out."""
         self.enable_states.update(joint, reading)
         self.trackers[joint].resume(reading, now)
 
     def hold(self, joint: int, now: float) -> float:
-        """Return the set-point of a drive that is sent nothing else while another is awaited.
+        """Return the set-point (rad) of a drive that is sent nothing else while another is awaited.
 
         It is the plan's, by the host's clock, for as long as one answer may take; then the drive
         slows down.
-
-        Parameters
-        ----------
-        joint : int
-            Number of the joint.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        float
-            rad.
-
-        Raises
-        ------
-        DeviceError
-            There is a reason to stop.
         """
         self.reason.refuse()
         awaited_s = now - self.progress.followed_at
@@ -193,20 +131,7 @@ class Supervisor:
         self.checks.check_held(joint, reading, self.trackers)
 
     def advance(self, cycle: int, now: float) -> None:
-        """Go on to the set-points that are due now that the sample of a cycle is latched.
-
-        Parameters
-        ----------
-        cycle : int
-            Cycle of the machine.
-        now : float
-            Host's clock, s.
-
-        Raises
-        ------
-        DeviceError
-            There is a reason to stop, or the silence is too long.
-        """
+        """Go on to the set-points that are due now that the sample of a cycle is latched."""
         self.reason.refuse()
         self.checks.refuse_silence(cycle, now)
         self._due = self.progress.state(cycle)
@@ -219,27 +144,10 @@ class Supervisor:
         self.progress.advance(cycle, now)
 
     def set_point(self, joint: int, now: float) -> float:
-        """Return the set-point that a drive is sent now that its turn has come.
+        """Return the set-point (rad) that a drive is sent now that its turn has come.
 
         It is the plan's. Where samples were missed it walks back there, no step larger than the
         speed limit.
-
-        Parameters
-        ----------
-        joint : int
-            Number of the joint.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        float
-            rad.
-
-        Raises
-        ------
-        DeviceError
-            There is a reason to stop, or the set-point is beyond the limits.
         """
         self.reason.refuse()
         tracker, progress = self.trackers[joint], self.progress
@@ -248,25 +156,7 @@ class Supervisor:
         return tracker.follow_plan(progress.due(joint, progress.cycle), progress.cycle, now)
 
     def check_answers(self, answers: Answers, now: float) -> Row | None:
-        """Return the sample that a cycle brought, where it is whole and new.
-
-        Parameters
-        ----------
-        answers : Answers
-            One of each drive, as far as they answered.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        Row or None
-            None where an answer is missing, or the sample is known.
-
-        Raises
-        ------
-        DeviceError
-            An answer is a reason to stop.
-        """
+        """Return the sample that a cycle brought, where it is whole and new."""
         self.reason.refuse()
         self.enable_states.update_all(answers)
         return self.checks.check(answers, self.trackers, self.progress.cycle, now)
@@ -274,27 +164,7 @@ class Supervisor:
     def check_records(
         self, row: Row, records: Sequence[Sequence[Reading]], now: float
     ) -> list[list[Reading]]:
-        """Return those samples of the drives' own records that are new.
-
-        Parameters
-        ----------
-        row : Row
-            The cycle's sample.
-        records : sequence of sequences of Reading
-            Samples of each drive's record.
-        now : float
-            Host's clock, s.
-
-        Returns
-        -------
-        list of lists of Reading
-            New samples of each drive.
-
-        Raises
-        ------
-        DeviceError
-            A sample is a reason to stop.
-        """
+        """Return those samples of the drives' own records that are new."""
         self.reason.refuse()
         self.enable_states.update_records(records)
         return self.checks.check_records(row, records, now)
