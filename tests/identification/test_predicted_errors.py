@@ -1,4 +1,4 @@
-"""The standard errors that a design foretells are those that an identification has."""
+"""The standard errors that a design predicts are those of an identification."""
 
 from dataclasses import replace
 
