@@ -10,10 +10,11 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.background_printer import BackgroundPrinter
-from exoid_cli.confirm import YesOption, ask_before, confirm
+from exoid_cli.confirm import ask_before, confirm
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.experiment_folder import open_experiment
+from exoid_cli.options import AgainOption, ConfigOption, YesOption, output_option
+from exoid_cli.stage_runner import run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from pipelines.mechanics.trajectory import Trajectory
     from pipelines.settings import Experiment
     from pipelines.settings.rig import RigSettings
+    from pipelines.workflow.graph import Step
 
 
 def acquire(
@@ -42,10 +44,7 @@ def acquire(
         ),
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="The recording to write.", show_default="recordings/RUN.parquet"
-        ),
+        Path | None, output_option("The recording to write.", "recordings/RUN.parquet")
     ] = None,
     again: AgainOption = False,
     yes: YesOption = False,
@@ -71,17 +70,13 @@ def acquire(
     if run is None:
         if trajectory or output:
             raise InputError("--run: missing; --trajectory and -o are of one run, name it")
-        options = (
-            *(("--overwrite",) if overwrite else ()),
-            *(("--reset-faults",) if reset_faults else ()),
-        )
-        run_stages(
-            context,
-            folder,
-            "acquire",
-            again=again,
-            before=lambda step: (*ask_before(folder.experiment, step, yes=yes), *options),
-        )
+        given = {"--overwrite": overwrite, "--reset-faults": reset_faults}
+        options = [name for name, is_given in given.items() if is_given]
+
+        def ask(step: "Step") -> list[str]:
+            return [*ask_before(folder.experiment, step, yes=yes), *options]
+
+        run_stages(context, folder, "acquire", again=again, before=ask)
         return
     folder.experiment.run_named(run)
     if trajectory is None or output is None:

@@ -2,9 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from exoid_cli.console import console
 from pipelines.errors import InputError
@@ -15,8 +13,6 @@ if TYPE_CHECKING:
     from pipelines.settings.acquire import RunSettings
     from pipelines.settings.rig import RigSettings
     from pipelines.workflow.graph import Step
-
-YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real rig is moved.")]
 
 
 def confirm(

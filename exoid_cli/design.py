@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.options import AgainOption, ConfigOption, output_option
+from exoid_cli.stage_runner import run_stages
 
 if TYPE_CHECKING:
     from pipelines.design.quality import Quality
@@ -16,13 +17,7 @@ if TYPE_CHECKING:
 def design(
     context: typer.Context,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="The trajectory/1 file to write.",
-            show_default="trajectory.parquet",
-        ),
+        Path | None, output_option("The trajectory/1 file to write.", "trajectory.parquet")
     ] = None,
     config: ConfigOption = None,
     evaluate: Annotated[

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.options import ConfigOption, files_argument
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.detectability.detectability import Detectable
@@ -17,10 +18,9 @@ if TYPE_CHECKING:
 def detect(
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="One excitation (TOML or trajectory/1), or recordings or motions of one rig.",
-            show_default="trajectory.parquet",
+        files_argument(
+            "One excitation (TOML or trajectory/1), or recordings or motions of one rig.",
+            "trajectory.parquet",
         ),
     ] = None,
     output: Annotated[
@@ -52,9 +52,8 @@ def detect(
     from pipelines.contracts.atomic import open_folder, write_text
     from pipelines.diagnosis.detectability.detectability import as_json
 
-    files = files or [
-        open_experiment(config, problem="no excitation is given").step("design").target
-    ]
+    if not files:
+        files = [open_experiment(config, problem="no excitation is given").step("design").target]
     experiment = settings_in_force(config)
     if output:
         open_folder(output)

@@ -7,13 +7,9 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    ConfigOption,
-    inputs_and_folder,
-    open_experiment,
-    settings_in_force,
-)
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.experiment_folder import inputs_and_folder, open_experiment, settings_in_force
+from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_option
+from exoid_cli.stage_runner import run_stages
 from exoid_cli.verdict_view import show_verdict
 
 
@@ -21,21 +17,14 @@ def diagnose(
     context: typer.Context,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="recording/1 or motion/1 files, some to train, some to validate.",
-            show_default="recordings/RUN.parquet of every run",
+        files_argument(
+            "recording/1 or motion/1 files, some to train, some to validate.",
+            "recordings/RUN.parquet of every run",
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            "--out",
-            help="Folder for verdict, tables and figures.",
-            show_default="diagnosed/",
-        ),
+        output_option("Folder for verdict, tables and figures.", "diagnosed/", "--out"),
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
@@ -71,12 +60,8 @@ def diagnose(
     from pipelines.settings.diagnose import DiagnoseSettings
 
     if not files and output is None and figures and not known:
-        run_stages(
-            context,
-            open_experiment(config, problem="no recording is given"),
-            "diagnose",
-            again=again,
-        )
+        folder = open_experiment(config, problem="no recording is given")
+        run_stages(context, folder, "diagnose", again=again)
         return
     files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from pipelines.errors import InputError
 
@@ -13,15 +11,6 @@ if TYPE_CHECKING:
     from pipelines.workflow.graph import Step
 
 NAME = "exoid.toml"
-
-ConfigOption = Annotated[
-    Path | None,
-    typer.Option("--config", help="The experiment's settings.", show_default="exoid.toml"),
-]
-OutOption = Annotated[
-    Path | None,
-    typer.Option("--out", help="Folder of the results.", show_default="that of exoid.toml"),
-]
 
 
 @dataclass(frozen=True)

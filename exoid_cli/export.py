@@ -7,7 +7,8 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.options import ConfigOption, files_argument
 
 if TYPE_CHECKING:
     from pipelines.export import Exported, Format
@@ -16,11 +17,7 @@ if TYPE_CHECKING:
 def export(
     model: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="FILE",
-            help="A parameters/1 file.",
-            show_default="identified/parameters.parquet",
-        ),
+        files_argument("A parameters/1 file.", "identified/parameters.parquet"),
     ] = None,
     *,
     to: Annotated[

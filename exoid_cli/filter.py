@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_option
+from exoid_cli.stage_runner import run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,20 +19,11 @@ def filter_(
     context: typer.Context,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="recording/1 files.",
-            show_default="recordings/RUN.parquet of every run",
-        ),
+        files_argument("recording/1 files.", "recordings/RUN.parquet of every run"),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="The motion/1 file to write, or a folder for several.",
-            show_default="motions/",
-        ),
+        output_option("The motion/1 file to write, or a folder for several.", "motions/"),
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
@@ -47,9 +39,8 @@ def filter_(
       exoid filter run.parquet -o motion.parquet --cutoff-hz 9
     """
     if not files and output is None and cutoff_hz is None:
-        run_stages(
-            context, open_experiment(config, problem="no recording is given"), "filter", again=again
-        )
+        folder = open_experiment(config, problem="no recording is given")
+        run_stages(context, folder, "filter", again=again)
         return
     settings = settings_in_force(config).filter.changed(cutoff_hz=cutoff_hz)
     results = [
@@ -63,10 +54,8 @@ def _targets(
 ) -> list[tuple[Path, Path]]:
     """Return inputs and outputs, from the experiment unless they are given."""
     if not files:
-        files = [
-            step.inputs[0]
-            for step in open_experiment(config, problem="no recording is given").of_stage("filter")
-        ]
+        folder = open_experiment(config, problem="no recording is given")
+        files = [step.inputs[0] for step in folder.of_stage("filter")]
     if output is None:
         output = open_experiment(config, problem="-o: missing").out / "motions"
     elif len(files) == 1 and not output.is_dir():

@@ -7,14 +7,10 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    ConfigOption,
-    inputs_and_folder,
-    open_experiment,
-    settings_in_force,
-)
+from exoid_cli.experiment_folder import inputs_and_folder, open_experiment, settings_in_force
+from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_option
 from exoid_cli.parameters_view import format_value, show_parameters
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.stage_runner import run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,20 +25,11 @@ def identify(
     context: typer.Context,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="motion/1 or recording/1 files.",
-            show_default="motions/RUN.parquet of every run",
-        ),
+        files_argument("motion/1 or recording/1 files.", "motions/RUN.parquet of every run"),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder for parameters, residuals and figures.",
-            show_default="identified/",
-        ),
+        output_option("Folder for parameters, residuals and figures.", "identified/"),
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
@@ -95,9 +82,8 @@ def identify(
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
 
     if not files and output is None and (method, causes, effect, reversals) == (None,) * 4:
-        run_stages(
-            context, open_experiment(config, problem="no motion is given"), "identify", again=again
-        )
+        folder = open_experiment(config, problem="no motion is given")
+        run_stages(context, folder, "identify", again=again)
         return
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"

@@ -7,12 +7,8 @@ import typer
 
 from exoid_cli.confirm import OperatorPrompt, confirm_move
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    ConfigOption,
-    in_experiment_folder,
-    open_experiment,
-    settings_in_force,
-)
+from exoid_cli.experiment_folder import in_experiment_folder, open_experiment, settings_in_force
+from exoid_cli.options import ConfigOption
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency

@@ -7,15 +7,10 @@ from typing import Annotated
 import typer
 
 from exoid_cli import completion
-from exoid_cli.confirm import YesOption, ask_before
+from exoid_cli.confirm import ask_before
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    ConfigOption,
-    ExperimentFolder,
-    OutOption,
-    open_experiment,
-    why_no_step,
-)
+from exoid_cli.experiment_folder import ExperimentFolder, open_experiment, why_no_step
+from exoid_cli.options import ConfigOption, OutOption, YesOption
 from exoid_cli.stage_runner import SkippedStep, bring_up_to_date
 
 

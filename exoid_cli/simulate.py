@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, open_experiment, settings_in_force
-from exoid_cli.stage_runner import AgainOption, run_stages
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_option
+from exoid_cli.stage_runner import run_stages
 
 if TYPE_CHECKING:
     from pipelines.contracts import Joint, Table
@@ -18,19 +19,12 @@ def simulate(
     context: typer.Context,
     parameters: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="FILE",
-            help="A parameters/1 file.",
-            show_default="identified/parameters.parquet",
-        ),
+        files_argument("A parameters/1 file.", "identified/parameters.parquet"),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder for the loop's table and figures; with --replay, a file.",
-            show_default="simulated/",
+        output_option(
+            "Folder for the loop's table and figures; with --replay, a file.", "simulated/"
         ),
     ] = None,
     config: ConfigOption = None,
@@ -77,21 +71,16 @@ def simulate(
             "--reference and --replay exclude each other: a replay follows its recording; drop one"
         )
     if parameters is output is run is reference is replay is None:
-        run_stages(
-            context,
-            open_experiment(config, problem="no parameters are given"),
-            "simulate",
-            "replay",
-            again=again,
-        )
+        folder = open_experiment(config, problem="no parameters are given")
+        run_stages(context, folder, "simulate", "replay", again=again)
         return
     if parameters is None:
-        parameters = (
-            open_experiment(config, problem="no parameters are given").step("identify").target
-        )
+        folder = open_experiment(config, problem="no parameters are given")
+        parameters = folder.step("identify").target
     if output is None:
-        folder = open_experiment(config, problem="-o: missing").out / "simulated"
-        output = folder / f"replay-{replay.stem}.parquet" if replay else folder
+        output = open_experiment(config, problem="-o: missing").out / "simulated"
+        if replay:
+            output /= f"replay-{replay.stem}.parquet"
     settings = settings_in_force(config)
     table = PARAMETERS.read(parameters)
     if replay:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,8 +14,6 @@ from pipelines.errors import InputError
 if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
     from pipelines.workflow.graph import Step
-
-AgainOption = Annotated[bool, typer.Option("--again", help="Redo even if up to date.")]
 
 Before = Callable[["Step"], Sequence[str]]
 """Called before a step; returns further arguments for its command."""

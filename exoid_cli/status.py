@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ConfigOption, OutOption, open_experiment
+from exoid_cli.experiment_folder import open_experiment
+from exoid_cli.options import ConfigOption, OutOption
 
 if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
