@@ -2,7 +2,10 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Kind = Literal["revolute", "prismatic"]
 
@@ -80,6 +83,15 @@ class Joint:
 
 
 HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
+
+
+def columns_of(joints: Iterable[Joint], quantities: "Mapping[str, NDArray]") -> dict[str, Any]:
+    """Return columns by name, joint by joint, from quantities of all joints, (n, J) each."""
+    return {
+        joint.column(quantity): values[:, j]
+        for j, joint in enumerate(joints)
+        for quantity, values in quantities.items()
+    }
 
 
 def in_words(joints: Iterable[Joint]) -> str:

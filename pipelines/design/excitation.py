@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipelines.contracts.joints import columns_of
 from pipelines.design.quality import Quality, quality
 from pipelines.design.search import Report, search
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.limits import QUANTITIES
 from pipelines.settings.design import DesignSettings
 
 
@@ -32,15 +34,8 @@ class Design:
         """
         rows = round(self.trajectory.period_s * self.settings.sample_rate_hz)
         time = np.arange(rows) / self.settings.sample_rate_hz
-        states = dict(
-            zip(("angle", "velocity", "acceleration"), self.trajectory.at(time), strict=True)
-        )
-        columns = {
-            joint.column(quantity): values[:, j]
-            for j, joint in enumerate(self.trajectory.joints)
-            for quantity, values in states.items()
-        }
-        return pd.DataFrame({"time_s": time, **columns})
+        states = dict(zip(QUANTITIES, self.trajectory.at(time), strict=True))
+        return pd.DataFrame({"time_s": time} | columns_of(self.trajectory.joints, states))
 
     def metadata(self) -> dict[str, Any]:
         """Return the coefficients and their quality for a file's metadata."""

@@ -60,18 +60,16 @@ def closed_loop(model: Model, motion: Motion) -> Motion:
 def _set_points(motion: Motion) -> NDArray:
     """Return the commanded angles, (n, J) rad, linear between recorded ones."""
     reference = np.full_like(motion.q, np.nan) if motion.reference is None else motion.reference
+    lines = []
     for joint, column in zip(motion.joints, reference.T, strict=True):
-        if not np.isfinite(column).any():
+        known = np.isfinite(column)
+        if not known.any():
             raise InputError(
                 f"{motion.file or 'the motion'}: has no set-points of {the(joint)}, which a"
                 " simulation of its closed loop follows; record them with the run, or choose a"
                 " --method that needs none"
             )
-    known = (np.isfinite(column) for column in reference.T)
-    lines = [
-        np.interp(motion.time, motion.time[k], c[k])
-        for k, c in zip(known, reference.T, strict=True)
-    ]
+        lines.append(np.interp(motion.time, motion.time[known], column[known]))
     return np.ascontiguousarray(np.column_stack(lines))
 
 
@@ -84,18 +82,12 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
         kp, kd, limit, rate = (
             np.array([_gain(c, key) for c in each]) for key in ("kp", "kd", "limit", "rate_hz")
         )
-        limit, rate = (
-            np.where(known > 0.0, known, other)
-            for known, other in ((limit, np.inf), (rate, RATE_HZ))
-        )
+        limit = np.where(limit > 0.0, limit, np.inf)
+        rate = np.where(rate > 0.0, rate, RATE_HZ)
     else:
         mass = masses(a)[0].mean(axis=0).diagonal()
-        kp, kd, limit, rate = (
-            bandwidth_rad_s**2 * mass,
-            2.0 * bandwidth_rad_s * mass,
-            np.inf * mass,
-            RATE_HZ + 0 * mass,
-        )
+        kp, kd = bandwidth_rad_s**2 * mass, 2.0 * bandwidth_rad_s * mass
+        limit, rate = np.full(len(mass), np.inf), np.full(len(mass), RATE_HZ)
     rate_hz = max(min(RATE_HZ, *rate), motion.sample_rate_hz)
     return make_drives(kp, kd, limit, np.zeros(len(each)), rate_hz, motion.sample_rate_hz)
 

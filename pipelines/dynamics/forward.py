@@ -90,22 +90,7 @@ def workspace(joints: int) -> Workspace:
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
-    return Workspace(
-        v[0],
-        v[1],
-        m[0],
-        m[1],
-        v[2],
-        v[3],
-        v[4],
-        v[5],
-        v[6],
-        v[7],
-        v[8],
-        v[9],
-        both,
-        np.zeros(2 * joints),
-    )
+    return Workspace(*v[:2], *m, *v[2:], both, np.zeros(2 * joints))
 
 
 states = float64[:, ::1]
@@ -131,9 +116,8 @@ def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, 
     """
     w.ddq[:] = 0.0
     at = Instant(t, angle, speed, w.ddq, direction, load, a.temperature)
-    for k in range(
-        -1, a.joints
-    ):  # first without acceleration: one copy of the call compiles faster
+    # First without acceleration: one copy of the call compiles faster.
+    for k in range(-1, a.joints):
         if k >= 0:
             w.ddq[k] = 1.0
         w.column[:] = 0.0
@@ -167,40 +151,17 @@ def _solve(M, b, scratch, x):
 @njit(cache=True, inline="always")
 def _prepare(a, w, t, state, memory, load):
     """Compute everything independent of friction's direction: masses, link and spring torque."""
-    link, after_inertial, drive = a.bounds[0], a.bounds[1], a.bounds[2]
+    links, others, drives, last = a.bounds[0], a.bounds[1], a.bounds[2], a.bounds[3]
+    q, dq, theta, dtheta = state[Q], state[DQ], state[THETA], state[DTHETA]
     for j in range(a.joints):
-        w.link_direction[j] = np.sign(state[DQ, j])
-    _mass_and_rest(
-        a,
-        w,
-        link,
-        after_inertial,
-        t,
-        state[Q],
-        state[DQ],
-        w.link_direction,
-        load,
-        memory,
-        w.mass,
-        w.rest,
-    )
-    if drive > after_inertial:
-        at = Instant(t, state[Q], state[DQ], w.zero, w.link_direction, load, a.temperature)
-        _react(a, after_inertial, drive, at, memory, w.rest)
-    if a.bounds[3] > drive:
+        w.link_direction[j] = np.sign(dq[j])
+    _mass_and_rest(a, w, links, others, t, q, dq, w.link_direction, load, memory, w.mass, w.rest)
+    if drives > others:
+        at = Instant(t, q, dq, w.zero, w.link_direction, load, a.temperature)
+        _react(a, others, drives, at, memory, w.rest)
+    if last > drives:
         _mass_and_rest(
-            a,
-            w,
-            drive,
-            a.bounds[3],
-            t,
-            state[THETA],
-            state[DTHETA],
-            w.zero,
-            load,
-            memory,
-            w.motor_mass,
-            w.push,
+            a, w, drives, last, t, theta, dtheta, w.zero, load, memory, w.motor_mass, w.push
         )
     for j in range(a.joints):
         term = a.sprung[j]
@@ -209,9 +170,7 @@ def _prepare(a, w, t, state, memory, load):
                 w.mass[j, j] += w.motor_mass[j, j]
         else:
             values = a.values[a.value_at[term] : a.value_at[term + 1]]
-            w.passed[j] = spring_at(a.springs[term])(
-                state[THETA, j] - state[Q, j], state[DTHETA, j] - state[DQ, j], values
-            )
+            w.passed[j] = spring_at(a.springs[term])(theta[j] - q[j], dtheta[j] - dq[j], values)
 
 
 @njit(**INNER)

@@ -74,18 +74,8 @@ def masses(a: Assembly) -> tuple[NDArray, NDArray]:
     poses, joints = _poses(a.joints), a.joints
     mass, mobility = np.empty((2, len(poses), joints, joints))
     state, still = resting_state(np.zeros(joints)), np.zeros(joints)
-    _masses(
-        a,
-        workspace(joints),
-        poses,
-        np.zeros(memory_size(a)),
-        state,
-        still,
-        still.copy(),
-        np.zeros((4, joints)),
-        mass,
-        mobility,
-    )
+    scratch = np.zeros(memory_size(a)), state, still, still.copy(), np.zeros((4, joints))
+    _masses(a, workspace(joints), poses, *scratch, mass, mobility)
     return mass, mobility
 
 

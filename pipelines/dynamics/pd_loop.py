@@ -125,16 +125,15 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     q = np.asarray(q, float)
     angle = q.copy()
     read_encoders(a, angle)
-    zeros = [np.zeros(a.joints) for _ in range(3)]
     return LoopState(
-        resting_state(q),
-        np.zeros(memory_size(a)),
-        zeros[0],
-        angle,
-        zeros[1],
-        zeros[2],
-        angle.copy(),
-        np.zeros(int(a.sensed_at[-1])),
+        state=resting_state(q),
+        memory=np.zeros(memory_size(a)),
+        load=np.zeros(a.joints),
+        angle=angle,
+        speed=np.zeros(a.joints),
+        torque=np.zeros(a.joints),
+        reference=angle.copy(),
+        sensed=np.zeros(int(a.sensed_at[-1])),
     )
 
 
@@ -151,6 +150,12 @@ def read_encoders(a, angle):
     """
     for i in range(a.bounds[4]):
         reading_at(a.readings[i])(angle, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
+
+
+@njit(cache=True, inline="always")
+def whole_counts(angle, rad_per_count):
+    """Return an angle rounded to counts of an encoder; unchanged for an ideal encoder."""
+    return np.floor(angle / rad_per_count + 0.5) * rad_per_count if rad_per_count > 0.0 else angle
 
 
 @njit(cache=True)
@@ -199,8 +204,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
         _copy(loop.state[THETA], counted)
         read_encoders(a, counted)
         for j in range(j_count):
-            if d.rad_per_count[j] > 0.0:
-                counted[j] = np.floor(counted[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
+            counted[j] = whole_counts(counted[j], d.rad_per_count[j])
             loop.speed[j] += d.speed_share * ((counted[j] - loop.angle[j]) / period - loop.speed[j])
             loop.angle[j] = counted[j]
             wanted = begin[j] + (reference[j] - begin[j]) * c / d.periods
@@ -212,25 +216,13 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
                 _copy(loop.state[THETA], angle)
                 read_encoders(a, angle)
                 for j in range(j_count):
-                    if d.rad_per_count[j] > 0.0:
-                        angle[j] = (
-                            np.floor(angle[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
-                        )
+                    angle[j] = whole_counts(angle[j], d.rad_per_count[j])
                 _copy(loop.speed, speed)
                 _copy(loop.state[Q], truth[0])
                 _copy(loop.state[DQ], truth[1])
                 _copy(loop.state[THETA], truth[3])
-            step(
-                a,
-                w,
-                s,
-                t + done * d.step_s,
-                d.step_s,
-                loop.state,
-                loop.memory,
-                loop.load,
-                loop.torque,
-            )
+            now = t + done * d.step_s
+            step(a, w, s, now, d.step_s, loop.state, loop.memory, loop.load, loop.torque)
             if done == middle:
                 _copy(s.rates[0, DQ], truth[2])
             done += 1

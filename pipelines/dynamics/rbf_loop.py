@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, typeof
+from numba.core import types
 from numba.core.types import boolean, float64
 from numpy.typing import NDArray
 
@@ -29,6 +30,8 @@ from pipelines.dynamics.forward import (
     STAGES,
     THETA,
     WORKSPACE,
+    Stages,
+    Workspace,
     accelerations,
     begin_stages,
     end_stages,
@@ -42,7 +45,7 @@ from pipelines.dynamics.forward import (
     weighted,
     workspace,
 )
-from pipelines.dynamics.pd_loop import read_encoders
+from pipelines.dynamics.pd_loop import read_encoders, whole_counts
 from pipelines.mechanics.instant import vector
 
 PARTS = 256
@@ -87,12 +90,21 @@ class Encoder(NamedTuple):
 
 
 class _Network(NamedTuple):
-    """Weights, their rates at four stages, a stage's weights, and the neurons' activation."""
+    """Rates of the weights at four stages, a stage's weights, and the neurons' activation."""
 
-    weights: np.ndarray
     rates: np.ndarray
     stage: np.ndarray
     activation: np.ndarray
+
+
+class _Seen(NamedTuple):
+    """Last reading, low-passed speed, and the errors of angle and speed; (J,) each."""
+
+    angle: np.ndarray
+    speed: np.ndarray
+    angle_error: np.ndarray
+    speed_error: np.ndarray
+    reading: np.ndarray
 
 
 class _Kept(NamedTuple):
@@ -106,23 +118,48 @@ class _Kept(NamedTuple):
     disturbance: np.ndarray
 
 
-class _Seen(NamedTuple):
-    """Last reading, low-passed speed, and the errors of angle and speed; (J,) each."""
+class _Loop(NamedTuple):
+    """A loop during a simulation: model, controller, scratch and state.
 
-    angle: np.ndarray
-    speed: np.ndarray
-    angle_error: np.ndarray
-    speed_error: np.ndarray
-    reading: np.ndarray
+    ``drive`` (4, J) is scratch for torques.
+    """
+
+    a: Assembly
+    c: RbfController
+    w: Workspace
+    s: Stages
+    net: _Network
+    seen: _Seen
+    state: np.ndarray
+    memory: np.ndarray
+    load: np.ndarray
+    weights: np.ndarray
+    drive: np.ndarray
 
 
 CONTROLLER = typeof(RbfController(1.0, 1.0, 1.0, 1.0, 1.0, np.zeros(1), 1.0))
-NETWORK = typeof(_Network(np.zeros((1, 1)), np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1)))
+NETWORK = typeof(_Network(np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1)))
 SEEN = typeof(_Seen(*np.zeros((5, 1))))
+LOOP = types.NamedTuple(
+    [
+        ASSEMBLY,
+        CONTROLLER,
+        WORKSPACE,
+        STAGES,
+        NETWORK,
+        SEEN,
+        states,
+        vector,
+        vector,
+        states,
+        states,
+    ],
+    _Loop,
+)
 
 
 @njit(**INNER)
-def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
+def _control(c, seen, net, state, wanted, weights, torque, network, weight_rates):
     """Write torque and network output (J,) and the weights' rates (J, m) for ``wanted`` (3, J)."""
     sharpness = 1.0 / (c.width * c.width)
     for j in range(torque.shape[0]):
@@ -132,19 +169,17 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
         r = de + c.error_gain * e
         network[j] = 0.0
         # |x - c|² expanded, because a centre has equal coordinates in all five directions.
-        sum_of_inputs, sum_of_squares = (
-            e + de + q + dq + ddq,
-            e * e + de * de + q * q + dq * dq + ddq * ddq,
-        )
+        sum_of_inputs = e + de + q + dq + ddq
+        sum_of_squares = e * e + de * de + q * q + dq * dq + ddq * ddq
         for i in range(c.nodes.shape[0]):
             distance = sum_of_squares + c.nodes[i] * (5.0 * c.nodes[i] - 2.0 * sum_of_inputs)
-            activation[i] = np.exp(-distance * sharpness)
-            network[j] += weights[j, i] * activation[i]
+            net.activation[i] = np.exp(-distance * sharpness)
+            network[j] += weights[j, i] * net.activation[i]
         demand = network[j] + c.feedback_gain * r + c.robust_gain * np.sign(r)
         torque[j] = min(c.limit, max(-c.limit, demand))
         rate = c.adaptation_gain * r if torque[j] == demand else 0.0
         for i in range(c.nodes.shape[0]):
-            weight_rates[j, i] = rate * activation[i]
+            weight_rates[j, i] = rate * net.activation[i]
 
 
 @njit(cache=True, inline="always")
@@ -157,36 +192,18 @@ def _keeps_going(direction, state):
     return agrees
 
 
-@compiled_once(
-    boolean(
-        ASSEMBLY,
-        CONTROLLER,
-        WORKSPACE,
-        STAGES,
-        NETWORK,
-        SEEN,
-        float64,
-        float64,
-        states,
-        vector,
-        vector,
-        float64[:, :, ::1],
-        states,
-        vector,
-        vector,
-        states,
-    )
-)
-def _step(
-    a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
-):
+@compiled_once(boolean(LOOP, float64, float64, float64[:, :, ::1], states, vector, vector))
+def _step(loop, t, h, wanted, disturbance, torque, network):
     """Advance leg and weights by ``h``; return whether nothing switched.
 
     A switch is a joint that turns, or a torque that reaches or leaves its limit. ``wanted`` (3, 3,
     J) and ``disturbance`` (3, J) are given at begin, middle and end. Torque and network output at
-    the begin are written to ``torque`` and ``network`` (J,); ``drive`` is scratch.
+    the begin are written to ``torque`` and ``network`` (J,).
     """
-    _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
+    a, c, w, s, net, seen = loop.a, loop.c, loop.w, loop.s, loop.net, loop.seen
+    state, memory, load, weights = loop.state, loop.memory, loop.load, loop.weights
+    drive = loop.drive
+    _control(c, seen, net, state, wanted[0], weights, torque, network, net.rates[0])
     for j in range(a.joints):
         drive[0, j] = torque[j] - disturbance[0, j]
     find_direction(a, w, t, h, state, memory, load, drive[0], s.rates[0])
@@ -197,19 +214,10 @@ def _step(
         reach = 0.5 * h * half_steps
         reach_stage(s, i, reach, state, memory)
         for j in range(a.joints):
-            for k in range(net.weights.shape[1]):
-                net.stage[j, k] = net.weights[j, k] + reach * net.rates[i - 1, j, k]
-        _control(
-            c,
-            seen,
-            s.state,
-            wanted[half_steps],
-            net.stage,
-            net.activation,
-            drive[0],
-            drive[3],
-            net.rates[i],
-        )
+            for k in range(weights.shape[1]):
+                net.stage[j, k] = weights[j, k] + reach * net.rates[i - 1, j, k]
+        now = wanted[half_steps]
+        _control(c, seen, net, s.state, now, net.stage, drive[0], drive[3], net.rates[i])
         for j in range(a.joints):
             smooth &= (abs(drive[0, j]) == c.limit) == (abs(torque[j]) == c.limit)
             drive[0, j] -= disturbance[half_steps, j]
@@ -217,21 +225,22 @@ def _step(
         memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
     end_stages(s, h, state, memory)
     for j in range(a.joints):
-        for k in range(net.weights.shape[1]):
-            net.weights[j, k] += h / 6.0 * weighted(net.rates[:, j, k])
+        for k in range(weights.shape[1]):
+            weights[j, k] += h / 6.0 * weighted(net.rates[:, j, k])
     return smooth and _keeps_going(w.direction, state)
 
 
 @njit(cache=True, inline="always")
-def _copy(state, memory, load, weights, into_state, into_memory, into_load, into_weights):
-    for j in range(load.shape[0]):
-        into_load[j] = load[j]
+def _copy(source, target):
+    """Copy state, memory, load and weights from a loop to what is kept of it, or back."""
+    for j in range(source.load.shape[0]):
+        target.load[j] = source.load[j]
         for row in range(4):
-            into_state[row, j] = state[row, j]
-        for k in range(weights.shape[1]):
-            into_weights[j, k] = weights[j, k]
-    for m in range(memory.shape[0]):
-        into_memory[m] = memory[m]
+            target.state[row, j] = source.state[row, j]
+        for k in range(source.weights.shape[1]):
+            target.weights[j, k] = source.weights[j, k]
+    for m in range(source.memory.shape[0]):
+        target.memory[m] = source.memory[m]
 
 
 @njit(cache=True, inline="always")
@@ -251,153 +260,74 @@ def _within(wanted, disturbance, begin, length, kept):
 
 
 @njit(**INNER)
-def _advance(
-    a,
-    c,
-    w,
-    s,
-    net,
-    seen,
-    t,
-    h,
-    state,
-    memory,
-    load,
-    wanted,
-    disturbance,
-    torque,
-    network,
-    drive,
-    kept,
-):
+def _advance(loop, kept, t, h, wanted, disturbance, torque, network):
     """Advance like ``_step``, but halve a part in which something switches, down to ``PARTS``."""
     done, size = 0, PARTS
     while done < PARTS:
-        _copy(state, memory, load, net.weights, kept.state, kept.memory, kept.load, kept.weights)
-        whole = size == PARTS
-        if not whole:
+        _copy(loop, kept)
+        begin, length = t + done * h / PARTS, size * h / PARTS
+        if size == PARTS:
+            smooth = _step(loop, begin, length, wanted, disturbance, torque, network)
+        else:
             _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
-        smooth = _step(
-            a,
-            c,
-            w,
-            s,
-            net,
-            seen,
-            t + done * h / PARTS,
-            size * h / PARTS,
-            state,
-            memory,
-            load,
-            wanted if whole else kept.wanted,
-            disturbance if whole else kept.disturbance,
-            torque if whole else drive[1],
-            network if whole else drive[2],
-            drive,
-        )
+            unused = loop.drive[1], loop.drive[2]
+            smooth = _step(loop, begin, length, kept.wanted, kept.disturbance, unused[0], unused[1])
         if smooth or size == 1:
             done += size
             while size < PARTS and done % (2 * size) == 0:
                 size *= 2
         else:
-            _copy(
-                kept.state, kept.memory, kept.load, kept.weights, state, memory, load, net.weights
-            )
+            _copy(kept, loop)
             size //= 2
 
 
 @njit(**INNER)
-def _look(a, encoder, seen, state, k, period):
+def _look(loop, encoder, k, period):
     """Read the encoders at sample ``k``, and update the errors of angle and speed."""
-    for j in range(a.joints):
+    seen, state = loop.seen, loop.state
+    for j in range(loop.a.joints):
         seen.reading[j] = state[THETA, j]
-    read_encoders(a, seen.reading)
-    for j in range(a.joints):
+    read_encoders(loop.a, seen.reading)
+    for j in range(loop.a.joints):
         angle = seen.reading[j]
         if encoder.noise.shape[0] > 0:
             angle += encoder.noise[k, j]
-            if encoder.rad_per_count > 0.0:
-                angle = np.floor(angle / encoder.rad_per_count + 0.5) * encoder.rad_per_count
+            angle = whole_counts(angle, encoder.rad_per_count)
             if k > 0:
-                seen.speed[j] += encoder.speed_share * (
-                    (angle - seen.angle[j]) / period - seen.speed[j]
-                )
+                change = (angle - seen.angle[j]) / period - seen.speed[j]
+                seen.speed[j] += encoder.speed_share * change
             seen.speed_error[j] = seen.speed[j] - state[DTHETA, j]
         seen.angle[j] = angle
         seen.angle_error[j] = angle - state[THETA, j]
 
 
 @njit(**HOT)
-def _run(
-    a,
-    c,
-    encoder,
-    w,
-    s,
-    net,
-    seen,
-    state,
-    memory,
-    load,
-    reference,
-    disturbance,
-    period,
-    substeps,
-    drive,
-    kept,
-    out,
-):
+def _run(loop, kept, encoder, reference, disturbance, period, substeps, out):
     """Simulate samples into ``out`` (n, 4, J), and return their number.
 
     A joint that runs away ends the simulation.
     """
+    net, state, drive = loop.net, loop.state, loop.drive
     h = period / substeps
     last = out.shape[0] - 1
     for k in range(out.shape[0]):
-        _look(a, encoder, seen, state, k, period)
+        _look(loop, encoder, k, period)
         ends = k == last
-        for j in range(a.joints):
+        for j in range(loop.a.joints):
             out[k, 0, j], out[k, 1, j] = state[THETA, j], state[DTHETA, j]
             ends |= not abs(state[THETA, j]) < TURN
         torque, network = out[k, 2], out[k, 3]
         at = 2 * k * substeps
         if ends:
-            _control(
-                c,
-                seen,
-                state,
-                reference[at],
-                net.weights,
-                net.activation,
-                torque,
-                network,
-                net.rates[0],
-            )
+            wanted, rates = reference[at], net.rates[0]
+            _control(loop.c, loop.seen, net, state, wanted, loop.weights, torque, network, rates)
             break
         for i in range(substeps):
             now = slice(at + 2 * i, at + 2 * i + 3)
             begin = k * period + i * h
             if i > 0:
                 torque, network = drive[1], drive[2]
-            _advance(
-                a,
-                c,
-                w,
-                s,
-                net,
-                seen,
-                begin,
-                h,
-                state,
-                memory,
-                load,
-                reference[now],
-                disturbance[now],
-                torque,
-                network,
-                drive,
-                kept,
-            )
+            _advance(loop, kept, begin, h, reference[now], disturbance[now], torque, network)
     return k + 1
 
 
@@ -456,39 +386,26 @@ def follow_with_rbf(
         n samples; fewer if a joint leaves ± one turn, in the last sample.
     """
     n, joints, m = (len(reference) - 1) // (2 * substeps) + 1, a.joints, len(controller.nodes)
-    out = np.empty((n, 4, joints))
-    state, memory = resting_state(start), np.zeros(memory_size(a))
-    w, s = workspace(joints), stages(joints, len(memory))
-    network = _Network(
-        np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m)
+    memories, weights = memory_size(a), np.zeros((joints, m))
+    loop = _Loop(
+        a,
+        _of_floats(controller),
+        workspace(joints),
+        stages(joints, memories),
+        _Network(np.zeros((4, joints, m)), weights.copy(), np.zeros(m)),
+        _Seen(*np.zeros((5, joints))),
+        resting_state(start),
+        np.zeros(memories),
+        np.zeros(joints),
+        weights,
+        np.zeros((4, joints)),
     )
     kept = _Kept(
-        np.zeros((4, joints)),
-        np.zeros(len(memory)),
-        np.zeros(joints),
-        np.zeros((joints, m)),
+        *(np.zeros_like(x) for x in (loop.state, loop.memory, loop.load, weights)),
         np.zeros((3, 3, joints)),
         np.zeros((3, joints)),
     )
-    seen, load, drive = _Seen(*np.zeros((5, joints))), np.zeros(joints), np.zeros((4, joints))
+    out = np.empty((n, 4, joints))
     reference, disturbance = np.ascontiguousarray(reference), np.ascontiguousarray(disturbance)
-    reached = _run(
-        a,
-        _of_floats(controller),
-        encoder,
-        w,
-        s,
-        network,
-        seen,
-        state,
-        memory,
-        load,
-        reference,
-        disturbance,
-        period,
-        substeps,
-        drive,
-        kept,
-        out,
-    )
+    reached = _run(loop, kept, encoder, reference, disturbance, period, substeps, out)
     return RbfRun(*(out[:reached, i] for i in range(4)))

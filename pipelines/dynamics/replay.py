@@ -97,33 +97,15 @@ def replay(
     memory = np.zeros((len(motion), memory_size(a)))
     w, s = workspace(a.joints), stages(a.joints, memory.shape[1])
     for stretch in motion.segments():
-        _remember(
-            a,
-            w,
-            s,
-            motion.time[stretch],
-            states[stretch],
-            load[stretch],
-            temperature[stretch],
-            memory[stretch],
-        )
+        recorded = (x[stretch] for x in (motion.time, states, load, temperature, memory))
+        _remember(a, w, s, *recorded)
     torque = np.ascontiguousarray(model.delivered(motor))
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * longest_step_s)))
     out = np.empty((len(first), length + 1, 2, a.joints))
     for k, window in zip(first, out, strict=True):
         a.temperature[:] = temperature[k]
-        _window(
-            a,
-            w,
-            s,
-            motion.time[k:],
-            torque[k:],
-            parts,
-            states[k].copy(),
-            memory[k].copy(),
-            load[k].copy(),
-            window,
-        )
+        start = states[k].copy(), memory[k].copy(), load[k].copy()
+        _window(a, w, s, motion.time[k:], torque[k:], parts, *start, window)
     samples = first[:, np.newaxis] + np.arange(length + 1)
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
 

@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.contracts.joints import columns_of, in_words
 from pipelines.dynamics.mobility import substeps_for
 from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.rbf_loop import TURN, Encoder, RbfController, RbfRun, follow_with_rbf
@@ -67,15 +68,15 @@ class ClosedLoop:
         DataFrame
             n rows; rad, rad/s and N·m.
         """
-        columns = {"time_s": self.time}
-        for j, joint in enumerate(self.joints):
-            columns[joint.column("reference")] = self.reference[:, j]
-            columns[joint.column("angle")] = self.run.angle[:, j]
-            columns[joint.column("velocity")] = self.run.speed[:, j]
-            columns[joint.column("error")] = self.error[:, j]
-            columns[joint.column("torque")] = self.run.torque[:, j]
-            columns[joint.column("network")] = self.run.network[:, j]
-        return pd.DataFrame(columns)
+        quantities = {
+            "reference": self.reference,
+            "angle": self.run.angle,
+            "velocity": self.run.speed,
+            "error": self.error,
+            "torque": self.run.torque,
+            "network": self.run.network,
+        }
+        return pd.DataFrame({"time_s": self.time} | columns_of(self.joints, quantities))
 
 
 def track(
@@ -150,13 +151,9 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
 
 def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
     if reference.joints != plant.joints:
-        given, expected = (
-            ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
-            for joints in (reference.joints, plant.joints)
-        )
         raise InputError(
-            f"the reference moves {given}, expected the model's joints, {expected}; give a"
-            " reference for these"
+            f"the reference moves {in_words(reference.joints)}, expected the model's joints,"
+            f" {in_words(plant.joints)}; give a reference for these"
         )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import joints_of
+from pipelines.contracts.joints import columns_of, joints_of
 from pipelines.estimation.regression import Regression, regressions, residual_of
 from pipelines.mechanics.run import Run
 from pipelines.model import Model
@@ -179,6 +179,4 @@ def _residual_rows(r: Regression, motion: Run, model: Model, name: str) -> pa.Ta
         "predicted": r.torque - error,
         "residual": error,
     }
-    for j, joint in enumerate(joints_of(motion.metadata)):
-        columns |= {joint.column(quantity): values[:, j] for quantity, values in quantities.items()}
-    return pa.table(columns)
+    return pa.table(columns | columns_of(joints_of(motion.metadata), quantities))

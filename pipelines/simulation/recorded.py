@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.contracts.joints import the
+from pipelines.contracts.joints import columns_of, the
 from pipelines.dynamics.pd_loop import (
     Drives,
     LoopState,
@@ -17,7 +17,7 @@ from pipelines.dynamics.pd_loop import (
     read_encoders,
 )
 from pipelines.dynamics.plant import Plant
-from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult, known_temperature
+from pipelines.dynamics.replay import ReplayResult, known_temperature
 from pipelines.mechanics.motion import Motion
 
 
@@ -128,12 +128,7 @@ def open_loop_frame(
 
     The recorded angle stands as the reference; ``window`` numbers the windows.
     """
-    apart = round(WINDOW_S / EVERY_S)
-    chosen = (
-        _without_overlap(replayed.first, replayed.angle.shape[1] - 1)
-        if apart > 1
-        else replayed.first
-    )
+    chosen = _without_overlap(replayed.first, replayed.angle.shape[1] - 1)
     which = np.searchsorted(replayed.first, chosen)
     # A window's last sample is the next one's first.
     rows = (chosen[:, np.newaxis] + np.arange(replayed.angle.shape[1] - 1)).ravel()
@@ -141,20 +136,17 @@ def open_loop_frame(
     def joined(windows: NDArray) -> NDArray:
         return windows[which, :-1].reshape(len(rows), -1)
 
-    angle, velocity, error = (
-        joined(replayed.angle),
-        joined(replayed.velocity),
-        joined(replayed.error),
-    )
+    angle, error = joined(replayed.angle), joined(replayed.error)
     columns = {"time_s": motion.time[rows], "window": np.repeat(which, replayed.angle.shape[1] - 1)}
-    for j, joint in enumerate(joints):
-        columns[joint.column("reference")] = angle[:, j] + error[:, j]
-        columns[joint.column("angle")] = angle[:, j]
-        columns[joint.column("velocity")] = velocity[:, j]
-        columns[joint.column("error")] = error[:, j]
-        columns[joint.column("torque")] = motion.torque[rows, j]
-        columns[joint.column("network")] = np.nan
-    return pd.DataFrame(columns)
+    quantities = {
+        "reference": angle + error,
+        "angle": angle,
+        "velocity": joined(replayed.velocity),
+        "error": error,
+        "torque": motion.torque[rows],
+        "network": np.full_like(angle, np.nan),
+    }
+    return pd.DataFrame(columns | columns_of(joints, quantities))
 
 
 def _without_overlap(first: NDArray, length: int) -> NDArray:
@@ -170,14 +162,14 @@ def closed_loop_frame(
 ) -> pd.DataFrame:
     """Return simulated and measured motion as a ``simulation/1`` table."""
     assert motion.reference is not None
-    columns: dict[str, object] = {"time_s": motion.time}
-    for j, joint in enumerate(joints):
-        columns[joint.column("reference")] = motion.reference[:, j]
-        columns[joint.column("angle")] = simulated.angle[:, j]
-        columns[joint.column("velocity")] = simulated.velocity[:, j]
-        columns[joint.column("error")] = motion.reference[:, j] - simulated.angle[:, j]
-        columns[joint.column("torque")] = simulated.torque[:, j]
-        columns[joint.column("network")] = np.nan
-        columns[joint.column("angle_measured")] = motion.q[:, j]
-        columns[joint.column("torque_measured")] = motion.torque[:, j]
-    return pd.DataFrame(columns)
+    quantities = {
+        "reference": motion.reference,
+        "angle": simulated.angle,
+        "velocity": simulated.velocity,
+        "error": motion.reference - simulated.angle,
+        "torque": simulated.torque,
+        "network": np.full_like(motion.q, np.nan),
+        "angle_measured": motion.q,
+        "torque_measured": motion.torque,
+    }
+    return pd.DataFrame({"time_s": motion.time} | columns_of(joints, quantities))
