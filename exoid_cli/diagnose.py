@@ -60,8 +60,8 @@ def diagnose(
     from pipelines.settings.diagnose import DiagnoseSettings
 
     if not files and output is None and figures and not known:
-        folder = open_experiment(config, problem="no recording is given")
-        run_stages(context, folder, "diagnose", again=again)
+        experiment = open_experiment(config, problem="no recording is given")
+        run_stages(context, experiment, "diagnose", again=again)
         return
     files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)

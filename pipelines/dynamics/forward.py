@@ -90,7 +90,7 @@ def workspace(joints: int) -> Workspace:
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
-    return Workspace(*v[:2], *m, *v[2:], both, np.zeros(2 * joints))
+    return Workspace._make([*v[:2], *m, *v[2:], both, np.zeros(2 * joints)])
 
 
 states = float64[:, ::1]

@@ -401,9 +401,12 @@ def follow_with_rbf(
         np.zeros((4, joints)),
     )
     kept = _Kept(
-        *(np.zeros_like(x) for x in (loop.state, loop.memory, loop.load, weights)),
-        np.zeros((3, 3, joints)),
-        np.zeros((3, joints)),
+        state=np.zeros((4, joints)),
+        memory=np.zeros(memories),
+        load=np.zeros(joints),
+        weights=np.zeros((joints, m)),
+        wanted=np.zeros((3, 3, joints)),
+        disturbance=np.zeros((3, joints)),
     )
     out = np.empty((n, 4, joints))
     reference, disturbance = np.ascontiguousarray(reference), np.ascontiguousarray(disturbance)

@@ -41,6 +41,8 @@ LIES_FORWARD: Vector = (1.0, 0.0, 0.0)
 RISES: Vector = (0.0, 0.0, 1.0)
 SLIDES_FORWARD: Vector = (1.0, 0.0, 0.0)
 
+NOMINAL = "Masses are nominal where X does not determine them; joint torques are unchanged."
+
 NOMINAL_MASS = 1.0
 """Mass of a body whose dynamics do not depend on it, kg."""
 
@@ -98,26 +100,16 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
             f"{mechanism.name} ({mechanism.joints_in_words}) has no rule for its bodies' masses."
             " Export to c, matlab or json, which need no bodies"
         )
-    return BODIES_OF[exported.machine.mechanism](exported)
-
-
-def _leg(exported: Exported) -> tuple[Body, ...]:
-    X1, X2, X3, X4 = exported.X
-    return _in_series(exported, X1, X2, X3, X4)
+    return BODIES_OF[mechanism](exported)
 
 
 def _level_leg(exported: Exported) -> tuple[Body, ...]:
-    X1, X2, X3 = exported.X
-    return tuple(
-        replace(body, axis=RISES, lies=LIES_FORWARD)
-        for body in _in_series(exported, X1, X2, X3, None)
-    )
+    return tuple(replace(body, axis=RISES, lies=LIES_FORWARD) for body in _leg(exported))
 
 
-def _in_series(
-    exported: Exported, X1: float, X2: float, X3: float, X4: float | None
-) -> tuple[Body, ...]:
+def _leg(exported: Exported) -> tuple[Body, ...]:
     """Return two links; without X4 (no gravity) the first link's centre is on its axis."""
+    X1, X2, X3, *X4 = exported.X
     hip, knee = exported.joints
     across = [_moment_across(exported, joint) for joint in (hip, knee)]
     length, shift = exported.geometry.thigh_length_m, exported.shift()
@@ -131,7 +123,7 @@ def _in_series(
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
     inertia = X1 - X2 - m2 * length**2
-    along = 0.0 if X4 is None else X4 - m2 * length
+    along = X4[0] - m2 * length if X4 else 0.0
     of_thigh = np.hypot(along, across[0])
     m1 = max(2.0 * of_thigh**2 / inertia, m2)
     thigh = Body(hip, m1, inertia - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])

@@ -1,11 +1,11 @@
 """C99: a header and a source file without dependencies, for controllers."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
 from pipelines.export.exported import Exported
 from pipelines.export.format import Format
-from pipelines.export.language import Language, function_name, one_line
+from pipelines.export.language import Language, function_name, indented, one_line
 
 LANGUAGE = Language(
     names={"abs": "fabs", "max": "fmax", "min": "fmin", "at.t": "at->t"},
@@ -14,8 +14,8 @@ LANGUAGE = Language(
     unequal="!=",
     branch=lambda condition, yes, no: [
         f"if ({condition}) {{",
-        *_indented(yes),
-        *(["} else {", *_indented(no)] if no else []),
+        *indented(yes),
+        *(["} else {", *indented(no)] if no else []),
         "}",
     ],
 )
@@ -192,16 +192,8 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         "sensor_shift": _array(model.sensor_shift),
         "link_shift": _array(model.link_shift),
         "groups": "\n\n".join(_group(group, model.groups[group]) for group in GROUPS),
-        "rates": "".join(
-            f"{line}\n"
-            for e in model.rates
-            for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
-        ),
-        "readings": "".join(
-            f"{line}\n"
-            for e in model.readings
-            for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
-        ),
+        "rates": _lines(model.rates, lambda e: LANGUAGE.assigned(e.outcome, "rate", e.first)),
+        "readings": _lines(model.readings, lambda e: LANGUAGE.assigned(e.outcome, "tau")),
     }
     return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
 
@@ -226,19 +218,15 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _group(name: str, group: list[Equation]) -> str:
-    lines = [line for e in group for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
-    unused = [] if group else ["    (void)at;", "    (void)tau;"]
-    return "\n".join(
-        [f"static void {name}(const struct instant *at, double *tau) {{", *unused, *lines, "}"]
-    )
+    lines = _lines(group, lambda e: LANGUAGE.added(e.outcome, "tau"))
+    unused = "" if group else "    (void)at;\n    (void)tau;\n"
+    return f"static void {name}(const struct instant *at, double *tau) {{\n{unused}{lines}}}"
 
 
-def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return _indented([_comment([f"{equation.label}: {equation.text}"]), *statements])
-
-
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+def _lines(equations: Iterable[Equation], write: Callable[[Equation], list[str]]) -> str:
+    """Return the indented statements of some equations, each with a comment."""
+    lines = [line for e in equations for line in (_comment([f"{e.label}: {e.text}"]), *write(e))]
+    return "".join(f"{line}\n" for line in indented(lines))
 
 
 C = Format("c", "C99 source", ".c", holding, write)

@@ -4,8 +4,8 @@ The terms form the four groups of ``pipelines.dynamics``: on links and inertial,
 and inertial, on drives. The torque of the links is the ``load`` of the drives.
 """
 
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass, field
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,8 @@ from pipelines.export.formula import (
     Elements,
     Formula,
     NotWritable,
-    arrays_in,
     constant,
-    constants_in,
+    names_in,
     outcome_of,
 )
 from pipelines.export.language import identifier, unique
@@ -37,24 +36,11 @@ GROUPS = ("link_inertia", "link_torque", "drive_inertia", "drive_torque")
 GEOMETRY = ("thigh_length", "gravity")
 """The values of a kernel's argument ``geometry``."""
 
-RESERVED = (
-    *GROUPS,
-    *GEOMETRY,
-    "sign",
-    "at",
-    "tau",
-    "rate",
-    "geometry",
-    "at_rest",
-    "inertial",
-    "velocity_torque",
-    "instant",
-    "instant_of",
-    "sensor_shift",
-    "link_shift",
-    "memory_rate",
-    "torque_reading",
-)
+OWN_NAMES = """
+    sign at tau rate geometry at_rest inertial velocity_torque instant instant_of sensor_shift
+    link_shift memory_rate torque_reading
+"""
+RESERVED = (*GROUPS, *GEOMETRY, *OWN_NAMES.split())
 """Names that an exported file uses itself."""
 
 
@@ -85,21 +71,26 @@ class Equations:
 
     joints: tuple[Joint, ...]
     constants: tuple[Constant, ...]
-    groups: dict[str, list[Equation]]
-    rates: list[Equation]
-    readings: list[Equation]
-    memories: int
-    memory_of: tuple[str, ...]
     sensor_shift: tuple[float, ...]
     """Encoders' angles less the motors', rad."""
     link_shift: tuple[float, ...]
     """Motors' angles less the links', on which gravity and springs depend, rad."""
+    groups: dict[str, list[Equation]] = field(default_factory=lambda: {name: [] for name in GROUPS})
+    rates: list[Equation] = field(default_factory=list)
+    readings: list[Equation] = field(default_factory=list)
+    memory_of: list[str] = field(default_factory=list)
+    """Label of the effect of each memory."""
+
+    @property
+    def memories(self) -> int:
+        """Number of memories."""
+        return len(self.memory_of)
 
     @property
     def used(self) -> list[Constant]:
         """The constants in the equations; others only selected a branch."""
         every = (*chain(*self.groups.values()), *self.rates, *self.readings)
-        names = set(constants_in([equation.outcome for equation in every]))
+        names = set(names_in([equation.outcome for equation in every], "constant"))
         return [c for c in self.constants if c.name in names]
 
 
@@ -123,7 +114,7 @@ def holding(term: Term) -> Holding:
         ]
     except NotWritable as error:
         return left_out(str(error))
-    if TEMPERATURE in arrays_in(outcomes):
+    if TEMPERATURE in names_in(outcomes, "element"):
         return left_out("it needs the motor's temperature")
     if effect.torque_reading is not None:
         return exact("torque_reading")
@@ -154,47 +145,28 @@ def equations(exported: Exported) -> Equations:
             names, named, np.concatenate([term.values for term in terms]), strict=True
         )
     ]
-    shape = zip(
-        GEOMETRY,
-        exported.geometry.array(),
-        ("m", "m/s²"),
-        ("first to second joint axis", "acceleration of gravity"),
-        strict=True,
+    length, gravity = exported.geometry.array().tolist()
+    fixed = (
+        Constant(GEOMETRY[0], length, "m", "first to second joint axis"),
+        Constant(GEOMETRY[1], gravity, "m/s²", "acceleration of gravity"),
     )
-    fixed = [Constant(name, float(value), unit, meaning) for name, value, unit, meaning in shape]
+    sensor = exported.shift(Side.SENSOR)
     model = Equations(
         exported.joints,
         (*fixed, *constants),
-        {group: [] for group in GROUPS},
-        [],
-        [],
-        0,
-        (),
-        (),
-        (),
-    )
-    memory_of: list[str] = []
-    at = 0
-    for term in terms:
-        count = len(term.effect.fitted)
-        values = [constant(c.name, c.value) for c in constants[at : at + count]]
-        at += count
-        _add_equations(model, term, values, len(memory_of))
-        memory_of += [term.effect.label] * term.effect.states
-    sensor = exported.shift(Side.SENSOR)
-    return replace(
-        model,
-        memories=len(memory_of),
-        memory_of=tuple(memory_of),
         sensor_shift=tuple(sensor.tolist()),
         link_shift=tuple((exported.shift() - sensor).tolist()),
     )
+    remaining = iter(constants)
+    for term in terms:
+        values = [constant(c.name, c.value) for c in islice(remaining, len(term.effect.fitted))]
+        _add_equations(model, term, values, model.memories)
+        model.memory_of.extend([term.effect.label] * term.effect.states)
+    return model
 
 
 def _constant_name(effect: Effect, parameter: Parameter) -> str:
-    return identifier(
-        "_".join(part for part in (effect.joint, effect.name, parameter.name) if part)
-    )
+    return identifier("_".join(filter(None, (effect.joint, effect.name, parameter.name))))
 
 
 def _add_equations(model: Equations, term: Term, values: list[Formula], first: int) -> None:

@@ -178,13 +178,10 @@ def exported(
             )
         whole = model_from_parameters(table.frame, run, machine)
         has_cuffs = cuffed([term.effect for term in whole])
-        present, absent = [], []
-        for term in whole:
-            reason = _why_absent(term, run, has_cuffs)
-            if reason:
-                absent.append((term, left_out(reason)))
-            else:
-                present.append(term)
+        reasons = [_why_absent(term, run, has_cuffs) for term in whole]
+        judged = list(zip(whole, reasons, strict=True))
+        present = [term for term, reason in judged if not reason]
+        absent = [(term, left_out(reason)) for term, reason in judged if reason]
         kind = "with_human" if run == HUMAN else run
         acting = Model(tuple(present)).for_run(kind)
         # Refuses models that no real machine has.

@@ -6,6 +6,7 @@ equations as every stage, without a second copy of them.
 """
 
 import math
+import operator
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -15,22 +16,14 @@ from typing import Any
 
 from pipelines.errors import ExoidError
 
-FUNCTIONS = (
-    "sin",
-    "cos",
-    "tan",
-    "exp",
-    "expm1",
-    "log",
-    "sqrt",
-    "tanh",
-    "atan",
-    "atan2",
-    "abs",
-    "sign",
-    "max",
-    "min",
-)
+OF_MATH = ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2")
+OTHERS: dict[str, Callable[..., Any]] = {
+    "abs": abs,
+    "max": max,
+    "min": min,
+    "sign": lambda x: (x > 0) - (x < 0),
+}
+FUNCTIONS = {name: getattr(math, name) for name in OF_MATH} | OTHERS
 """Functions that an equation may call, and that every format can write."""
 
 
@@ -52,75 +45,57 @@ class Formula:
     """Value of a constant; comparisons of constants are evaluated while tracing."""
 
     def __add__(self, other):
-        """Write a sum."""
         return _sum(self, other)
 
     def __radd__(self, other):
-        """Write a sum."""
         return _sum(other, self)
 
     def __sub__(self, other):
-        """Write a difference."""
         return self if _is(other, 0) else Formula("-", (self, other))
 
     def __rsub__(self, other):
-        """Write a difference."""
         return -self if _is(other, 0) else Formula("-", (other, self))
 
     def __mul__(self, other):
-        """Write a product."""
         return _product(self, other)
 
     def __rmul__(self, other):
-        """Write a product."""
         return _product(other, self)
 
     def __truediv__(self, other):
-        """Write a quotient."""
         return Formula("/", (self, other))
 
     def __rtruediv__(self, other):
-        """Write a quotient."""
         return 0.0 if _is(other, 0) else Formula("/", (other, self))
 
     def __pow__(self, other):
-        """Write a power."""
         return Formula("**", (self, other))
 
     def __rpow__(self, other):
-        """Write a power."""
         return Formula("**", (other, self))
 
     def __neg__(self):
-        """Write the opposite."""
         return Formula("neg", (self,))
 
     def __abs__(self):
-        """Write the absolute value."""
         return Formula("abs", (self,))
 
     def __lt__(self, other):
-        """Compare."""
         return _compare("<", self, other)
 
     def __le__(self, other):
-        """Compare."""
         return _compare("<=", self, other)
 
     def __gt__(self, other):
-        """Compare."""
         return _compare(">", self, other)
 
     def __ge__(self, other):
-        """Compare."""
         return _compare(">=", self, other)
 
     def __eq__(self, other):
-        """Compare."""
         return _compare("==", self, other)
 
     def __ne__(self, other):
-        """Compare."""
         return _compare("!=", self, other)
 
     __hash__ = None  # type: ignore[assignment]
@@ -135,27 +110,18 @@ def constant(name: str, value: float) -> Formula:
     return Formula("constant", (name,), float(value))
 
 
-def constants_in(outcome: Any) -> Iterator[str]:
-    """Yield the name of each constant of an outcome, once per occurrence."""
-    return _names_in(outcome, "constant")
-
-
-def arrays_in(outcome: Any) -> Iterator[str]:
-    """Yield the name of the array of each element in an outcome, once per occurrence."""
-    return _names_in(outcome, "element")
-
-
-def _names_in(outcome: Any, operator: str) -> Iterator[str]:
+def names_in(outcome: Any, kind: str) -> Iterator[str]:
+    """Yield the name of each ``constant``, or of the array of each ``element``, of an outcome."""
     match outcome:
         case Branch(condition, yes, no):
-            yield from _names_in([condition.left, condition.right, yes, no], operator)
+            yield from names_in([condition.left, condition.right, yes, no], kind)
         case list() | tuple():
             for part in outcome:
-                yield from _names_in(part, operator)
-        case Formula() if outcome.operator == operator:
+                yield from names_in(part, kind)
+        case Formula() if outcome.operator == kind:
             yield outcome.operands[0]
         case Formula():
-            yield from _names_in(outcome.operands, operator)
+            yield from names_in(outcome.operands, kind)
 
 
 @dataclass(frozen=True)
@@ -302,18 +268,10 @@ def _substitute(thing: Any, done: dict[FunctionType, FunctionType]) -> Any:
 
 
 def _function(name: str) -> Callable[..., Any]:
-    of_numbers: dict[str, Callable[..., Any]] = {
-        "abs": abs,
-        "max": max,
-        "min": min,
-        "sign": lambda x: (x > 0) - (x < 0),
-    }
-    evaluate = of_numbers[name] if name in of_numbers else getattr(math, name)
-
     def call(*arguments):
         if any(isinstance(argument, Formula) for argument in arguments):
             return Formula(name, arguments)
-        return float(evaluate(*arguments))
+        return float(FUNCTIONS[name](*arguments))
 
     return call
 
@@ -345,18 +303,18 @@ def _product(a: Any, b: Any) -> Any:
     return Formula("*", (a, b))
 
 
-_COMPARED: dict[str, Callable[[float, float], bool]] = {
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
+_COMPARED = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
 }
 
 
-def _compare(operator: str, a: Any, b: Any) -> Condition | bool:
+def _compare(sign: str, a: Any, b: Any) -> Condition | bool:
     one, other = (side.value if isinstance(side, Formula) else float(side) for side in (a, b))
     if one is None or other is None:
-        return Condition(operator, a, b)
-    return _COMPARED[operator](one, other)
+        return Condition(sign, a, b)
+    return bool(_COMPARED[sign](one, other))

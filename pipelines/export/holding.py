@@ -38,17 +38,20 @@ def held_friction(term: Term, whole: Holding) -> Holding:
     return approximate(f"its other coefficient only: {reason}")
 
 
-Holdings = Mapping[Element | None, Callable[[Term], Holding]]
-"""Functions that return the holding of a term, by its element."""
-
-
-def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[Term], Holding]:
+def holding_from(
+    exactly: Mapping[Element | None, str],
+    friction: Callable[[Term], Holding],
+    shift: str,
+    format_name: str,
+) -> Callable[[Term], Holding]:
     """Return the function from a term to its holding.
 
     Parameters
     ----------
-    holdings : Holdings
-        Function by name of effect.
+    exactly : mapping
+        Place in the file, by the element that it holds exactly.
+    friction : callable
+        Returns the holding of friction.
     shift : str
         How the format holds an encoder's shift.
     format_name : str
@@ -63,8 +66,11 @@ def holding_from(holdings: Holdings, shift: str, format_name: str) -> Callable[[
     def holding(term: Term) -> Holding:
         if shift_of(term) is not None:
             return exact(shift)
-        if term.effect.element in holdings:
-            return holdings[term.effect.element](term)
+        element = term.effect.element
+        if element is Element.FRICTION:
+            return friction(term)
+        if element in exactly:
+            return exact(exactly[element])
         return left_out(f"{format_name} has no element for it")
 
     return holding

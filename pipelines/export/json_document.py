@@ -50,16 +50,13 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         Text by suffix, ``.json``.
     """
     contract = "model/1"
-    table = exported.table
+    table, mechanism = exported.table, exported.machine.mechanism
     document = {
         "contract": contract,
         "name": stem,
         "provenance": describe([table.path] if table.path else []),
         "run": exported.run,
-        "mechanism": {
-            "name": exported.machine.mechanism.name,
-            "title": exported.machine.mechanism.title,
-        },
+        "mechanism": {"name": mechanism.name, "title": mechanism.title},
         "method": table.metadata.get("method"),
         "joints": [
             {
@@ -92,10 +89,7 @@ def _effect(term: Term) -> dict[str, Any]:
     return {
         "effect": effect.name,
         "joint": effect.joint,
-        "side": stated["side"],
-        "equation": stated["equation"],
-        "meaning": stated["meaning"],
-        "source": stated["source"],
+        **{key: stated[key] for key in ("side", "equation", "meaning", "source")},
         "values": [
             {
                 "name": p.name,

@@ -112,6 +112,11 @@ class Language:
         return f"{self.text(condition.left)} {operator} {self.text(condition.right)}"
 
 
+def indented(lines: Iterable[str]) -> list[str]:
+    """Return lines of code one level deeper."""
+    return [f"    {line}" for line in lines]
+
+
 def identifier(text: str) -> str:
     """Return a name of ASCII letters, digits and underscores that starts with a letter."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")

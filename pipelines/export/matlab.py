@@ -1,37 +1,17 @@
 """MATLAB, Octave and Simulink: one function file."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
 from pipelines.export.exported import Exported
 from pipelines.export.format import Format
-from pipelines.export.language import Language, function_name, one_line
+from pipelines.export.language import Language, function_name, indented, one_line
 
-KEYWORDS = frozenset(
-    (
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-        "otherwise",
-        "parfor",
-        "persistent",
-        "return",
-        "spmd",
-        "switch",
-        "try",
-        "while",
-    )
-)
+KEYWORDS = """
+    break case catch classdef continue else elseif end for function global if otherwise parfor
+    persistent return spmd switch try while
+"""
 
 LANGUAGE = Language(
     names={},
@@ -40,8 +20,8 @@ LANGUAGE = Language(
     unequal="~=",
     branch=lambda condition, yes, no: [
         f"if {condition}",
-        *_indented(yes),
-        *(["else", *_indented(no)] if no else []),
+        *indented(yes),
+        *(["else", *indented(no)] if no else []),
         "end",
     ],
 )
@@ -138,7 +118,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     ]
     return {
         ".m": FILE.format(
-            name=function_name(stem, ".m", KEYWORDS),
+            name=function_name(stem, ".m", KEYWORDS.split()),
             comment=_comment([*exported.heading(MATLAB), "", *order]),
             joints=joints,
             memories=model.memories,
@@ -161,21 +141,12 @@ def _column(values: Iterable[float]) -> str:
 
 def _functions(model: Equations) -> Iterable[str]:
     for group in GROUPS:
-        lines = [
-            line for e in model.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))
-        ]
+        lines = _statements(model.groups[group], lambda e: LANGUAGE.added(e.outcome, "tau"))
         yield _function(f"tau = {group}(at, tau)", lines, model)
-    rates = [
-        line
-        for e in model.rates
-        for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
-    ]
-    yield _function(
-        "rate = memory_rate(at)", [f"rate = zeros({model.memories}, 1);", *rates], model
-    )
-    readings = [
-        line for e in model.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
-    ]
+    rates = _statements(model.rates, lambda e: LANGUAGE.assigned(e.outcome, "rate", e.first))
+    rates.insert(0, f"rate = zeros({model.memories}, 1);")
+    yield _function("rate = memory_rate(at)", rates, model)
+    readings = _statements(model.readings, lambda e: LANGUAGE.assigned(e.outcome, "tau"))
     yield _function("tau = torque_reading(at, tau)", readings, model)
 
 
@@ -190,12 +161,9 @@ def _function(head: str, lines: list[str], model: Equations) -> str:
     return "\n".join([f"function {head}", *used, *lines, "end"])
 
 
-def _body(equation: Equation, statements: list[str]) -> list[str]:
-    return [_comment([f"{equation.label}: {equation.text}"]), *statements]
-
-
-def _indented(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+def _statements(equations: Iterable[Equation], write: Callable[[Equation], list[str]]) -> list[str]:
+    """Return the statements of some equations, each with a comment."""
+    return [line for e in equations for line in (_comment([f"{e.label}: {e.text}"]), *write(e))]
 
 
 MATLAB = Format("matlab", "MATLAB function", ".m", holding, write)

@@ -13,10 +13,10 @@ import numpy as np
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import motor_inertia
 from pipelines.effects import Element
-from pipelines.export.bodies import Body, bodies
+from pipelines.export.bodies import NOMINAL, Body, bodies
 from pipelines.export.exported import Exported
-from pipelines.export.format import Degree, Format, Holding, approximate, exact
-from pipelines.export.holding import Holdings, held_friction, holding_from, sound_friction
+from pipelines.export.format import Degree, Format, Holding, approximate
+from pipelines.export.holding import held_friction, holding_from, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -25,33 +25,23 @@ TIMESTEP_S = 0.001
 
 
 def _friction(term: Term) -> Holding:
-    return held_friction(
-        term,
-        approximate(
-            "joint damping and frictionloss: exact in motion, but standing joints creep a little"
-        ),
-    )
+    how = "joint damping and frictionloss: exact in motion, but standing joints creep a little"
+    return held_friction(term, approximate(how))
 
 
-def _elasticity(term: Term) -> Holding:
-    return exact(
+EXACT: dict[Element | None, str] = {
+    Element.RIGID_BODIES: "bodies of nominal masses that have these X",
+    Element.QUADRATIC_DAMPING: "second coefficient of the joint's damping (read by MuJoCo 4.0)",
+    Element.ARMATURE: "joint armature",
+    Element.SPRING: "joint stiffness and springref",
+    Element.MASS_ACROSS: "place of the body's centre of mass",
+    Element.SERIES_SPRING: (
         "a second joint, its stiffness and damping; the motor's inertia is the first one's armature"
-    )
-
-
-HOLDINGS: Holdings = {
-    Element.RIGID_BODIES: lambda term: exact("bodies of nominal masses that have these X"),
-    Element.FRICTION: _friction,
-    Element.QUADRATIC_DAMPING: lambda term: exact(
-        "second coefficient of the joint's damping (read by MuJoCo 4.0)"
     ),
-    Element.ARMATURE: lambda term: exact("joint armature"),
-    Element.SPRING: lambda term: exact("joint stiffness and springref"),
-    Element.MASS_ACROSS: lambda term: exact("place of the body's centre of mass"),
-    Element.SERIES_SPRING: _elasticity,
-    Element.TORQUE_GAIN: lambda term: exact("gain of the actuator"),
-    Element.TORQUE_OFFSET: lambda term: exact("bias of the actuator"),
+    Element.TORQUE_GAIN: "gain of the actuator",
+    Element.TORQUE_OFFSET: "bias of the actuator",
 }
+"""Places in the file that hold an element exactly."""
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
@@ -87,10 +77,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
         _spring_across(springs, (name, twist), joint, exported)
         _actuator(actuators, name, joint, exported)
     root.extend([part for part in (springs, actuators) if len(part)])
-    masses = (
-        "Masses are nominal where X does not determine them; joint torques are unchanged. Shapes"
-        " are for display only."
-    )
+    masses = f"{NOMINAL} Shapes are for display only."
     return {".xml": document(root, [*exported.heading(MJCF), "", masses])}
 
 
@@ -98,10 +85,8 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     # Shift of the centre of mass of a body on two slides.
     off_centre_m = 0.01
     element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
-    hinge = {
-        "type": "hinge" if body.joint.kind == "revolute" else "slide",
-        "axis": numbers(*body.axis),
-    }
+    kind = "hinge" if body.joint.kind == "revolute" else "slide"
+    hinge = {"type": kind, "axis": numbers(*body.axis)}
     soft = _twist(body.joint, exported)
     at_link = {} if soft else _spring(body.joint, body.shift, exported)
     ET.SubElement(element, "joint", {"name": name} | hinge | _joint(body, exported) | at_link)
@@ -182,10 +167,8 @@ def _spring_across(
     place = [other.name for other in exported.joints].index(joint.name)
     spring = _spring(joint, exported.shift()[place], exported)
     if spring:
-        across = ET.SubElement(
-            springs, "fixed", name=f"{names[0]}_spring", stiffness=spring["stiffness"]
-        )
-        across.set("springlength", spring["springref"])
+        stated = {"stiffness": spring["stiffness"], "springlength": spring["springref"]}
+        across = ET.SubElement(springs, "fixed", {"name": f"{names[0]}_spring"} | stated)
         for part in names:
             ET.SubElement(across, "joint", joint=part, coef="1")
 
@@ -202,15 +185,8 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     if gain and offset and _comes_before(exported, gain, offset):
         at_zero *= per_unit
     bias = numbers(at_zero, 0.0, 0.0)
-    ET.SubElement(
-        actuators,
-        "general",
-        name=name,
-        joint=name,
-        gainprm=number(per_unit),
-        biastype="affine",
-        biasprm=bias,
-    )
+    general = {"gainprm": number(per_unit), "biastype": "affine", "biasprm": bias}
+    ET.SubElement(actuators, "general", {"name": name, "joint": name} | general)
 
 
 def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
@@ -221,6 +197,6 @@ MJCF = Format(
     "mjcf",
     "MuJoCo model",
     ".xml",
-    holding_from(HOLDINGS, "orientation of the joint's frame", "MJCF"),
+    holding_from(EXACT, _friction, "orientation of the joint's frame", "MJCF"),
     write,
 )

@@ -11,26 +11,25 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from pipelines.effects import Element
-from pipelines.export.bodies import Body, bodies
+from pipelines.export.bodies import NOMINAL, Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, exact
-from pipelines.export.holding import Holdings, held_friction, holding_from, sound_friction
+from pipelines.export.holding import held_friction, holding_from, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
 
 def _friction(term: Term) -> Holding:
-    return held_friction(
-        term, exact("dynamics of the joint: damping and friction; some readers ignore them")
-    )
+    how = "dynamics of the joint: damping and friction; some readers ignore them"
+    return held_friction(term, exact(how))
 
 
-HOLDINGS: Holdings = {
-    Element.RIGID_BODIES: lambda term: exact("links of nominal masses that have these X"),
-    Element.FRICTION: _friction,
-    Element.MASS_ACROSS: lambda term: exact("place of the link's centre of mass"),
+EXACT: dict[Element | None, str] = {
+    Element.RIGID_BODIES: "links of nominal masses that have these X",
+    Element.MASS_ACROSS: "place of the link's centre of mass",
 }
+"""Places in the file that hold an element exactly."""
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
@@ -61,10 +60,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     # A counterweight carries part of a lift's weight, so gravity is reduced.
     gravity = number(exported.geometry.gravity_m_s2 * (1.0 - machine_bodies[0].carried))
     comments = [
-        (
-            "Masses are nominal where X does not determine them; joint torques are unchanged."
-            " Limits are not the machine's."
-        ),
+        f"{NOMINAL} Limits are not the machine's.",
         f"Set gravity in the reader: {gravity} m/s² along -z.",
     ]
     return {".urdf": document(root, [*exported.heading(URDF), "", *comments])}
@@ -97,5 +93,9 @@ def _joint(
 
 
 URDF = Format(
-    "urdf", "URDF model", ".urdf", holding_from(HOLDINGS, "origin of the joint", "URDF"), write
+    "urdf",
+    "URDF model",
+    ".urdf",
+    holding_from(EXACT, _friction, "origin of the joint", "URDF"),
+    write,
 )

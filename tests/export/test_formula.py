@@ -10,7 +10,7 @@ from pipelines.export.formula import (
     Elements,
     NotWritable,
     constant,
-    constants_in,
+    names_in,
     outcome_of,
 )
 from pipelines.export.matlab import LANGUAGE
@@ -64,7 +64,7 @@ def test_a_choice_is_outcome_of_with_both_ways():
 
 def test_constants_are_told_once_they_are_outcome_of():
     outcome = formula(_clipped, constant("limit", 0.25))
-    assert isinstance(outcome, Branch) and set(constants_in(outcome)) == {"limit"}
+    assert isinstance(outcome, Branch) and set(names_in(outcome, "constant")) == {"limit"}
 
 
 @pytest.mark.parametrize("kernel", [_remembers, _rounds])

@@ -16,10 +16,8 @@ FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's
 
 def cause(effect="cogging", joint="knee", ties=()):
     first = verdict_of()["causes"][0]
-    rivals = [
-        {"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1}
-        for e, j in ties
-    ]
+    shared = {"why": "", "how_to_separate": "", "probability": 0.1, "per_run": False}
+    rivals = [{"effect": e, "joint": j} | shared for e, j in ties]
     return first | {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
 
 
@@ -46,7 +44,7 @@ def test_the_headline_claims_no_cause_that_is_tied(ties, said):
 
 def test_a_tie_that_would_differ_from_run_to_run_is_called_so():
     tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {
-        "each_run": [{"file": "a", "purpose": "train", "values": {}}]
+        "each_run": [{"file": "a", "purpose": "train", "values": {}, "ci95": {}}]
     }
     tied["indistinguishable_from"][0]["per_run"] = True
     assert (
