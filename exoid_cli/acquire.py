@@ -67,6 +67,7 @@ def acquire(
       exoid acquire --run with_human_train --trajectory mine.toml -o a.parquet
     """
     folder = open_experiment(config)
+    experiment = folder.experiment
     if run is None:
         if trajectory or output:
             raise InputError("--run: missing; --trajectory and -o are of one run, name it")
@@ -74,22 +75,16 @@ def acquire(
         options = [name for name, is_given in given.items() if is_given]
 
         def ask(step: "Step") -> list[str]:
-            return [*ask_before(folder.experiment, step, yes=yes), *options]
+            return [*ask_before(experiment, step, yes=yes), *options]
 
         run_stages(context, folder, "acquire", again=again, before=ask)
         return
-    folder.experiment.run_named(run)
+    experiment.run_named(run)
     if trajectory is None or output is None:
         step = folder.step("acquire", run)
         trajectory, output = trajectory or step.inputs[0], output or step.target
     _record(
-        folder.experiment,
-        run,
-        trajectory,
-        output,
-        yes=yes,
-        overwrite=overwrite,
-        reset_faults=reset_faults,
+        experiment, run, trajectory, output, yes=yes, overwrite=overwrite, reset_faults=reset_faults
     )
 
 
@@ -128,11 +123,8 @@ def _record(
                     confirm(rig, settings, trajectory, motion, rate)
             rigs.append(rig)
             if rig.embedded:
-                starting.enter_context(
-                    console.starting(
-                        "starting the virtual rig; the first start compiles, up to a minute"
-                    )
-                )
+                what = "starting the virtual rig; the first start compiles, up to a minute"
+                starting.enter_context(console.starting(what))
 
         def report(progress: "Progress") -> None:
             if not reports:
@@ -163,14 +155,7 @@ def _record(
             f" than {1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower"
             " acquire.sample_rate_hz"
         )
-    console.emit(
-        {
-            "path": outcome.path,
-            "samples": outcome.samples,
-            "missed": outcome.missed,
-            "left_out": outcome.left_out,
-        }
-    )
+    console.emit({key: getattr(outcome, key) for key in ("path", "samples", "missed", "left_out")})
     console.say(f"{outcome.path}: {outcome.samples} samples of run {run}, {outcome.missed} missed")
 
 

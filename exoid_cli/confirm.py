@@ -42,11 +42,9 @@ def confirm(
             f" rad/s; limits {low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s,"
             f" {drive.torque_nm:g} N·m"
         )
-    cuffs = (
-        f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
-        if rig.sensor
-        else "none on the cuffs"
-    )
+    cuffs = "none on the cuffs"
+    if rig.sensor:
+        cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
     lines += [
         f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C"

@@ -11,11 +11,11 @@ import shlex
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cached_property
 from pathlib import Path
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from textwrap import TextWrapper
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
@@ -68,15 +68,9 @@ class Console:
 
     def note(self, text: str) -> None:
         """Print a remark on the line above, indented and broken between words."""
-        hanging = "    " if text.startswith("- ") else "  "
-        for line in wrap(
-            text,
-            self.out.width,
-            initial_indent="  ",
-            subsequent_indent=hanging,
-            break_long_words=False,
-            break_on_hyphens=False,
-        ):
+        wrapper = TextWrapper(self.out.width, "  ", "    " if text.startswith("- ") else "  ")
+        wrapper.break_long_words = wrapper.break_on_hyphens = False
+        for line in wrapper.wrap(text):
             self.say(line)
 
     def wrote(self, folder: Path, *names: str) -> None:
@@ -108,19 +102,14 @@ class Console:
         widths = column_widths(headings, cells, self.out.width)
         table = Table(box=None, pad_edge=False)
         for heading, width in zip(headings, widths, strict=True):
-            table.add_column(
-                heading,
-                justify="right" if heading in right else "left",
-                overflow="fold",
-                width=width,
-            )
+            justify: Literal["left", "right"] = "right" if heading in right else "left"
+            table.add_column(heading, justify=justify, overflow="fold", width=width)
         for row in cells:
-            table.add_row(
-                *(
-                    Text(text if width is None else break_at_slashes(text, width))
-                    for text, width in zip(row, widths, strict=True)
-                )
+            broken = (
+                text if width is None else break_at_slashes(text, width)
+                for text, width in zip(row, widths, strict=True)
             )
+            table.add_row(*map(Text, broken))
         with self.out.capture() as captured:
             self.out.print(table)
         # rich pads the last column with spaces, which would be copied with the text.
@@ -162,40 +151,25 @@ class Console:
         self.err.print(_as_text(f"exoid: {' '.join(text.split())}", "red"), soft_wrap=True)
 
     @contextmanager
-    def progress(self, what: str, total: float) -> Iterator[Callable[..., None]]:
-        """Show a bar while the block runs; yield ``report(done, note="")``."""
+    def progress(self, what: str, total: float | None) -> Iterator[Callable[..., None]]:
+        """Show a bar, or a spinner without a total; yield ``report(done, note="")``."""
         if not self._may_move:
             yield lambda done, note="": None
             return
-        from rich import progress
+        from rich import progress as rich
 
-        columns = (
-            progress.TextColumn("{task.description}"),
-            progress.BarColumn(),
-            progress.TextColumn("{task.fields[note]}"),
-            progress.TimeElapsedColumn(),
-            progress.TimeRemainingColumn(),
-        )
-        with progress.Progress(*columns, console=self.err, transient=True) as bar:
+        words, elapsed = rich.TextColumn("{task.description}"), rich.TimeElapsedColumn()
+        columns: list[Any] = [rich.SpinnerColumn("line"), words, elapsed]
+        if total is not None:
+            note = rich.TextColumn("{task.fields[note]}")
+            columns = [words, rich.BarColumn(), note, elapsed, rich.TimeRemainingColumn()]
+        with rich.Progress(*columns, console=self.err, transient=True) as bar:
             task = bar.add_task(what, total=total, note="")
             yield lambda done, note="": bar.update(task, completed=done, note=note)
 
-    @contextmanager
-    def working(self, what: str) -> Iterator[None]:
+    def working(self, what: str) -> AbstractContextManager[Any]:
         """Show a spinner and the elapsed time while the block runs."""
-        if not self._may_move:
-            yield
-            return
-        from rich import progress
-
-        columns = (
-            progress.SpinnerColumn("line"),
-            progress.TextColumn("{task.description}"),
-            progress.TimeElapsedColumn(),
-        )
-        with progress.Progress(*columns, console=self.err, transient=True) as line:
-            line.add_task(what, total=None)
-            yield
+        return self.progress(what, None)
 
     @contextmanager
     def starting(self, what: str) -> Iterator[None]:

@@ -110,10 +110,8 @@ def _show(file: str, quality: "Quality") -> None:
         numbers="value",
     )
     console.say("")
-    errors = [
-        (name, f"{value:.2g}", quality.units[name])
-        for name, value in quality.standard_errors.items()
-    ]
+    stated = quality.standard_errors.items()
+    errors = [(name, f"{value:.2g}", quality.units[name]) for name, value in stated]
     console.table(
         ("parameter", "expected standard error", "unit"), errors, numbers="expected standard error"
     )
@@ -122,11 +120,8 @@ def _show(file: str, quality: "Quality") -> None:
     headings = ("joint", "quantity", "unit", *numbers.split(", "), "")
     rows = [
         (
-            m.joint,
-            m.quantity,
-            m.unit,
-            *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)),
-            f"{m.margin:.4f}",
+            *(m.joint, m.quantity, m.unit),
+            *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high, m.margin)),
             "" if m.kept else "OUT",
         )
         for m in quality.margins

@@ -66,14 +66,10 @@ def detect(
     if output:
         from pipelines.diagnosis.detectability.figure import draw
 
-        write_text(
-            output / "detectability.json", json.dumps(document, ensure_ascii=False, indent=1) + "\n"
-        )
-        draw(
-            results,
-            output / "detectability",
-            f"What {', '.join(file.name for file in files)} would reveal",
-        )
+        text = json.dumps(document, ensure_ascii=False, indent=1)
+        write_text(output / "detectability.json", f"{text}\n")
+        title = f"What {', '.join(file.name for file in files)} would reveal"
+        draw(results, output / "detectability", title)
     console.emit(document)
     _show(results)
     if output:
@@ -160,16 +156,10 @@ def _row(one: "Detectable") -> tuple[str, ...]:
     from pipelines.wording.label import number
 
     machine = one.effect.on
-    name = (
-        one.effect.name,
-        one.effect.joint or ("whole leg" if machine.is_exoskeleton else "whole machine"),
-    )
+    whole = "whole leg" if machine.is_exoskeleton else "whole machine"
+    cause = (one.effect.name, one.effect.joint or whole)
     share = one.smallest_rms_nm / one.torque_rms_nm
     if share >= 1.0:
-        return (*name, "not to be seen", "", "")
-    return (
-        *name,
-        one.size_in_words(),
-        number(machine, one.smallest_rms_nm),
-        f"{100 * share:.1f} %",
-    )
+        return (*cause, "not to be seen", "", "")
+    rms = number(machine, one.smallest_rms_nm)
+    return (*cause, one.size_in_words(), rms, f"{100 * share:.1f} %")

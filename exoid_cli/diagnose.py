@@ -77,9 +77,8 @@ def diagnose(
     document = verdict(diagnosis)
     checked = check(document, str(output / "verdict.json"))
     machine, geometry = motions[0].machine, motions[0].geometry
-    used_settings = settings.sections_about(
-        machine.is_exoskeleton, "mechanism", "filter", "diagnose"
-    )
+    sections = ("mechanism", "filter", "diagnose")
+    used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
     shared = {"joints": motions[0].joint_metadata} | describe(files, used_settings)
     recordings = {}
     if diagnosis.each_run:  # hashing reads whole files
@@ -108,11 +107,8 @@ def diagnose(
     detectable = as_json(detectability(diagnosis.train, diagnosis.baseline, diagnosis.floor))
     with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():
-            contract.write(
-                folder / f"{name}.parquet",
-                frames[name],
-                shared | (model if name == "parameters" else {}),
-            )
+            metadata = shared | (model if name == "parameters" else {})
+            contract.write(folder / f"{name}.parquet", frames[name], metadata)
         for name, content in (("detectability", detectable), ("verdict", document)):
             text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)
             write_text(folder / f"{name}.json", f"{text}\n")

@@ -56,10 +56,9 @@ def _page(effect: type) -> None:
     console.note(description["equation"])
     console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
-    console.table(
-        headings,
-        [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters],
-    )
+    parameters = effect().parameters
+    rows = [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in parameters]
+    console.table(headings, rows)
     parts = (
         ("Runs", "runs"),
         ("Looks like", "looks_like"),
@@ -67,9 +66,8 @@ def _page(effect: type) -> None:
         ("To confirm", "confirm"),
         ("Source", "source"),
     )
-    for title, key in ((title, key) for title, key in parts if description[key]):
-        text = (
-            description[key] if isinstance(description[key], str) else ", ".join(description[key])
-        )
-        console.say(f"\n{title}")
-        console.note(text)
+    for title, key in parts:
+        text = description[key]
+        if text:
+            console.say(f"\n{title}")
+            console.note(text if isinstance(text, str) else ", ".join(text))

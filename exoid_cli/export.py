@@ -78,17 +78,14 @@ def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
 
     if output is None:
         return model.with_suffix(chosen.suffix)
-    path = (
-        output if output.suffix and not output.is_dir() else output / f"{model.stem}{chosen.suffix}"
-    )
-    other = next(
-        (format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None
-    )
-    if other:
-        raise SettingsError(
-            f"-o {path}: is a file name of --to {other}, expected {chosen.suffix} with --to"
-            f" {chosen.name}"
-        )
+    is_file = output.suffix and not output.is_dir()
+    path = output if is_file else output / f"{model.stem}{chosen.suffix}"
+    for other in FORMATS:
+        if other.suffix == path.suffix != chosen.suffix:
+            raise SettingsError(
+                f"-o {path}: is a file name of --to {other.name}, expected {chosen.suffix} with"
+                f" --to {chosen.name}"
+            )
     return path
 
 
@@ -122,19 +119,10 @@ def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path])
         for term, holding in holdings
     ]
     written = [str(file) for file in files]
-    console.emit(
-        {
-            "to": chosen.name,
-            "run": exported.run,
-            "files": written,
-            "warnings": exported.driving(),
-            "terms": terms,
-        }
-    )
-    console.table(
-        ("term", "held", "how"),
-        [(term.effect.label, holding.degree, holding.how) for term, holding in holdings],
-    )
+    about = {"to": chosen.name, "run": exported.run, "files": written}
+    console.emit(about | {"warnings": exported.driving(), "terms": terms})
+    rows = [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
+    console.table(("term", "held", "how"), rows)
     for sentence in exported.driving():
         console.warn(sentence)
     for term, holding in holdings:

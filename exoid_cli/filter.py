@@ -43,9 +43,8 @@ def filter_(
         run_stages(context, folder, "filter", again=again)
         return
     settings = settings_in_force(config).filter.changed(cutoff_hz=cutoff_hz)
-    results = [
-        _filter(file, target, settings) for file, target in _targets(files or [], output, config)
-    ]
+    targets = _targets(files or [], output, config)
+    results = [_filter(file, target, settings) for file, target in targets]
     console.emit(results[0] if len(results) == 1 else results)
 
 
@@ -76,9 +75,7 @@ def _filter(recording: Path, output: Path, settings: "FilterSettings") -> dict[s
 
     with console.working(f"filtering {recording.name}"):
         motion = filtered(RECORDING.scan(recording), settings)
-        provenance = describe(
-            inputs=[recording], config={"filter": settings.model_dump(mode="json")}
-        )
+        provenance = describe([recording], {"filter": settings.model_dump(mode="json")})
         summary = Summary(motion)
         MOTION.write_pieces(output, summary.passing(motion.pieces()), motion.metadata | provenance)
     gaps = "no gap" if summary.segments == 1 else f"{summary.segments} segments"

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from pipelines.mechanics.machine import Machine
     from pipelines.mechanics.run import Run
 
+REMARKS = ("collinear", "unrealizable", "remarks", "angle_noise")
+"""Sentences on a model, in the metadata of its file."""
+
 
 def identify(
     context: typer.Context,
@@ -109,12 +112,8 @@ def identify(
     runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
-        model = fit(
-            runs,
-            estimator,
-            _extension(effect or [], causes, runs, files),
-            reversals=options.reversals,
-        )
+        extension = _extension(effect or [], causes, runs, files)
+        model = fit(runs, estimator, extension, reversals=options.reversals)
     used_settings = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
     config_used = used_settings | {"identify": options.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
@@ -157,10 +156,7 @@ def _write(
         "geometry": run.machine.metadata(run.geometry),
         "one_step": model.one_step.tolist(),
         "validation": model.validation.as_json(),
-        "collinear": model.collinear,
-        "unrealizable": model.unrealizable,
-        "remarks": model.remarks,
-        "angle_noise": model.angle_noise,
+        **{key: getattr(model, key) for key in REMARKS},
     }
     if model.each_run:
         described["each_run"] = model.each_run
@@ -184,17 +180,9 @@ def _report(model: "Identified", machine: "Machine") -> None:
 
     rows = model.parameters.to_dict("records")
     unit = either(joint.unit("torque") for joint in machine.joints)
-    console.emit(
-        {
-            "parameters": rows,
-            "validation": model.validation.as_json(),
-            "collinear": model.collinear,
-            "unrealizable": model.unrealizable,
-            "method": model.method,
-            "remarks": model.remarks,
-            "angle_noise": model.angle_noise,
-        }
-    )
+    about = {"parameters": rows, "validation": model.validation.as_json()}
+    keys = ("collinear", "unrealizable", "method", "remarks", "angle_noise")
+    console.emit(about | {key: getattr(model, key) for key in keys})
     show_parameters(rows, machine.joints, model.one_step.tolist())
     console.say("")
     scores = {**model.validation.by_run, "all": model.validation.pooled}
@@ -202,10 +190,8 @@ def _report(model: "Identified", machine: "Machine") -> None:
         ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}"),
         [
             (
-                run,
-                joint,
-                format_value(score.rmse[j], machine.joints, 3),
-                format_value(score.rmse_unmasked[j], machine.joints, 3),
+                *(run, joint),
+                *(format_value(x[j], machine.joints, 3) for x in (score.rmse, score.rmse_unmasked)),
                 format_value(score.torque_rms[j], machine.joints, 2),
             )
             for run, score in scores.items()

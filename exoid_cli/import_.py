@@ -182,11 +182,8 @@ def _say_in_short(logs: list[dict[str, Any]]) -> None:
             _say_recording(recording)
         for finding in _findings(log):
             # Findings of one kind differ in their numbers only, as in "2 rows left out".
-            kind = (
-                finding.where,
-                re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where)),
-            )
-            seen.setdefault(kind, []).append((finding, log["file"].name))
+            words = re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where))
+            seen.setdefault((finding.where, words), []).append((finding, log["file"].name))
     if seen:
         console.say("\nSeen, with the numbers of the first file; `exoid show` has those of each:")
     for of_kind in seen.values():

@@ -27,11 +27,9 @@ def init(
     from pipelines.settings.template import create
 
     command = Path(sys.argv[0])
-    words = (
-        [str(command.resolve())]
-        if command.name == "exoid"
-        else [sys.executable, "-m", "exoid_cli.app"]
-    )
+    words = [sys.executable, "-m", "exoid_cli.app"]
+    if command.name == "exoid":
+        words = [str(command.resolve())]
     create(folder, exoid=shlex.join(words))
     written = [folder / name for name in ("exoid.toml", "rigs", "Makefile")]
     console.emit({"folder": folder, "written": written})

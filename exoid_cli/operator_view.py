@@ -86,9 +86,8 @@ class OperatorView:
         """Set the progress to show."""
         if progress.row is not None:
             # A sensor that is read every second cycle keeps its last value.
-            self._forces = np.where(
-                np.isnan(progress.row.forces), self._forces, progress.row.forces
-            )
+            forces = progress.row.forces
+            self._forces = np.where(np.isnan(forces), self._forces, forces)
         if self._progress is not None and progress.missed > self._progress.missed:
             self._lost_at = time.monotonic()
         self._progress = progress
@@ -148,9 +147,8 @@ class OperatorView:
         progress = self._progress
         if progress is None:
             return []
-        reason = wrap(
-            progress.abort or "", max(width - 1, 4), max_lines=abort_lines, placeholder="..."
-        )
+        room = max(width - 1, 4)
+        reason = wrap(progress.abort or "", room, max_lines=abort_lines, placeholder="...")
         head = [self._head(progress, width), *[[(text, URGENT)] for text in reason], []]
         gauges = [gauge.line() for gauge in self._gauges()]
         if not gauges:
@@ -179,7 +177,6 @@ def plain_line(progress: "Progress") -> str:
     if progress.row is not None:
         angles = ", ".join(f"{drive.angle:+.3f}" for drive in progress.row.drives)
         torques = ", ".join(f"{drive.torque:+.1f}" for drive in progress.row.drives)
-        text += (
-            f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
-        )
+        text += f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz"
+        text += f"  {progress.missed} missed"
     return f"{text}  {progress.abort}" if progress.abort else text

@@ -24,29 +24,18 @@ def show_parameters(
     one_step: Sequence[float] | None = None,
 ) -> None:
     """Print the rows of a parameters/1 table, and the values of a one-step fit if given."""
-    one_step_cells = [[format_value(value, joints)] for value in one_step or ()]
-    console.table(
-        (
-            "parameter",
-            "value",
-            "95 % interval",
-            "unit",
-            *(["one step"] if one_step_cells else []),
-            "step",
-        ),
-        [
-            (
-                _name(row),
-                format_value(row["value"], joints),
-                _interval(row, joints),
-                row["unit"],
-                *(one_step_cells[k] if one_step_cells else []),
-                row["step"],
-            )
-            for k, row in enumerate(rows)
-        ],
-        numbers="value, one step",
-    )
+    columns = {
+        "parameter": [_name(row) for row in rows],
+        "value": [format_value(row["value"], joints) for row in rows],
+        "95 % interval": [_interval(row, joints) for row in rows],
+        "unit": [row["unit"] for row in rows],
+        "one step": [format_value(value, joints) for value in one_step or ()],
+        "step": [row["step"] for row in rows],
+    }
+    if not one_step:
+        del columns["one step"]
+    cells = zip(*columns.values(), strict=True)
+    console.table(tuple(columns), cells, numbers="value, one step")
 
 
 def _interval(row: Mapping[Any, Any], joints: "Sequence[Joint]") -> str:

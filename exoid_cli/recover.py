@@ -70,25 +70,16 @@ def _in_words(recording: "Recovery") -> str:
     if summary.cut_off:
         seconds = summary.cut_off / summary.rate_hz
         text += f"; {summary.cut_off} more ({seconds:.3f} s) were planned"
-    text += (
-        f"; {summary.missed} are missing in {len(summary.gaps)} gaps"
-        if summary.gaps
-        else "; no gaps"
+    gaps = (
+        f"{summary.missed} are missing in {len(summary.gaps)} gaps" if summary.gaps else "no gaps"
     )
+    text += f"; {gaps}"
     if summary.damaged:
         text += "; the journal is damaged or cut off, and is kept: check the disk"
     return f"{text}; {summary.abort or 'the run had ended, only its recording was not written'}"
 
 
 def _as_json(recording: "Recovery") -> dict:
-    summary = recording.summary
-    return {
-        "path": recording.path,
-        "samples": summary.samples,
-        "planned": summary.planned,
-        "cut_off": summary.cut_off,
-        "gaps": summary.gaps,
-        "abort": summary.abort,
-        "damaged": summary.damaged,
-        "checked": True,
-    }
+    keys = ("samples", "planned", "cut_off", "gaps", "abort", "damaged")
+    summary = {key: getattr(recording.summary, key) for key in keys}
+    return {"path": recording.path} | summary | {"checked": True}

@@ -1,5 +1,6 @@
 """``exoid report``: all results on one page that opens offline."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,18 +91,9 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
         warn_of_unreadable(session)
     page = compare(first, second, titles_of(first, second))
     write_text(output, page.text)
-    differing = [
-        {"name": one.name, "first": one.first, "second": one.second} for one in page.settings
-    ]
-    console.emit(
-        {
-            "path": str(output),
-            "changed": page.changed,
-            "judged": page.judged,
-            "headline": page.headline,
-            "settings": differing,
-        }
-    )
+    counts = {"changed": page.changed, "judged": page.judged, "headline": page.headline}
+    settings = [asdict(one) for one in page.settings]
+    console.emit({"path": str(output)} | counts | {"settings": settings})
     console.say(f"{page.headline}{' (95 %)' if page.judged else ''}.")
     for line in page.errors:
         console.say(line)

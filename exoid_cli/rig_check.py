@@ -65,10 +65,8 @@ def check(
     from pipelines.errors import DeviceError
 
     if file is None:
-        experiment = open_experiment(
-            config, problem="no rig file is given", allow_damaged=True
-        ).experiment
-        file = experiment.file(experiment.acquire.rig)
+        folder = open_experiment(config, problem="no rig file is given", allow_damaged=True)
+        file = folder.experiment.file(folder.experiment.acquire.rig)
     if rate_hz is None and (config or in_experiment_folder()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":
@@ -93,25 +91,19 @@ def check(
 def _show(report: "RigReport") -> None:
     console.say("\nOne request at a time")
     rows = [(device.name, _identity(device), *_times(device.latency)) for device in report.devices]
-    console.table(
-        ("device", "identity", "min ms", "median", "99 %", "max", "log scale"),
-        rows,
-        numbers="min ms, median, 99 %, max",
-    )
+    headings: tuple[str, ...]
+    headings = ("device", "identity", "min ms", "median", "99 %", "max", "log scale")
+    console.table(headings, rows, numbers=", ".join(headings[2:-1]))
     drives = [device for device in report.devices if "angle" in device.values]
     if drives:
         console.say("\nDrives, disabled")
-        console.table(
-            ("", *DRIVE.values(), "samples/s", "clock s/s"),
-            map(_drive, drives),
-            numbers=", ".join((*DRIVE.values(), "samples/s", "clock s/s")),
-        )
+        headings = ("", *DRIVE.values(), "samples/s", "clock s/s")
+        console.table(headings, map(_drive, drives), numbers=", ".join(headings[1:]))
     sensors = [device for device in report.devices if FORCES[0] in device.values]
     if sensors:
         console.say("\nSensors, mean ± noise in N")
-        console.table(
-            ("", "x", "y", "z", "samples/s"), map(_sensor, sensors), numbers="x, y, z, samples/s"
-        )
+        headings = ("", "x", "y", "z", "samples/s")
+        console.table(headings, map(_sensor, sensors), numbers=", ".join(headings[1:]))
     if report.answers:
         console.say("\nMoved by the drives")
         rows = [
@@ -131,11 +123,10 @@ def _show(report: "RigReport") -> None:
 def _identity(device: "DeviceReport") -> str:
     if not device.connected:
         return "no connection"
-    wrong = [entry for entry in device.identity if entry["found"] != entry["expected"]]
+    read = [(entry["found"], entry["expected"]) for entry in device.identity]
+    wrong = [f"0x{value:04X}, expected 0x{due:04X}" for value, due in read if value != due]
     if wrong:
-        return ", ".join(
-            f"0x{entry['found']:04X}, expected 0x{entry['expected']:04X}" for entry in wrong
-        )
+        return ", ".join(wrong)
     if device.latency is None:
         return "no answer"
     return "as expected" if device.identity else "none asked for"
@@ -174,24 +165,18 @@ def _clock(device: "DeviceReport") -> tuple[str, str]:
 
 
 def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
-    console.say(
-        f"\nCycles of {what}: {rate.cycles_hz:.0f} a second"
-        + (f", wanted {wanted_hz:g}" if wanted_hz else "")
-    )
+    wanted = f", wanted {wanted_hz:g}" if wanted_hz else ""
+    console.say(f"\nCycles of {what}: {rate.cycles_hz:.0f} a second{wanted}")
     if wanted_hz:
         console.note(f"{rate.late:.1%} of them take longer than a sample")
     cycle = rate.cycle
     steps = len(cycle.histogram)
-    edges = [
-        cycle.least * (cycle.most / cycle.least) ** (k / steps) * 1e3 for k in range(steps + 1)
-    ]
-    bars = [(k, count) for k, count in enumerate(cycle.histogram) if count]
+    ratio = cycle.most / cycle.least
+    edges = [cycle.least * ratio ** (k / steps) * 1e3 for k in range(steps + 1)]
+    most = max(cycle.histogram)
     rows = [
-        (
-            f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms",
-            count,
-            "█" * -(-count * 30 // max(cycle.histogram)),
-        )
-        for k, count in bars
+        (f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms", count, "█" * -(-count * 30 // most))
+        for k, count in enumerate(cycle.histogram)
+        if count
     ]
     console.table(("duration", "cycles", ""), rows, numbers="cycles")

@@ -83,9 +83,7 @@ def _refuse_unknown(stages: Sequence[str], folder: ExperimentFolder) -> None:
     from pipelines.workflow.graph import STAGES
 
     known = list(dict.fromkeys(step.stage for step in folder.steps))
-    for stage in stages:
-        if stage in known:
-            continue
+    for stage in (stage for stage in stages if stage not in known):
         if stage in STAGES:
             raise InputError(f"{stage}: {why_no_step(stage)}; leave it out")
         raise InputError(

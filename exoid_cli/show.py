@@ -43,9 +43,9 @@ def show(
     complete = _show_content(inspection)
     if inspection.columns and not complete:
         headings = ("column", "unit", "type", "min", "max", "nulls")
-        rows = [[column[heading] for heading in headings] for column in inspection.columns]
+        rows = [[_number(column[key]) for key in headings] for column in inspection.columns]
         console.say(f"\n{inspection.rows} rows")
-        console.table(headings, [_shortened(row) for row in rows], numbers="min, max, nulls")
+        console.table(headings, rows, numbers="min, max, nulls")
     _show_facts("Where it came from", _folded(inspection.origin))
     if not (complete and inspection.contract.startswith("verdict/")):
         _show_facts("Metadata", inspection.metadata)
@@ -63,10 +63,8 @@ def _show_content(inspection: "Inspection") -> bool:
         from exoid_cli.parameters_view import show_parameters
 
         console.say("")
-        show_parameters(
-            PARAMETERS.load(inspection.file)[0].to_pylist(),
-            joints_of(inspection.metadata),
-        )
+        rows = PARAMETERS.load(inspection.file)[0].to_pylist()
+        show_parameters(rows, joints_of(inspection.metadata))
         return True
     if inspection.contract == CANDIDATES.label:
         _show_candidates(CANDIDATES.load(inspection.file)[0].to_pylist())
@@ -90,10 +88,8 @@ def _show_candidates(rows: list[dict[Any, Any]]) -> None:
 
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:first]:
-        console.say(
-            f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}:"
-            f" {row['verdict']}"
-        )
+        causes = " + ".join(map(any_label_in_words, row["causes"]))
+        console.say(f"\n{row['rank']} {causes}: {row['verdict']}")
         console.note(labels_in_words(row["reason"], labels))
     if len(rows) > first:
         console.say(f"\n{len(rows) - first} more are in the file")
@@ -103,13 +99,11 @@ def _folded(origin: dict[str, Any]) -> dict[str, Any]:
     """Shorten the origin: the number of settings, and the first characters of each hash."""
     folded = dict(origin)
     if "config" in origin:
-        folded["config"] = (
-            f"{len(_lines({'config': origin['config']}))} settings; --json shows them"
-        )
+        settings = _lines({"config": origin["config"]})
+        folded["config"] = f"{len(settings)} settings; --json shows them"
     if "software" in origin:
-        folded["software"] = ", ".join(
-            f"{name} {version}" for name, version in origin["software"].items()
-        )
+        versions = (f"{name} {version}" for name, version in origin["software"].items())
+        folded["software"] = ", ".join(versions)
     if "inputs" in origin:
         folded["inputs"] = {
             entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]
@@ -130,9 +124,9 @@ def _show_facts(title: str, facts: dict[str, Any]) -> None:
 
 def _is_table(value: Any) -> bool:
     """Return whether a value is several objects of the same few keys, none of them nested."""
-    if not (
-        isinstance(value, list) and len(value) > 1 and all(isinstance(row, dict) for row in value)
-    ):
+    if not isinstance(value, list) or len(value) < 2:
+        return False
+    if not all(isinstance(row, dict) for row in value):
         return False
     return len(value[0]) <= COLUMNS and all(
         row.keys() == value[0].keys()
@@ -165,8 +159,8 @@ def _in_short(value: Any) -> str:
         return f"{rows} values; --json shows them"
     if isinstance(value, list):
         return ", ".join(map(_in_short, value)) or "none"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return str(_number(value))
 
 
-def _shortened(row: list[Any]) -> list[Any]:
-    return [f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row]
+def _number(value: Any) -> Any:
+    return f"{value:.6g}" if isinstance(value, float) else value

@@ -130,9 +130,8 @@ def _track(
         gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
-    described = describe(
-        inputs, settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
-    ) | {
+    config = settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
+    described = describe(inputs, config) | {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
@@ -152,10 +151,9 @@ def _track(
     if chosen.figures:
         from pipelines.simulation.figures import draw_sweep, draw_tracking
 
+        limits = chosen.torque_limit_nm, chosen.settled_after_s
         with console.working("drawing"):
-            draw_tracking(
-                frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s
-            )
+            draw_tracking(frame, plant.joints, output, *limits)
             if len(gains):
                 draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
     worst = loop.worst_error(chosen.settled_after_s)
@@ -222,10 +220,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         result["closed_loop_rmse_rad"] = dict(zip(names, loop.angle_rmse.tolist(), strict=True))
         result["closed_loop_rmse_nm"] = dict(zip(names, loop.torque_rmse.tolist(), strict=True))
         scores = {key: value for key, value in result.items() if key.startswith("closed")}
-        controller = motion.metadata["controller"]
-        SIMULATION.write(
-            closed_loop_file, closed_loop, shared | scores | {"controller": controller}
-        )
+        about_loop = scores | {"controller": motion.metadata["controller"]}
+        SIMULATION.write(closed_loop_file, closed_loop, shared | about_loop)
     if settings.simulate.figures:
         from pipelines.simulation.figures import draw_replay
 
@@ -249,9 +245,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:
     from pipelines.contracts.joints import either
 
-    angle, torque = (
-        either(joint.unit(quantity) for joint in joints) for quantity in ("angle", "torque")
-    )
+    angle = either(joint.unit("angle") for joint in joints)
+    torque = either(joint.unit("torque") for joint in joints)
     headings = {
         "simulation_rmse_rad": f"1 s windows ({angle})",
         "closed_loop_rmse_rad": f"closed loop ({angle})",

@@ -38,14 +38,10 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
         [*(_damaged_as_json(file) for file in folder.damaged), *(_as_json(one) for one in judged)]
     )
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
-    damaged = [
-        ("import", "damaged", file.relative_to(folder.out).as_posix(), REMEDY)
-        for file in folder.damaged
-    ]
-    console.table(
-        ("stage", "state", "result", "why"),
-        [*damaged, *(_line(stage, folder.out) for stage in stages)],
-    )
+    files = [file.relative_to(folder.out).as_posix() for file in folder.damaged]
+    rows = [("import", "damaged", file, REMEDY) for file in files]
+    rows += [_line(stage, folder.out) for stage in stages]
+    console.table(("stage", "state", "result", "why"), rows)
     if folder.damaged:
         raise InputError(damage(folder.damaged))
     todo = sum(not one.done for one in judged)
@@ -56,15 +52,13 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     console.say(f"\n{to_do if todo else 'Everything is up to date.'}")
 
 
-def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, ...]:
+def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     count = Counter(one.state.value for one in stage)
     state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
-    why = (
-        reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "")
-        if reasons
-        else ""
-    )
+    why = reasons[0] if reasons else ""
+    if len(reasons) > 1:
+        why += f" (and {len(reasons) - 1} more)"
     targets = [one.step.target.relative_to(out) for one in stage]
     return stage[0].step.stage, state, _result(targets, count[state]), why
 

@@ -67,26 +67,22 @@ def _show_faults(verdict: "Verdict") -> None:
 
 def _show_findings(verdict: "Verdict") -> None:
     """Print the probability that something is missing, and the path to its cause."""
-    from pipelines.wording.findings import outcomes, rows
+    from pipelines.wording import findings
 
-    cases, tree = outcomes(verdict), rows(verdict)
+    cases, tree = findings.outcomes(verdict), findings.rows(verdict)
     if not cases:
         return
     shown = [_broken(row.words, row.depth) for row in tree]
     width = max(map(len, chain([MISSING, WHAT], *shown)))
-    for heading, lines in (
-        (MISSING, [(case.words, f"{case.probability:.2f}") for case in cases]),
-        (
-            WHAT,
-            [
-                ("\n".join(words), f"{row.probability:.2f}")
-                for words, row in zip(shown, tree, strict=True)
-            ],
-        ),
-    ):
+    tables = {
+        MISSING: [(case.words, case.probability) for case in cases],
+        WHAT: [("\n".join(s), row.probability) for s, row in zip(shown, tree, strict=True)],
+    }
+    for heading, lines in tables.items():
         if lines:
+            rows = [(words, f"{probability:.2f}") for words, probability in lines]
             console.say("")
-            console.table((heading.ljust(width), "probability"), lines, numbers="probability")
+            console.table((heading.ljust(width), "probability"), rows, numbers="probability")
 
 
 def _broken(words: str, depth: int) -> list[str]:
