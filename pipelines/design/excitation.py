@@ -77,9 +77,5 @@ def design(
     """
     geometry = geometry or Geometry()
     result = search(settings, geometry, report)
-    return Design(
-        result.trajectory,
-        quality(result.trajectory, settings, geometry),
-        settings,
-        result.stopped_by,
-    )
+    reached = quality(result.trajectory, settings, geometry)
+    return Design(result.trajectory, reached, settings, result.stopped_by)

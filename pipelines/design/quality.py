@@ -45,19 +45,16 @@ class Quality:
 
     def as_metadata(self) -> dict[str, Any]:
         """Return the quality for the metadata of ``trajectory/1``."""
-        numbers = {
-            name: getattr(self, name) for name in ("condition", "scaled_condition", "log_det")
-        }
+        names = ("condition", "scaled_condition", "log_det", "inertial_condition")
         return {
-            **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
-            "inertial_condition": (
-                self.inertial_condition if np.isfinite(self.inertial_condition) else None
-            ),
-            "standard_errors": {
-                k: v if np.isfinite(v) else None for k, v in self.standard_errors.items()
-            },
+            **_finite({name: getattr(self, name) for name in names}),
+            "standard_errors": _finite(self.standard_errors),
             "margins": [{**vars(margin), "margin": margin.margin} for margin in self.margins],
         }
+
+
+def _finite(numbers: dict[str, float]) -> dict[str, float | None]:
+    return {name: value if np.isfinite(value) else None for name, value in numbers.items()}
 
 
 def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry) -> Quality:
@@ -115,20 +112,10 @@ def _planned(
     trajectory: Trajectory, geometry: Geometry, time: NDArray, sample_rate_hz: float = 200.0
 ) -> Motion:
     q, dq, ddq = trajectory.at(time)
-    nothing = np.zeros_like(q)
-    count = len(time)
-    return Motion(
-        time,
-        q,
-        dq,
-        ddq,
-        torque=nothing,
-        load=nothing,
-        segment=np.zeros(count, np.int64),
-        valid=np.ones(count, bool),
-        sample_rate_hz=sample_rate_hz,
-        geometry=geometry,
-    )
+    nothing, segment = np.zeros_like(q), np.zeros(len(time), np.int64)
+    valid = np.ones(len(time), bool)
+    about: dict[str, Any] = {"sample_rate_hz": sample_rate_hz, "geometry": geometry}
+    return Motion(time, q, dq, ddq, nothing, segment, valid, load=nothing, **about)
 
 
 def standard_errors(
@@ -159,14 +146,12 @@ def standard_errors(
         In the units of the parameters; infinite if they are not identifiable.
     """
     duration = min(noise.duration_s, trajectory.duration_s)
-    motion = _planned(
-        trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz), sample_rate_hz
-    )
+    time = np.arange(0.0, duration, 1.0 / sample_rate_hz)
+    motion = _planned(trajectory, geometry, time, sample_rate_hz)
     weight = away_from_reversals(motion) / np.array([noise.hip_nm, noise.knee_nm])
     A = paper_model().regressor(motion) * weight[:, :, np.newaxis]
-    rho = (
-        np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if noise.correlation_s > 0.0 else 0.0
-    )
+    correlated = noise.correlation_s > 0.0
+    rho = np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if correlated else 0.0
     # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier +
     # earlier'A.
     earlier = lfilter([0.0, rho], [1.0, -rho], A, axis=0)
@@ -180,8 +165,7 @@ def standard_errors(
 
 def paper_model() -> Model:
     """Return the model of an excitation: rigid body, and friction of both joints."""
-    effects = baseline(THE_LEG, ("exo_alone",))
-    return Model.of(effects)
+    return Model.of(baseline(THE_LEG, ("exo_alone",)))
 
 
 def _parameters() -> dict[str, str]:

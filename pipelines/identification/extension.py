@@ -84,10 +84,8 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     InputError
         If there is no such effect at such a joint, or its shape is unknown.
     """
-    effects = [
-        effect_at(label, machine, _has_no_shape, "--effect", REASON)
-        for label in dict.fromkeys(labels)
-    ]
+    unique = dict.fromkeys(labels)
+    effects = [effect_at(label, machine, _has_no_shape, "--effect", REASON) for label in unique]
     return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
@@ -104,10 +102,9 @@ def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
             first = next(iter(run.pieces(0))).motion
             if effect.explains(first):
                 continue
-            column = f"{effect.joint}_temperature_c"
             raise InputError(
-                f"{run.file}: has no column {column}, on which {effect.label} depends. Record the"
-                " temperature, or leave the effect out"
+                f"{run.file}: has no column {effect.joint}_temperature_c, on which {effect.label}"
+                " depends. Record the temperature, or leave the effect out"
             )
 
 
@@ -156,15 +153,8 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
                 own[run.file] = tuple(own_term(term, table, sha256) for term in terms)
             in_run = [term for term in terms if term.effect.acts(run.run)]
             remarks += _remarks(run, path, in_run, table, sha256)
-    return Extension(
-        terms,
-        _of_shapes(table, acting),
-        _critical(table),
-        own,
-        _bodies(table),
-        hashes,
-        tuple(dict.fromkeys(remarks)),
-    )
+    shapes, unique = _of_shapes(table, acting), tuple(dict.fromkeys(remarks))
+    return Extension(terms, shapes, _critical(table), own, _bodies(table), hashes, unique)
 
 
 def _refuse_another_machine(table: Table, run: Run) -> None:
@@ -208,9 +198,8 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
     """Return the covariance of the terms' shapes, (s, s), from that of their rows."""
     stated = table.metadata.get("covariance")
     error = table.frame["std_error"].to_numpy(float)
-    covariance = np.nan_to_num(
-        np.diag(error**2) if stated is None else np.array(stated, dtype=float)
-    )
+    whole = np.diag(error**2) if stated is None else np.array(stated, dtype=float)
+    covariance = np.nan_to_num(whole)
     maps = [np.zeros((0, len(covariance)))]
     for term, rows in terms:
         effect, place = term.effect, dict(zip(rows["name"], rows.index, strict=True))
@@ -227,11 +216,8 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
 def _critical(table: Table) -> float:
     """Return the half-width of the table's intervals in standard errors."""
     frame = table.frame
-    width = (
-        ((frame["ci95_high"] - frame["value"]) / frame["std_error"])
-        .replace([np.inf, 0.0], np.nan)
-        .median()
-    )
+    widths = (frame["ci95_high"] - frame["value"]) / frame["std_error"]
+    width = widths.replace([np.inf, 0.0], np.nan).median()
     return float(width) if np.isfinite(width) else 1.96
 
 

@@ -42,9 +42,9 @@ class _RunData:
         for name in columns:
             self.squares[name] = self.squares.get(name, 0.0) + float(np.sum(scored[name] ** 2))
         chosen = frame.iloc[-self.passed % self.every :: self.every]
-        self.frame = (
-            pd.concat([self.frame, chosen], ignore_index=True) if len(self.frame) else chosen
-        )
+        if len(self.frame):
+            chosen = pd.concat([self.frame, chosen], ignore_index=True)
+        self.frame = chosen
         self.passed += len(frame)
         while len(self.frame) > MOST:
             self.frame = self.frame.iloc[::2].reset_index(drop=True)
@@ -73,9 +73,8 @@ def draw(residuals: Rows, folder: Path) -> None:
 
 
 def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
-    columns = [
-        joint.column(quantity) for joint in residuals.joints for quantity in ("residual", "torque")
-    ]
+    quantities = ("residual", "torque")
+    columns = [joint.column(name) for joint in residuals.joints for name in quantities]
     runs: dict[str, _RunData] = {}
     for piece in residuals.pieces():
         frame = piece.to_pandas()
@@ -87,28 +86,19 @@ def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
 def _prediction(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
     """Draw measured and predicted torque over time, with the residual on the same scale."""
     frame = run.frame
+    size, heights = (9, 3.2 * len(joints)), [3, 1.3] * len(joints)
     figure, axes = plt.subplots(
-        2 * len(joints),
-        1,
-        figsize=(9, 3.2 * len(joints)),
-        sharex=True,
-        height_ratios=[3, 1.3] * len(joints),
+        2 * len(joints), 1, figsize=size, sharex=True, height_ratios=heights
     )
     for j, joint in enumerate(joints):
         torque, residual = axes[2 * j], axes[2 * j + 1]
-        torque.plot(
-            frame["time_s"], frame[joint.column("torque")], color=MEASURED, lw=2.2, label="measured"
-        )
-        torque.plot(
-            frame["time_s"],
-            frame[joint.column("predicted")],
-            color=PREDICTED,
-            lw=0.9,
-            label="predicted",
-        )
+        time, measured = frame["time_s"], frame[joint.column("torque")]
+        torque.plot(time, measured, color=MEASURED, lw=2.2, label="measured")
+        predicted = frame[joint.column("predicted")]
+        torque.plot(time, predicted, color=PREDICTED, lw=0.9, label="predicted")
         torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
         torque.set_title(f"{joint.name}: {_error(run, joint)}", loc="left", fontsize=9)
-        _residual_over(residual, frame["time_s"], frame, joint)
+        _residual_over(residual, time, frame, joint)
         residual.set_ylabel(f"residual, {joint.unit('torque')}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
     axes[-1].set_xlabel("time, s")
@@ -126,9 +116,9 @@ def _residuals(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
     )
     for row, joint in zip(axes, joints, strict=True):
         against = {"time, s": "time_s"}
-        against |= {
-            f"{joint.name} {q}, {joint.unit(q)}": joint.column(q) for q in ("angle", "velocity")
-        }
+        for quantity in ("angle", "velocity"):
+            label = f"{joint.name} {quantity}, {joint.unit(quantity)}"
+            against[label] = joint.column(quantity)
         for axis, (label, column) in zip(row, against.items(), strict=True):
             _residual_over(axis, frame[column], frame, joint, dots=True)
             axis.set_xlabel(label)
@@ -149,22 +139,14 @@ def _residual_over(
     if not dots:
         axis.plot(x, np.where(scored, residual, np.nan), color=RESIDUAL, lw=0.7)
         return
-    axis.plot(
-        x[~scored],
-        residual[~scored],
-        ".",
-        ms=1.2,
-        color=MEASURED,
-        alpha=0.5,
-        label="near a reversal",
-    )
+    left_out, label = ~scored, "near a reversal"
+    axis.plot(x[left_out], residual[left_out], ".", ms=1.2, color=MEASURED, alpha=0.5, label=label)
     axis.plot(x[scored], residual[scored], ".", ms=1.2, color=RESIDUAL, alpha=0.6, label="scored")
     axis.axhline(0, color="black", lw=0.6)
     if not scored.any():
         return
-    bins = frame.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[
-        joint.column("residual")
-    ]
+    groups = frame.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)
+    bins = groups[joint.column("residual")]
     mean = bins.mean().where(bins.count() >= FEWEST)
     axis.plot([b.mid for b in mean.index], mean, color=PREDICTED, lw=1.6, label="mean")
     # Residuals of a sticking joint are ten times the others and are cut off.

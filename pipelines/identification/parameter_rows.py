@@ -37,10 +37,9 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
         yield from _of_body(bodies, "with_human", "inertia")
         yield from _of_body(wearer, "human", "inertia")
     for term, slope in terms:
-        if term.effect.name not in BASELINE:
-            yield from rows_of(
-                term.effect, term.values, slope, "extension", positive=term.effect.shape
-            )
+        effect = term.effect
+        if effect.name not in BASELINE:
+            yield from rows_of(effect, term.values, slope, "extension", positive=effect.shape)
 
 
 def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray]]:

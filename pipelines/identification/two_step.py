@@ -9,6 +9,7 @@ follows, and twice for the covariance of the residual.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -104,11 +105,8 @@ class Identified:
                 if term is not None:
                     physical = effect.physical(term.values)
                     values = {name: float(physical[at]) for name, at in places.items()}
-                entry = {
-                    "name": run.file,
-                    "sha256": self.extension.recordings[run.file],
-                    "values": values,
-                }
+                sha256 = self.extension.recordings[run.file]
+                entry = {"name": run.file, "sha256": sha256, "values": values}
                 by_label.setdefault(effect.label, []).append(entry)
         return by_label
 
@@ -155,17 +153,14 @@ def identify(
     table_rows = list(rows(training, values))
     covariance = _covariance(table_rows, steps, extension, training)
     error = np.sqrt(np.diag(covariance))
-    table = table_of(
-        table_rows, np.where(error > 0.0, error, np.nan), _critical(table_rows, steps, extension)
-    )
+    known_error = np.where(error > 0.0, error, np.nan)
+    table = table_of(table_rows, known_error, _critical(table_rows, steps, extension))
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
         covariance=covariance,
         one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),
-        validation=validate(
-            judged, lambda run: _as_model(training, values, run), training.cutoff_hz
-        ),
+        validation=validate(judged, partial(_as_model, training, values), training.cutoff_hz),
         runs=(*training.runs, *judged),
         training=training,
         values=values,
@@ -253,9 +248,9 @@ def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
     """Return the rigid body of each kind of run, and the wearer's, (k,) each."""
     layout = training.layout
     bodies = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
-    return bodies | (
-        {"human": values[layout.bodies[-1]]} if "human" in _body_keys(training) else {}
-    )
+    if "human" in _body_keys(training):
+        bodies["human"] = values[layout.bodies[-1]]
+    return bodies
 
 
 def _as_model(training: Training, values: NDArray, run: Run) -> Model | None:

@@ -84,13 +84,11 @@ def validate(
     for motion in motions:
         model = model_of(motion)
         if model is not None:
-            before = sums.get(motion.run, _Sums.none(len(joints)))
-            of_run = (
-                _Sums.of(r, residual_of(r, model.linear_values))
-                for r in regressions(motion, model, cutoff_hz)
-            )
             # Sums of squares add up over runs and pieces; rms errors do not.
-            sums[motion.run] = sum(of_run, before)
+            of_run = sums.get(motion.run, _Sums.none(len(joints)))
+            for r in regressions(motion, model, cutoff_hz):
+                of_run = of_run + _Sums.of(r, residual_of(r, model.linear_values))
+            sums[motion.run] = of_run
     pooled = sum(sums.values(), _Sums.none(len(joints)))
     return Validation(
         joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()}

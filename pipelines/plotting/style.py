@@ -1,4 +1,4 @@
-"""How exoid's figures look, and how they are written."""
+"""The style of exoid's figures, and the writing of their files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,7 +36,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> N
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
     for kind in kinds:
         with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
-            # Without its date a PDF that shows the same is the same, and nothing goes stale for it.
+            # Without a date, equal figures are equal files, and nothing becomes stale.
             undated = {"CreationDate": None} if kind == "pdf" else None
             figure.savefig(path, format=kind, bbox_inches=box, metadata=undated)
     plt.close(figure)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -62,29 +63,14 @@ def draw_sweep(sweep: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, cho
         figure, axis = plt.subplots(figsize=(6, 3.6))
         gains = sweep["feedback_gain_nm_s_rad"]
         for joint, colour in zip(joints, JOINT_COLOURS, strict=False):
-            axis.plot(
-                gains,
-                1e3 * sweep[joint.column("error")],
-                "o-",
-                ms=3.5,
-                color=colour,
-                label=joint.name,
-            )
+            errors = 1e3 * sweep[joint.column("error")]
+            axis.plot(gains, errors, "o-", ms=3.5, color=colour, label=joint.name)
         axis.axvline(chosen, color=GREY, lw=0.9, ls=":")
-        axis.annotate(
-            "chosen",
-            (chosen, 0.97),
-            xycoords=("data", "axes fraction"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            color=GREY,
-            va="top",
-        )
-        axis.set(
-            xlabel="feedback gain Kv, N·m·s/rad",
-            ylabel="largest settled error, mrad",
-            ylim=(0, None),
-        )
+        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "va": "top"}
+        offset: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points"}
+        axis.annotate("chosen", (chosen, 0.97), color=GREY, **place, **offset)
+        axis.set(xlabel="feedback gain Kv, N·m·s/rad", ylabel="largest settled error, mrad")
+        axis.set_ylim(0, None)
         axis.legend()
         axis.set_title("More feedback, less error", loc="left", fontweight="bold")
         save(figure, folder / "kv-sweep")
@@ -130,9 +116,8 @@ def draw_replay(
             axis.set_xlabel("time, s")
         axes[0, 0].set_title("under the recorded torque, 1 s windows", loc="left", fontsize=9)
         if closed_loop is not None:
-            axes[0, 1].set_title(
-                "in the drives' loop under the recorded references", loc="left", fontsize=9
-            )
+            title_of_loop = "in the drives' loop under the recorded references"
+            axes[0, 1].set_title(title_of_loop, loc="left", fontsize=9)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right", ncols=2)
         figure.suptitle(title, x=0.02, ha="left", fontweight="bold")
         figure.align_ylabels()
@@ -141,21 +126,17 @@ def draw_replay(
 
 
 def _panels(joints: tuple[Joint, ...]) -> tuple[Figure, NDArray]:
-    figure, axes = plt.subplots(
-        len(joints), 1, figsize=(8, 2.3 * len(joints)), sharex=True, squeeze=False
-    )
+    size = (8, 2.3 * len(joints))
+    figure, axes = plt.subplots(len(joints), 1, figsize=size, sharex=True, squeeze=False)
     return figure, axes[:, 0]
 
 
 def _tracking(frame: pd.DataFrame, joints: tuple[Joint, ...]) -> Figure:
     figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
-        axis.plot(
-            frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.6, label="wanted"
-        )
-        axis.plot(
-            frame["time_s"], frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated"
-        )
+        wanted, angle = (frame[joint.column(name)] for name in ("reference", "angle"))
+        axis.plot(frame["time_s"], wanted, color=GREY, lw=2.6, label="wanted")
+        axis.plot(frame["time_s"], angle, color=ORANGE, lw=1.0, label="simulated")
         axis.set_ylabel(f"{joint.name} angle, {joint.unit('angle')}")
     return _finished(figure, axes, "The leg follows its reference")
 
@@ -166,14 +147,8 @@ def _error(frame: pd.DataFrame, joints: tuple[Joint, ...], settled_after_s: floa
     for axis, joint in zip(axes, joints, strict=True):
         error = 1e3 * frame[joint.column("error")]
         worst = error[frame["time_s"] >= settled_after_s].abs().max()
-        axis.axhspan(
-            -worst,
-            worst,
-            color=GREY,
-            alpha=0.15,
-            lw=0,
-            label=f"largest after {settled_after_s:g} s",
-        )
+        label = f"largest after {settled_after_s:g} s"
+        axis.axhspan(-worst, worst, color=GREY, alpha=0.15, lw=0, label=label)
         axis.axhline(0, color="black", lw=0.6)
         axis.plot(frame["time_s"], error, color=BLUE, lw=1.0, label="error")
         axis.set_ylim(-4 * worst, 4 * worst)
@@ -188,18 +163,11 @@ def _torque(frame: pd.DataFrame, joints: tuple[Joint, ...], limit_nm: float) -> 
     for axis, joint in zip(axes, joints, strict=True):
         torque = frame[joint.column("torque")]
         axis.plot(frame["time_s"], torque, color=ORANGE, lw=1.0, label="torque")
-        axis.plot(
-            frame["time_s"],
-            frame[joint.column("network")],
-            color=BLUE,
-            lw=1.0,
-            label="the network's share",
-        )
+        network = frame[joint.column("network")]
+        axis.plot(frame["time_s"], network, color=BLUE, lw=1.0, label="the network's share")
         if torque.abs().max() > 0.7 * limit_nm:
-            for bound in (-limit_nm, limit_nm):
-                axis.axhline(
-                    bound, color=GREY, lw=0.9, ls=":", label="limit" if bound > 0 else None
-                )
+            for bound, label in ((-limit_nm, None), (limit_nm, "limit")):
+                axis.axhline(bound, color=GREY, lw=0.9, ls=":", label=label)
         axis.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
     return _finished(figure, axes, "What the drives deliver")
 
@@ -224,9 +192,8 @@ def _windows(angles: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> N
     # A break between two windows, so that no line joins the end of one to the begin of the next.
     ends = frame["window"].diff().fillna(0) != 0
     time = frame["time_s"].where(~ends)
-    angles.plot(
-        frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.4, label="recorded"
-    )
+    recorded = frame[joint.column("reference")]
+    angles.plot(frame["time_s"], recorded, color=GREY, lw=2.4, label="recorded")
     angles.plot(time, frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated")
     errors.axhline(0, color="black", lw=0.6)
     errors.plot(time, 1e3 * frame[joint.column("error")], color=BLUE, lw=0.9)
@@ -237,10 +204,11 @@ def _windows(angles: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> N
 def _torques(torques: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> None:
     measured = frame[joint.column("torque_measured")]
     torques.plot(frame["time_s"], measured, color=GREY, lw=1.8)
-    torques.plot(frame["time_s"], frame[joint.column("torque")], color=ORANGE, lw=0.9)
+    simulated = frame[joint.column("torque")]
+    torques.plot(frame["time_s"], simulated, color=ORANGE, lw=0.9)
     errors.axhline(0, color="black", lw=0.6)
-    errors.plot(frame["time_s"], measured - frame[joint.column("torque")], color=BLUE, lw=0.7)
+    errors.plot(frame["time_s"], measured - simulated, color=BLUE, lw=0.7)
     torques.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
     errors.set_ylabel(f"error, {joint.unit('torque')}")
-    spread = float(np.nanstd(measured - frame[joint.column("torque")]))
+    spread = float(np.nanstd(measured - simulated))
     errors.set_ylim(-6 * spread, 6 * spread)

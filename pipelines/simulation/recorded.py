@@ -58,9 +58,9 @@ def why_no_closed_loop(motion: Motion) -> str:
 
 
 def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
-    """Let the plant follow a motion's references under the drives that its metadata names.
+    """Simulate a plant along a motion's references under the drives that its metadata names.
 
-    Every segment begins in its recorded state; ``why_no_closed_loop`` must have nothing to say.
+    Every segment begins in its recorded state. ``why_no_closed_loop`` must be empty.
     """
     drives, temperature = _drives(motion), known_temperature(motion)
     simulated = [np.full(motion.q.shape, np.nan) for _ in range(3)]
@@ -74,13 +74,9 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
         for whole, part in zip(simulated, followed, strict=False):
             whole[segment] = part
     angle, velocity, torque = simulated
-    return UnderReferences(
-        angle,
-        velocity,
-        torque,
-        _rms((motion.q - angle)[motion.valid]),
-        _rms((motion.torque - torque)[motion.valid]),
-    )
+    angle_rmse = _rms((motion.q - angle)[motion.valid])
+    torque_rmse = _rms((motion.torque - torque)[motion.valid])
+    return UnderReferences(angle, velocity, torque, angle_rmse, torque_rmse)
 
 
 def _drives(motion: Motion) -> Drives:
@@ -97,8 +93,7 @@ def _drives(motion: Motion) -> Drives:
 
 
 def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> LoopState:
-    """Return the loop in the recorded state at the begin of sample ``k``, half a period before its
-    time."""
+    """Return the loop in the recorded state half a period before the time of sample ``k``."""
     motor = plant.model.sensed(motion)
     link = plant.model.behind_motors(motor)
     state = np.stack([link.q[k], link.dq[k], motor.q[k], motor.dq[k]])

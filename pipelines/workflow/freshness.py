@@ -73,15 +73,10 @@ class Judge:
         except ContractError as error:
             yield str(error).removeprefix(f"{step.target}: ")
             return
-        yield from self._lacking(
-            [
-                *step.other_outputs,
-                *(step.target.with_name(name) for name in metadata.get("beside", [])),
-            ]
-        )
-        yield from self._other_inputs(
-            step, {(entry["name"], entry["sha256"]) for entry in metadata.get("inputs", [])}
-        )
+        others = [step.target.with_name(name) for name in metadata.get("beside", [])]
+        yield from self._lacking([*step.other_outputs, *others])
+        inputs = {(entry["name"], entry["sha256"]) for entry in metadata.get("inputs", [])}
+        yield from self._other_inputs(step, inputs)
         yield from _other_settings(metadata.get("config", {}), step.settings)
         if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
             yield f"{self._name(step.watched)} is newer"

@@ -14,17 +14,8 @@ from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
 from pipelines.workflow.imported import ImportedRuns
 
-STAGES = (
-    "design",
-    "acquire",
-    "filter",
-    "identify",
-    "diagnose",
-    "simulate",
-    "replay",
-    "extended",
-    "report",
-)
+FIRST_STAGES = ("design", "acquire", "filter", "identify")
+STAGES = (*FIRST_STAGES, "diagnose", "simulate", "replay", "extended", "report")
 """All stages; an experiment may have no step of some."""
 
 
@@ -138,27 +129,12 @@ def graph(
         called: tuple[str, ...] = ("simulate", model.as_posix())
         if imported.of_a_leg:
             sweep = [SWEEP] if experiment.simulate.sweep_nm_s_rad else []
-            yield step(
-                loop,
-                folder / LOOP,
-                [model],
-                ("simulate", "mechanism"),
-                *called,
-                other_outputs=sweep,
-            )
+            counted = ("simulate", "mechanism")
+            yield step(loop, folder / LOOP, [model], counted, *called, other_outputs=sweep)
         for name in (run.name for run in validate):
-            inputs, words = (
-                [model, recordings[name]],
-                (*called, "--replay", recordings[name].as_posix()),
-            )
-            yield step(
-                replay,
-                folder / f"replay-{name}.parquet",
-                inputs,
-                ("filter", "mechanism"),
-                *words,
-                run=name,
-            )
+            target, inputs = folder / f"replay-{name}.parquet", [model, recordings[name]]
+            words = (*called, "--replay", recordings[name].as_posix())
+            yield step(replay, target, inputs, ("filter", "mechanism"), *words, run=name)
 
     # An imported recording may lack what a model needs to be simulated.
     loops = simulated(parameters, out / "simulated", "simulate", "replay")
@@ -194,28 +170,15 @@ def _recorded(
     """Return the step that records one run; its rig and its excitation count by their content."""
     excitation = experiment.file(run.trajectory) if run.trajectory else designed
     rig = experiment.file(experiment.acquire.rig)
-    return Step(
-        "acquire",
-        target,
-        (excitation, rig),
-        # The rig counts by its content, as an input does: its path differs between computers.
-        {
-            "acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz},
-            "run": run.model_dump(mode="json"),
-        },
-        (
-            "acquire",
-            *config_option,
-            "--run",
-            run.name,
-            "--trajectory",
-            excitation.as_posix(),
-            "-o",
-            target.as_posix(),
-        ),
-        run=run.name,
-        watched=sealed_file(rig),
-    )
+    # The rig counts by its content, as an input does: its path differs between computers.
+    counted = {
+        "acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz},
+        "run": run.model_dump(mode="json"),
+    }
+    words = ("acquire", *config_option, "--run", run.name, "--trajectory", excitation.as_posix())
+    command = (*words, "-o", target.as_posix())
+    inputs, sealed = (excitation, rig), sealed_file(rig)
+    return Step("acquire", target, inputs, counted, command, run=run.name, watched=sealed)
 
 
 def sealed_file(rig: Path) -> Path | None:

@@ -37,12 +37,10 @@ class ImportedRuns:
 
 def damage(files: Sequence[Path]) -> str:
     """Return a message on recordings that cannot be read, with a remedy."""
-    damaged = "damaged or truncated"
-    names, several = ", ".join(file.as_posix() for file in files), len(files) > 1
+    names, them = ", ".join(file.as_posix() for file in files), "them" if len(files) > 1 else "it"
     return (
-        f"{names}: {damaged}, and nothing is done without {'them' if several else 'it'};"
-        f" {'import them' if several else 'import it'} again, or remove"
-        f" {'them' if several else 'it'}"
+        f"{names}: damaged or truncated, and nothing is done without {them}; import {them} again,"
+        f" or remove {them}"
     )
 
 

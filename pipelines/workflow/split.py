@@ -32,9 +32,9 @@ def split(experiment: Experiment, folder: Path) -> None:
         experiment.refuse_missing_files()
         _add_what_is_recorded(experiment, sections)
     for name, content in sections.items():
-        _write_if_changed(
-            folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n"
-        )
+        path, text = folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n"
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
     write_text(folder / "graph.mk", "\n".join(_rules(steps)) + "\n")
 
 
@@ -49,11 +49,6 @@ def _add_what_is_recorded(experiment: Experiment, sections: dict[str, Any]) -> N
         section = sections[f"run-{run.name}"] = run.model_dump(mode="json")
         if run.trajectory:
             section["trajectory_sha256"] = sha256(experiment.file(run.trajectory))
-
-
-def _write_if_changed(path: Path, text: str) -> None:
-    if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        write_text(path, text)
 
 
 def _rules(steps: Sequence[Step]) -> Iterator[str]:
