@@ -12,6 +12,9 @@ from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 
+TABLES = ("parameters", "residuals", "motion", "recording", "trajectory", "simulation")
+OF_MACHINE = (*TABLES, "verdict")
+"""Kinds of file whose metadata hold the joints, the most reliable first."""
 CONTRACT_KEY = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
 """Recognizes a damaged document of exoid."""
 
@@ -122,20 +125,10 @@ class Session:
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """The machine's joints, from the first kind of file that the session has."""
-        order = (
-            "parameters",
-            "residuals",
-            "motion",
-            "recording",
-            "trajectory",
-            "simulation",
-            "verdict",
-        )
-        sets = sorted(
-            (one for one in self.artifacts if one.kind in order),
-            key=lambda one: order.index(one.kind),
-        )
-        return joints_of(sets[0].metadata) if sets else ()
+        for kind in OF_MACHINE:
+            for artifact in self.of_kind(kind):
+                return joints_of(artifact.metadata)
+        return ()
 
     @cached_property
     def verdict_file(self) -> Artifact | None:
@@ -178,9 +171,8 @@ class Session:
     @property
     def has_damaged_verdict(self) -> bool:
         """Whether the only verdict cannot be read."""
-        return not self.verdict_file and any(
-            path.name == "verdict.json" for path in self.unreadable
-        )
+        names = [path.name for path in self.unreadable]
+        return not self.verdict_file and "verdict.json" in names
 
     @cached_property
     def extended(self) -> Artifact | None:
@@ -231,14 +223,8 @@ class Session:
 
     def recorded(self, artifact: Artifact) -> Artifact | None:
         """Return the recording or motion of a replay."""
-        return next(
-            (
-                one
-                for one in self.artifacts
-                if one.kind in ("recording", "motion") and artifact.has_input(one)
-            ),
-            None,
-        )
+        runs = (one for one in self.artifacts if one.kind in ("recording", "motion"))
+        return next((one for one in runs if artifact.has_input(one)), None)
 
     def _next_to_verdict(self, kind: str) -> Artifact | None:
         if self.verdict_file is None:

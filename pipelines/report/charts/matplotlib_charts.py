@@ -1,6 +1,7 @@
 """The page's charts, drawn by matplotlib."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import pyplot as plt
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from pipelines.plotting.style import BLUE, CAUSES, GREY, NOISE, WANDERS
 from pipelines.report.charts.bars import Bar, Fall
@@ -31,31 +33,33 @@ def chart_figure(chart: Chart) -> Figure:
     chart = chart.thinned(ROWS)
     cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
     heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
-    figure, axes = plt.subplots(
+    figure, axes = _rows(
         len(chart.panels),
-        1,
+        (NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)),
         sharex=True,
-        squeeze=False,
         height_ratios=heights,
-        figsize=(NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)),
-        layout="constrained",
     )
-    for axis, panel in zip(axes[:, 0], chart.panels, strict=True):
+    for axis, panel in zip(axes, chart.panels, strict=True):
         _draw(axis, chart, panel)
-    axes[-1, 0].set_xlabel(chart.x_label)
-    lines = {
-        line.get_label(): line
-        for axis in axes[:, 0]
-        for line in axis.get_lines()
-        if line.get_label()[0] != "_"
-    }
+    axes[-1].set_xlabel(chart.x_label)
+    lines = [line for axis in axes for line in axis.get_lines() if line.get_label()[0] != "_"]
     figure.suptitle(_sentence(chart.title), x=0.01, ha="left", fontsize=9, fontweight="bold")
-    if lines:
-        figure.legend(
-            lines.values(), lines.keys(), loc="outside lower left", ncols=len(lines), fontsize=8
-        )
+    _legend(figure, {line.get_label(): line for line in lines}, 8)
     figure.align_ylabels()
     return figure
+
+
+def _rows(count: int, size: tuple[float, float], **options: Any) -> tuple[Figure, NDArray]:
+    figure, axes = plt.subplots(
+        count, 1, figsize=size, squeeze=False, layout="constrained", **options
+    )
+    return figure, axes[:, 0]
+
+
+def _legend(figure: Figure, artists: Mapping[Any, Artist], size: float) -> None:
+    if artists:
+        look: dict[str, Any] = {"ncols": len(artists), "fontsize": size}
+        figure.legend(artists.values(), artists.keys(), loc="outside lower left", **look)
 
 
 def _draw(axis: Axes, chart: Chart, panel: Panel) -> None:
@@ -71,20 +75,11 @@ def _draw(axis: Axes, chart: Chart, panel: Panel) -> None:
 
 def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
     colour, label = COLOURS[series.role], series.label or "_"
-    if series.mark is Mark.DOTS:
-        axis.plot(
-            chart.x,
-            series.values,
-            ".",
-            ms=1.6,
-            mew=0,
-            alpha=0.5,
-            color=colour,
-            label=label,
-            rasterized=True,
-        )
-        return
     x, values = chart.x, series.values
+    if series.mark is Mark.DOTS:
+        dots: dict[str, Any] = {"ms": 1.6, "mew": 0, "alpha": 0.5, "rasterized": True}
+        axis.plot(x, values, ".", color=colour, label=label, **dots)
+        return
     if series.mark is Mark.MEAN:
         known = ~np.isnan(values)
         x, values = x[known], values[known]
@@ -94,24 +89,14 @@ def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
 
 def budget_figure(bars: Sequence[Bar]) -> Figure:
     """Return the figure of the error budget: one bar per joint, each with its own scale."""
-    figure, axes = plt.subplots(
-        len(bars), 1, figsize=(WIDE, 0.5 + 1.25 * len(bars)), squeeze=False, layout="constrained"
-    )
-    for axis, bar in zip(axes[:, 0], bars, strict=True):
+    figure, axes = _rows(len(bars), (WIDE, 0.5 + 1.25 * len(bars)))
+    for axis, bar in zip(axes, bars, strict=True):
         shown = [segment for segment in bar.segments if segment.share]
-        for segment in shown:
-            axis.barh(
-                0,
-                segment.high - segment.low,
-                left=segment.low,
-                color=TONES[segment.tone],
-                ec="white",
-                lw=0.5,
-            )
+        for s in shown:
+            axis.barh(0, s.high - s.low, left=s.low, color=TONES[s.tone], ec="white", lw=0.5)
         axis.set_yticks([])
-        axis.set_title(
-            _sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms"), loc="left", fontsize=9
-        )
+        title = _sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms")
+        axis.set_title(title, loc="left", fontsize=9)
         axis.set_xlabel(f"mean square error, ({bar.unit})²")
         axis.grid(visible=False)
         axis.legend(
@@ -137,16 +122,11 @@ def falls_figure(falls: Sequence[Fall]) -> Figure:
     axis.invert_yaxis()
     axis.set_xlabel(f"rms error on runs that no fit has seen, {units}")
     axis.grid(axis="y", visible=False)
-    legend: dict[str, Artist] = {
-        "rigid body and friction": Patch(color=GREY),
-        "with the causes": Patch(color=BLUE),
-    }
-    if falls[0].after is None:
-        del legend["with the causes"]
+    legend: dict[str, Artist] = {"rigid body and friction": Patch(color=GREY)}
+    if falls[0].after is not None:
+        legend["with the causes"] = Patch(color=BLUE)
     legend["noise floor"] = Line2D([], [], color="black")
-    figure.legend(
-        legend.values(), legend.keys(), loc="outside lower left", ncols=len(legend), fontsize=7
-    )
+    _legend(figure, legend, 7)
     return figure
 
 

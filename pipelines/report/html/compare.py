@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
+from pipelines.contracts.joints import in_words
 from pipelines.contracts.verdict import Cause
 from pipelines.errors import InputError
 from pipelines.report.html.page import render
@@ -131,16 +132,11 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compari
         "causes": _causes(pair),
         "errors": _by_model(rows),
     }
-    context["headline"] = _change_in_words(pair, context["beyond"], context["judged"])
+    beyond, judged, settings = context["beyond"], context["judged"], context["settings"]
+    sentence = context["headline"] = _change_in_words(pair, beyond, judged)
     text = render("compare.html", (), (), context, (*first.artifacts, *second.artifacts))
-    return Comparison(
-        text,
-        context["beyond"],
-        context["judged"],
-        context["headline"],
-        tuple(row.words for row in rows),
-        tuple(context["settings"]),
-    )
+    errors = tuple(row.words for row in rows)
+    return Comparison(text, beyond, judged, sentence, errors, tuple(settings))
 
 
 def _change_in_words(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
@@ -200,17 +196,14 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
     kinds = [("rigid body and friction", "baseline_rmse_nm")]
     if first.causes or second.causes:
         kinds.append(("with the causes that each names", "extended_rmse_nm"))
-    return [
-        ErrorAndFloor(
-            joint,
-            words,
-            torque_unit(first, joint),
-            (getattr(first, key)[joint], getattr(second, key)[joint]),
-            (first.noise_floor_nm[joint], second.noise_floor_nm[joint]),
-        )
-        for joint in first.baseline_rmse_nm
-        for words, key in kinds
-    ]
+    rows = []
+    for joint in first.baseline_rmse_nm:
+        unit = torque_unit(first, joint)
+        floors = (first.noise_floor_nm[joint], second.noise_floor_nm[joint])
+        for words, key in kinds:
+            errors = (getattr(first, key)[joint], getattr(second, key)[joint])
+            rows.append(ErrorAndFloor(joint, words, unit, errors, floors))
+    return rows
 
 
 def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
@@ -221,17 +214,14 @@ def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str,
     InputError
         If they differ.
     """
-    for prefix, description in (("", _joints_in_words), ("mechanism ", _mechanism)):
-        one, other = (description(session) for session in pair)
+    descriptions = {"": lambda session: in_words(session.joints), "mechanism ": _mechanism}
+    for prefix, description in descriptions.items():
+        one, other = map(description, pair)
         if one and other and one != other:
             raise InputError(
                 f"{titles[0]} is of another machine than {titles[1]} ({prefix}{one}, and"
                 f" {prefix}{other}). Compare two sessions of one machine"
             )
-
-
-def _joints_in_words(session: Session) -> str:
-    return ", ".join(f"{joint.name} ({joint.kind})" for joint in session.joints)
 
 
 def _mechanism(session: Session) -> str | None:
@@ -273,48 +263,34 @@ def _model(
     title: str, first: Session, one: Artifact, second: Session, other: Artifact
 ) -> ModelChanges:
     a, b = estimates(first.table(one)), estimates(second.table(other))
-    keys = ({e.key for e in a}, {e.key for e in b})
+    files = (first.shown(one.path), second.shown(other.path))
     return ModelChanges(
-        title,
-        (first.shown(one.path), second.shown(other.path)),
-        tuple(changes(a, b)),
-        (
-            _only(first, [e for e in a if e.key not in keys[1]]),
-            _only(second, [e for e in b if e.key not in keys[0]]),
-        ),
+        title, files, tuple(changes(a, b)), (_only(first, a, b), _only(second, b, a))
     )
 
 
-def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
+def _only(session: Session, own: list[Estimate], others: list[Estimate]) -> tuple[str, ...]:
     """Return the parameters of one session only, in words, with its named causes."""
     named = {cause.label for cause in session.causes}
-    return tuple(
-        f"{one.words} of {any_label_in_words(_label(one))}, which it names"
-        if _label(one) in named
-        else one.words
-        for one in alone
-    )
-
-
-def _label(estimate: Estimate) -> str:
-    return f"{estimate.effect}@{estimate.joint}" if estimate.joint else estimate.effect
+    known = {other.key for other in others}
+    results = []
+    for one in (one for one in own if one.key not in known):
+        label = f"{one.effect}@{one.joint}" if one.joint else one.effect
+        cause = f" of {any_label_in_words(label)}, which it names" if label in named else ""
+        results.append(f"{one.words}{cause}")
+    return tuple(results)
 
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
     """Return the causes that either verdict names, with probability and gain in each."""
     named = [{cause.label: cause for cause in session.causes} for session in pair]
-    return [
-        {
-            "words": " / ".join(
-                dict.fromkeys(cause_in_words(causes[label]) for causes in named if label in causes)
-            ),
-            "cells": [
-                _cause_cell(session, causes.get(label))
-                for session, causes in zip(pair, named, strict=True)
-            ],
-        }
-        for label in dict.fromkeys(label for causes in named for label in causes)
-    ]
+    rows = []
+    for label in named[0] | named[1]:
+        in_each = [causes.get(label) for causes in named]
+        words = dict.fromkeys(cause_in_words(cause) for cause in in_each if cause)
+        cells = [_cause_cell(*one) for one in zip(pair, in_each, strict=True)]
+        rows.append({"words": " / ".join(words), "cells": cells})
+    return rows
 
 
 def _cause_cell(session: Session, cause: Cause | None) -> dict[str, Any] | None:

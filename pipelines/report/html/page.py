@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pipelines import __version__
 from pipelines.contracts import describe
 from pipelines.contracts.provenance import sha256
-from pipelines.report.charts.chart import Chart
+from pipelines.report.charts.chart import Chart, Series
 from pipelines.report.numbers import digits, digits_for
 from pipelines.report.sections.animation import Animation
 from pipelines.report.session import Artifact
@@ -70,9 +70,8 @@ def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
     artifacts = list(artifacts)
     inputs = [{"name": one.path.name, "sha256": one.sha256} for one in artifacts]
     # The sweep is a table without metadata, in the folder of its model's loop.
-    sweeps = dict.fromkeys(
-        one.path.with_name(SWEEP) for one in artifacts if one.kind == "simulation"
-    )
+    loops = [one.path for one in artifacts if one.kind == "simulation"]
+    sweeps = dict.fromkeys(path.with_name(SWEEP) for path in loops)
     inputs += [{"name": file.name, "sha256": sha256(file)} for file in sweeps if file.is_file()]
     return describe() | {"inputs": inputs}
 
@@ -123,19 +122,16 @@ def _chart(chart: Chart) -> dict[str, Any]:
                 "label": panel.label,
                 "band": panel.band,
                 "reach": panel.reach,
-                "series": [
-                    {
-                        "label": s.label,
-                        "role": s.role,
-                        "mark": s.mark,
-                        "values": _coded(s.values, np.float32),
-                    }
-                    for s in panel.series
-                ],
+                "series": [_series(one) for one in panel.series],
             }
             for panel in chart.panels
         ],
     }
+
+
+def _series(one: Series) -> dict[str, Any]:
+    about = {"label": one.label, "role": one.role, "mark": one.mark}
+    return about | {"values": _coded(one.values, np.float32)}
 
 
 def _animation(one: Animation) -> dict[str, Any]:
@@ -149,6 +145,5 @@ def _animation(one: Animation) -> dict[str, Any]:
 
 def _coded(values: NDArray, dtype: type[np.floating]) -> str:
     """Return numbers, (n,) or (n, k), as base64 of their little-endian bytes, row by row."""
-    return base64.b64encode(
-        np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()
-    ).decode()
+    little_endian = np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<"))
+    return base64.b64encode(little_endian.tobytes()).decode()

@@ -41,10 +41,7 @@ class Animation:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's animations."""
-    return {
-        "is_leg": _drawn_as(content.session) == "leg",
-        "animations": animations(content.session),
-    }
+    return {"is_leg": _drawn_as(content.session) == "leg", "animations": animations(content.session)}
 
 
 def animations(session: Session) -> list[Animation]:
@@ -65,16 +62,14 @@ def _drawn_as(session: Session) -> str:
 
 def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animation:
     first = next(iter(tables.values()))
-    tables = {
-        model: table for model, table in tables.items() if len(table.frame) == len(first.frame)
-    }
     time = first.frame["time_s"].to_numpy()
     rows = _frames(time, np.abs(first.stacked("error")).sum(axis=1))
     angles = {"measured": first.stacked("reference")[rows]}
     labels = {"measured": "measured"}
     for model, table in tables.items():
-        role, words = MODELS[model]
-        angles[role], labels[role] = table.stacked("angle")[rows], words
+        if len(table.frame) == len(first.frame):
+            role, words = MODELS[model]
+            angles[role], labels[role] = table.stacked("angle")[rows], words
     kind, lengths = _machine(session, first, angles["measured"])
     return Animation(run, kind, lengths, time[rows], angles, labels)
 

@@ -10,13 +10,7 @@ from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
 
-TONES = {
-    "named": "good",
-    "indistinguishable": "warn",
-    "unlisted": "warn",
-    "absorbed": "",
-    "rejected": "",
-}
+TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn"}
 
 Row = dict[Any, Any]
 
@@ -55,17 +49,21 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 "probability": _probability(row["probability"]),
                 "verdict": row["verdict"],
                 "tone": TONES.get(row["verdict"], ""),
-                "falls": [
-                    f"{joint.name} {digits(row[joint.column('rmse_before')])} →"
-                    f" {digits(row[joint.column('rmse_after')])}"
-                    for joint in session.joints
-                    if np.isfinite(row[joint.column("rmse_after")])
-                ],
+                "falls": _falls(session, row),
                 "gain": gain,
                 "reason": labels_in_words(_reason(row["reason"], extra or ()), labels),
             }
         )
     return shown
+
+
+def _falls(session: Session, row: Row) -> list[str]:
+    texts = []
+    for joint in session.joints:
+        before, after = row[joint.column("rmse_before")], row[joint.column("rmse_after")]
+        if np.isfinite(after):
+            texts.append(f"{joint.name} {digits(before)} → {digits(after)}")
+    return texts
 
 
 def _beyond(row: Row, named: Row | None) -> list[str] | None:

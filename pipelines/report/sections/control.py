@@ -36,16 +36,12 @@ def _comparison(verdict: Verdict) -> dict[str, Any] | None:
     loops = [("without", "rigid body and friction", control.without)]
     if verdict.causes:
         loops.append(("with", "with the causes", control.with_))
-    rows = [
-        {
-            "key": key,
-            "words": words,
-            "error": {joint: 1e3 * value for joint, value in loop.tracking_rmse_rad.items()},
-            "torque": loop.peak_torque_nm,
-        }
-        for key, words, loop in loops
-        if loop
-    ]
+    rows = []
+    for key, words, loop in loops:
+        if loop:
+            errors = {joint: 1e3 * value for joint, value in loop.tracking_rmse_rad.items()}
+            torque = loop.peak_torque_nm
+            rows.append({"key": key, "words": words, "error": errors, "torque": torque})
     if not rows:
         return None
     return {
@@ -60,11 +56,10 @@ def _loops(session: Session) -> dict[str, Artifact]:
     """Return one adaptive loop of each model, with a wearer if there are several."""
     results = {}
     for model, simulations in session.simulations_by_model("loop").items():
-        ranked = sorted(
-            simulations, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human"
-        )
-        if ranked and model in models_of(session):
-            results[model] = ranked[0]
+        kinds = [one.metadata.get("plant", {}).get("run") for one in simulations]
+        if kinds and model in models_of(session):
+            number = kinds.index("with_human") if "with_human" in kinds else 0
+            results[model] = simulations[number]
     return results
 
 
@@ -74,17 +69,12 @@ def control_charts(session: Session) -> Iterator[Chart]:
     tables = {model: session.table(one).frame for model, one in of_models.items()}
     if not tables:
         return
-    settled = (
-        next(iter(of_models.values()))
-        .metadata.get("config", {})
-        .get("simulate", {})
-        .get("settled_after_s", 0.0)
-    )
+    config = next(iter(of_models.values())).metadata.get("config", {})
+    settled = config.get("simulate", {}).get("settled_after_s", 0.0)
     for joint in session.joints:
         yield _loop_chart(joint, tables, settled)
-    sweep = _sweep_chart(
-        session, {model: one.path.with_name(SWEEP) for model, one in of_models.items()}
-    )
+    files = {model: one.path.with_name(SWEEP) for model, one in of_models.items()}
+    sweep = _sweep_chart(session, files)
     if sweep:
         yield sweep
 
@@ -106,7 +96,7 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
     return Chart(
         key=f"control-{joint.name}",
         title=f"{joint.name} under adaptive RBF control",
-        caption=(f"From rest; errors count from {settled:g} s on, when the network has adapted."),
+        caption=f"From rest; errors count from {settled:g} s on, when the network has adapted.",
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(
@@ -119,29 +109,24 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
 
 
 def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
-    tables = {model: pd.read_csv(path) for model, path in files.items() if path.is_file()}
-    columns = [GAIN, *(joint.column("error") for joint in session.joints)]
-    tables = {
-        model: table
-        for model, table in tables.items()
-        if set(columns) <= set(table.columns) and len(table)
-    }
+    columns = {GAIN, *(joint.column("error") for joint in session.joints)}
+    tables: dict[str, pd.DataFrame] = {}
+    for model, path in files.items():
+        table = pd.read_csv(path) if path.is_file() else pd.DataFrame()
+        if columns <= set(table.columns) and len(table):
+            tables[model] = table
     if not tables:
         return None
     first = next(iter(tables.values()))
     panels = []
     for joint in session.joints:
-        curves = tuple(
-            Series(
-                MODELS[model][1],
-                1e3 * table[joint.column("error")].to_numpy(dtype=float),
-                MODELS[model][0],
-                Mark.MEAN,
-            )
-            for model, table in tables.items()
-            if table[GAIN].equals(first[GAIN])
-        )
-        panels.append(Panel(f"{joint.name}, m{joint.unit('angle')}", curves))
+        curves = []
+        for model, table in tables.items():
+            if table[GAIN].equals(first[GAIN]):
+                role, words = MODELS[model]
+                errors = 1e3 * table[joint.column("error")].to_numpy(dtype=float)
+                curves.append(Series(words, errors, role, Mark.MEAN))
+        panels.append(Panel(f"{joint.name}, m{joint.unit('angle')}", tuple(curves)))
     return Chart(
         key="kv-sweep",
         title="Largest settled error against the feedback gain",

@@ -65,24 +65,15 @@ def decision(verdict: Verdict) -> Decision | None:
     cases = outcomes(verdict)
     if not cases:
         return None
-    return Decision(
-        _end_to_end([(case.words, OUTCOMES[case.key], case.probability) for case in cases]),
-        tuple(rows(verdict)),
-        tuple(_split(verdict, one) for one in shares(verdict)),
-        searched_runs(verdict),
-    )
+    shown = [(case.words, OUTCOMES[case.key], case.probability) for case in cases]
+    splits = tuple(_split(verdict, one) for one in shares(verdict))
+    return Decision(_end_to_end(shown), tuple(rows(verdict)), splits, searched_runs(verdict))
 
 
 def _split(verdict: Verdict, one: Shares) -> Split:
     parts = [(PARTS[name], tone, one.parts[name]) for name, tone in TONES.items()]
-    return Split(
-        one.joint,
-        torque_unit(verdict, one.joint),
-        one.rms,
-        _end_to_end(parts),
-        one.with_person_only,
-        one.predicted,
-    )
+    unit, shown = torque_unit(verdict, one.joint), _end_to_end(parts)
+    return Split(one.joint, unit, one.rms, shown, one.with_person_only, one.predicted)
 
 
 def _end_to_end(shares: list[tuple[str, str, float]]) -> tuple[Part, ...]:

@@ -61,19 +61,14 @@ def budget(verdict: Verdict) -> list[Bar]:
 
 def falls(verdict: Verdict) -> list[Fall]:
     """Return each joint's error without and with the causes."""
-    named = bool(verdict.causes)
-    return [
-        Fall(
-            joint,
-            torque_unit(verdict, joint),
-            before,
-            verdict.extended_rmse_nm[joint] if named else None,
-            verdict.noise_floor_nm[joint],
-            verdict.unexplained[joint],
-            (verdict.torque_rms_nm or {}).get(joint),
-        )
-        for joint, before in verdict.baseline_rmse_nm.items()
-    ]
+    results = []
+    for joint, before in verdict.baseline_rmse_nm.items():
+        after = verdict.extended_rmse_nm[joint] if verdict.causes else None
+        floor, unexplained = verdict.noise_floor_nm[joint], verdict.unexplained[joint]
+        torque = (verdict.torque_rms_nm or {}).get(joint)
+        unit = torque_unit(verdict, joint)
+        results.append(Fall(joint, unit, before, after, floor, unexplained, torque))
+    return results
 
 
 def torque_unit(verdict: Verdict, joint: str) -> str:

@@ -40,20 +40,12 @@ def _excitations(session: Session) -> list[Excitation]:
 
 def _excitation(session: Session, artifact: Artifact) -> Excitation:
     about = artifact.metadata
-    facts = [
-        f"{words} {digits(about[key])}"
-        for key, words in NUMBERS.items()
-        if about.get(key) is not None
-    ]
+    known = {key: words for key, words in NUMBERS.items() if about.get(key) is not None}
+    facts = [f"{words} {digits(about[key])}" for key, words in known.items()]
     if about.get("a") and about.get("omega_rad_s"):
         base_hz = about["omega_rad_s"] / (2 * pi)
         facts.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
-    return Excitation(
-        session.shown(artifact.path),
-        ", ".join(facts),
-        tuple(about.get("margins") or ()),
-        tuple(
-            (name, error, unit(session, name))
-            for name, error in (about.get("standard_errors") or {}).items()
-        ),
-    )
+    stated = (about.get("standard_errors") or {}).items()
+    errors = tuple((name, error, unit(session, name)) for name, error in stated)
+    margins = tuple(about.get("margins") or ())
+    return Excitation(session.shown(artifact.path), ", ".join(facts), margins, errors)

@@ -124,17 +124,13 @@ def scores(session: Session, run: str) -> list[Score]:
     results = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
     for kind, rows in SCORES.items():
         replays = replayed(session, kind).get(run, {})
+        shown = [replays.get(model) for model in models_of(session)]
         for key, quantity, words, factor, prefix in rows if replays else ():
             for joint in session.joints:
-                values = tuple(
-                    _stated_error(replays.get(model), key, joint, factor)
-                    for model in models_of(session)
-                )
+                values = tuple(_stated_error(replay, key, joint, factor) for replay in shown)
                 name = joint.place if quantity == "angle" else joint.effort
-                where = (
-                    f"{joint.name} {name}, {words.format(drive=joint.effort)},"
-                    f" {prefix}{joint.unit(quantity)}"
-                )
+                how, unit = words.format(drive=joint.effort), f"{prefix}{joint.unit(quantity)}"
+                where = f"{joint.name} {name}, {how}, {unit}"
                 note = LARGER if simulation_error_grew(*values) else ""
                 results.append(Score(where, values, note))
                 if kind == "windows":
@@ -155,14 +151,10 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     rows = rows[rows["file"] == run]
     floor = session.noise_floor(joint)
     grew_away_from_reversals = False
-    for words, chosen in (
-        ("away from reversals", rows[rows["scored"]]),
-        ("reversals included", rows),
-    ):
-        errors = [
-            chosen.loc[chosen["model"] == model, joint.column("residual")]
-            for model in models_of(session)
-        ]
+    subsets = {"away from reversals": rows[rows["scored"]], "reversals included": rows}
+    residual = joint.column("residual")
+    for words, chosen in subsets.items():
+        errors = [chosen.loc[chosen["model"] == model, residual] for model in models_of(session)]
         values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in errors)
         grew = floor is not None and torque_error_grew(*values, floor=floor)
         note = LARGER if grew else ""

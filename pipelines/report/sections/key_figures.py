@@ -109,26 +109,19 @@ def _simulation_tiles(session: Session, verdict: Verdict) -> list[Tile]:
 def _loop_tiles(session: Session) -> list[Tile]:
     """Return the drives' simulated torque error, in the run with the largest gain."""
     joint, key = worst_joint(session), "closed_loop_rmse_nm"
-    pairs = [
-        [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]
-        for one in replayed(session, "drives").values()
-        if joint
-        and len(one) == 2
-        and all(joint.name in simulation.metadata.get(key, {}) for simulation in one.values())
-    ]
-    if not joint or not pairs:
+    if not joint:
+        return []
+    pairs = []
+    for models in replayed(session, "drives").values():
+        replays = [models[name] for name in ("baseline", "extended") if name in models]
+        stated = [replay.metadata.get(key, {}) for replay in replays]
+        errors = [of_joints[joint.name] for of_joints in stated if joint.name in of_joints]
+        if len(errors) == 2:
+            pairs.append(errors)
+    if not pairs:
         return []
     before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
-    small = (
-        "worse with the causes" if after > before else f"rms error of the simulated {joint.effort}"
-    )
-    title = f"{joint.name}, in the drives' loop"
-    return [
-        Tile(
-            title,
-            f"{digits(before)} → {digits(after)}",
-            joint.unit("torque"),
-            small,
-            after > before,
-        )
-    ]
+    is_worse = after > before
+    small = "worse with the causes" if is_worse else f"rms error of the simulated {joint.effort}"
+    big, unit = f"{digits(before)} → {digits(after)}", joint.unit("torque")
+    return [Tile(f"{joint.name}, in the drives' loop", big, unit, small, is_worse)]

@@ -12,6 +12,9 @@ from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
 
+SENTENCES = ("collinear", "remarks", "angle_noise")
+"""Lists of sentences in the metadata of a model."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -81,12 +84,8 @@ class Model:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's tables of models."""
-    shown = models(content.session)
-    return {
-        "has_baseline": bool(content.session.baselines),
-        "models": shown,
-        "parameters": _side_by_side(shown),
-    }
+    shown, has_baseline = models(content.session), bool(content.session.baselines)
+    return {"has_baseline": has_baseline, "models": shown, "parameters": _side_by_side(shown)}
 
 
 def models(session: Session) -> list[Model]:
@@ -96,12 +95,8 @@ def models(session: Session) -> list[Model]:
         for one in session.identified
     ]
     if session.extended:
-        results.append(
-            (
-                session.extended,
-                "Extended by the named causes" if session.causes else "As the diagnosis fitted it",
-            )
-        )
+        title = "Extended by the named causes" if session.causes else "As the diagnosis fitted it"
+        results.append((session.extended, title))
     return [_model(session, one, title) for one, title in results]
 
 
@@ -146,40 +141,32 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
             replace(e, meaning=meaning(session, e.effect, e.joint, e.name))
             for e in estimates(table)
         ),
-        collinear=tuple(map(str, about.get("collinear") or ())),
         unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
-        remarks=tuple(map(str, about.get("remarks") or ())),
-        angle_noise=tuple(map(str, about.get("angle_noise") or ())),
+        **{key: tuple(map(str, about.get(key) or ())) for key in SENTENCES},
         validation=about.get("validation") or {},
     )
 
 
 def estimates(table: Table) -> list[Estimate]:
     """Return the rows of a ``parameters/1`` table."""
-    return [
-        _estimate({str(k): v for k, v in row.items()}) for row in table.frame.to_dict("records")
-    ]
+    return [_estimate(row) for row in table.frame.to_dict("records")]
 
 
-def _estimate(row: Mapping[str, Any]) -> Estimate:
+def _estimate(row: Mapping[Any, Any]) -> Estimate:
     low, high, error = (
         None if pd.isna(row[key]) else float(row[key])
         for key in ("ci95_low", "ci95_high", "std_error")
     )
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
-    return Estimate(
-        row["effect"],
-        row["name"],
-        row["symbol"],
-        joint,
-        run,
-        row["unit"],
-        float(row["value"]),
-        low,
-        high,
-        error,
-        bool(row.get("each_run")),
-    )
+    names = {key: row[key] for key in ("effect", "name", "symbol", "unit")}
+    numbers: dict[str, Any] = {
+        "value": float(row["value"]),
+        "low": low,
+        "high": high,
+        "std_error": error,
+    }
+    each_run = bool(row.get("each_run"))
+    return Estimate(**names, **numbers, joint=joint, run=run, each_run=each_run)
 
 
 def _method(method: Any) -> str:

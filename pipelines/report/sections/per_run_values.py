@@ -31,19 +31,12 @@ def per_run_values(cause: Cause) -> PerRunValues | None:
         return None
     units = {one.name: "" if one.unit == "1" else one.unit for one in cause.parameters}
     names = tuple(cause.each_run[0].values)
-    return PerRunValues(
-        tuple(
-            ", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names
-        ),
-        tuple(
-            RunValues(
-                run.file,
-                run.purpose,
-                tuple(_estimate(cause, run, name, units) for name in names),
-            )
-            for run in cause.each_run
-        ),
-    )
+    titles = [(name.replace("_", " "), units.get(name, "")) for name in names]
+    rows = []
+    for run in cause.each_run:
+        estimates = tuple(_estimate(cause, run, name, units) for name in names)
+        rows.append(RunValues(run.file, run.purpose, estimates))
+    return PerRunValues(tuple(", ".join(filter(None, title)) for title in titles), tuple(rows))
 
 
 def _estimate(cause: Cause, run: OneRun, name: str, units: dict[str, str]) -> Estimate | None:
@@ -51,14 +44,5 @@ def _estimate(cause: Cause, run: OneRun, name: str, units: dict[str, str]) -> Es
     low, high = run.ci95.get(name) or (None, None)
     if value is None:
         return None
-    return Estimate(
-        cause.effect,
-        name,
-        name,
-        cause.joint or "",
-        run.file,
-        units.get(name, ""),
-        value,
-        low,
-        high,
-    )
+    effect, joint, unit = cause.effect, cause.joint or "", units.get(name, "")
+    return Estimate(effect, name, name, joint, run.file, unit, value, low, high)

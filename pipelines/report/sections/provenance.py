@@ -101,10 +101,10 @@ def outside(session: Session) -> list[Outside]:
             if _input(session, stated).state != "elsewhere":
                 continue
             name, role = _role(one, stated["name"])
-            before = results.get(stated["sha256"], Outside(name, role, stated["sha256"], ()))
-            results[stated["sha256"]] = replace(
-                before, made_of_it=(*before.made_of_it, session.shown(one.path))
-            )
+            digest = stated["sha256"]
+            before = results.get(digest, Outside(name, role, digest, ()))
+            files = (*before.made_of_it, session.shown(one.path))
+            results[digest] = replace(before, made_of_it=files)
     return list(results.values())
 
 
@@ -150,10 +150,8 @@ def _software(session: Session) -> list[tuple[str, list[str]]]:
     for one in session.artifacts:
         stated = one.metadata.get("software")
         if isinstance(stated, dict) and stated:
-            words = ", ".join(
-                f"{'Python' if name == 'python' else name} {version}"
-                for name, version in stated.items()
-            )
+            names = {"python": "Python"}
+            words = ", ".join(f"{names.get(name, name)} {stated[name]}" for name in stated)
             versions.setdefault(words, []).append(session.shown(one.path))
     return list(versions.items())
 

@@ -118,18 +118,16 @@ def _time(artifact: Artifact) -> np.ndarray:
 
 
 def _clock(joint: str, clock: dict[str, Any]) -> str:
+    offset_ms, rate_ppm = 1e3 * clock["offset_s"], clock["rate_ppm"]
     corrected = "corrected" if clock["corrected"] else "not corrected"
-    return (
-        f"{joint} {1e3 * clock['offset_s']:+.3g} ms and {clock['rate_ppm']:+.3g} ppm, {corrected}"
-    )
+    return f"{joint} {offset_ms:+.3g} ms and {rate_ppm:+.3g} ppm, {corrected}"
 
 
 def _imported(about: Any) -> str:
     if not isinstance(about, dict):
         return ""
-    return (
-        ", ".join(str(about[key]) for key in ("source", "format") if about.get(key)) or "imported"
-    )
+    stated = [str(about[key]) for key in ("source", "format") if about.get(key)]
+    return ", ".join(stated) or "imported"
 
 
 def _filter(about: Any) -> str:

@@ -89,11 +89,9 @@ def _against(session: Session, joint: Joint) -> list[Against]:
     charts = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
-            charts += [
-                _along(other, quantity, f"other_{variable}")
-                for quantity, variable in DEPENDENCES.items()
-                if variable != "acceleration"
-            ]
+            for quantity, variable in DEPENDENCES.items():
+                if variable != "acceleration":
+                    charts.append(_along(other, quantity, f"other_{variable}"))
     return [*charts, Against("time", "time", "time, s", "time_s")]
 
 
@@ -145,7 +143,7 @@ def _chart(
         line[len(places) - len(middles) :] = _mean_along(x, y)[1]
         clouds.append(Series("", dots[order], role, Mark.DOTS))
         means.append(Series(words, line[order], role, Mark.MEAN))
-    quantity = joint.effort
+    label = f"{joint.name} {joint.effort} error, {joint.unit('torque')}"
     floor = session.noise_floor(joint)
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
@@ -156,14 +154,7 @@ def _chart(
         ),
         x_label=one.label,
         x=places[order],
-        panels=(
-            Panel(
-                f"{joint.name} {quantity} error, {joint.unit('torque')}",
-                (*clouds, *means),
-                floor,
-                reach,
-            ),
-        ),
+        panels=(Panel(label, (*clouds, *means), floor, reach),),
     )
 
 

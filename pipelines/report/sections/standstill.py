@@ -83,12 +83,8 @@ def _at(joint: Joint, verdict: Verdict) -> Iterator[str]:
         (getattr(verdict, f"baseline_{key}")[name], getattr(verdict, f"extended_{key}")[name])
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
-    known = [
-        BY_NAME[cause.effect]
-        for cause in verdict.causes
-        if cause.joint == name and cause.effect in BY_NAME
-    ]
-    holds = any(effect.holds for effect in known)
+    here = [cause.effect for cause in verdict.causes if cause.joint == name]
+    holds = any(BY_NAME[effect].holds for effect in here if effect in BY_NAME)
     grew = torque_error_grew(all_before, all_after, floor=verdict.noise_floor_nm[name])
     if grew:
         yield (
