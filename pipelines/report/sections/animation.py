@@ -41,7 +41,10 @@ class Animation:
 
 def context(content: Content) -> dict[str, Any]:
     """Return the values of the template's animations."""
-    return {"is_leg": _drawn_as(content.session) == "leg", "animations": animations(content.session)}
+    return {
+        "is_leg": _drawn_as(content.session) == "leg",
+        "animations": animations(content.session),
+    }
 
 
 def animations(session: Session) -> list[Animation]:
