@@ -110,10 +110,8 @@ def all_or_none(folder: Path, last: str | None = None) -> Iterator[Path]:
         except OSError as error:
             error.filename = error.filename and str(error.filename).replace(temporary, str(folder))
             raise
-        targets = {
-            file: Path(os.path.realpath(folder / file.name))
-            for file in sorted(Path(temporary).iterdir())
-        }
+        files = sorted(Path(temporary).iterdir())
+        targets = {file: Path(os.path.realpath(folder / file.name)) for file in files}
         for path in targets.values():
             refuse_special(path)
         equal = {file: equal_except_time(path, file) for file, path in targets.items()}

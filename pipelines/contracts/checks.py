@@ -85,11 +85,8 @@ def _alike(actual: pa.DataType, expected: pa.DataType) -> bool:
 
 
 def _is_list(dtype: pa.DataType) -> bool:
-    return (
-        pa.types.is_list(dtype)
-        or pa.types.is_large_list(dtype)
-        or pa.types.is_fixed_size_list(dtype)
-    )
+    kinds = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
+    return any(is_kind(dtype) for is_kind in kinds)
 
 
 def _is_number(dtype: pa.DataType) -> bool:
@@ -98,11 +95,8 @@ def _is_number(dtype: pa.DataType) -> bool:
 
 def is_text(dtype: pa.DataType) -> bool:
     """Return whether a type is one of Arrow's for text."""
-    return (
-        pa.types.is_string(dtype)
-        or pa.types.is_large_string(dtype)
-        or pa.types.is_string_view(dtype)
-    )
+    kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_string_view)
+    return any(is_kind(dtype) for is_kind in kinds)
 
 
 def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> None:

@@ -33,11 +33,7 @@ class Inspection:
 
     def as_json(self) -> dict[str, Any]:
         """Return the description for programs."""
-        fault = str(self.fault) if self.fault else None
-        return {
-            **{key: value for key, value in vars(self).items() if key != "fault"},
-            "fault": fault,
-        }
+        return vars(self) | {"fault": str(self.fault) if self.fault else None}
 
 
 def inspect(path: Path) -> Inspection:
@@ -76,9 +72,7 @@ def _table(path: Path) -> Inspection:
         contract=metadata["contract"],
         purpose=contract.purpose,
         origin={key: metadata[key] for key in ORIGIN if key in metadata},
-        metadata={
-            key: value for key, value in metadata.items() if key not in (*ORIGIN, "contract")
-        },
+        metadata={key: metadata[key] for key in metadata if key not in (*ORIGIN, "contract")},
         rows=table.num_rows,
         columns=[_column(table, name) for name in dict.fromkeys(table.column_names)],
         fault=fault,

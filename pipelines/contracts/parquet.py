@@ -142,9 +142,8 @@ def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) ->
         temporary.touch()  # the system's error, if any, is clearer than Arrow's
         with pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
             for piece in chain([first], pieces):
-                writer.write_table(
-                    piece.replace_schema_metadata(schema.metadata), row_group_size=ROWS
-                )
+                described = piece.replace_schema_metadata(schema.metadata)
+                writer.write_table(described, row_group_size=ROWS)
 
 
 def refuse_place(path: Path, contract: str) -> None:

@@ -40,9 +40,8 @@ class Column:
 
     def at(self, joint: Joint) -> "Column":
         """Return this quantity's column at one joint."""
-        return replace(
-            self, name=joint.column(self.name), unit=joint.unit(self.name), per_joint=False
-        )
+        name, unit = joint.column(self.name), joint.unit(self.name)
+        return replace(self, name=name, unit=unit, per_joint=False)
 
 
 def per_joint(
@@ -192,11 +191,10 @@ class Contract:
 
     def _columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
         """Return every column by its name in a file, one for each joint."""
-        expanded = (
-            [column.at(joint) for joint in joints] if column.per_joint else [column]
-            for column in self.columns
-        )
-        return tuple(column for group in expanded for column in group)
+        columns: list[Column] = []
+        for column in self.columns:
+            columns += [column.at(joint) for joint in joints] if column.per_joint else [column]
+        return tuple(columns)
 
     def read(self, path: Path | str) -> Table:
         """Return the table in a file.
@@ -280,9 +278,8 @@ class Contract:
         """
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
-        parquet.save(
-            path, [self._conform(self._to_arrow(frame, str(path)), metadata, str(path))], metadata
-        )
+        rows = self._conform(self._to_arrow(frame, str(path)), metadata, str(path))
+        parquet.save(path, [rows], metadata)
 
     def write_pieces(
         self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]
@@ -353,9 +350,7 @@ class Contract:
                 f"{source}: column {twice[0]} occurs twice, expected each name once; rename one"
             )
         # Lists and structs need an explicit type, which an empty list does not have.
-        nested = {
-            column.name: column.dtype for column in self.columns if pa.types.is_nested(column.dtype)
-        }
+        nested = {one.name: one.dtype for one in self.columns if pa.types.is_nested(one.dtype)}
         arrays = {}
         for name in frame.columns:
             try:
@@ -441,9 +436,8 @@ class Contract:
         if not column.required or column.name in table.column_names:
             return
         known_names = {column.name for column in known}
-        near = closest(
-            column.name, [name for name in table.column_names if name not in known_names]
-        )
+        others = [name for name in table.column_names if name not in known_names]
+        near = closest(column.name, others)
         raise ContractError(
             f"{source}: column {column.name} is missing, expected {_described(column)}; "
             f"a {self.label} table must have it"
@@ -465,9 +459,8 @@ class Contract:
             checks.refuse_implausible(values, where)
             if column.unit == "rad":
                 checks.refuse_degrees(values, where)
-        field = pa.field(
-            column.name, column.dtype, metadata={"unit": column.unit, "meaning": column.meaning}
-        )
+        about = {"unit": column.unit, "meaning": column.meaning}
+        field = pa.field(column.name, column.dtype, metadata=about)
         return table.set_column(index, field, values)
 
     def _check_metadata(self, metadata: Mapping[str, Any], source: str) -> None:

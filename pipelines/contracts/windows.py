@@ -42,9 +42,8 @@ def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Wi
     for piece in pieces:
         held = piece if held is None else pa.concat_tables([held, piece])
         while held.num_rows >= start + length + margin:
-            yield Window(
-                held.slice(0, start + length + margin), first, slice(start, start + length)
-            )
+            rows = held.slice(0, start + length + margin)
+            yield Window(rows, first, slice(start, start + length))
             passed = max(0, start + length - margin)
             held, first, start = held.slice(passed), first + passed, start + length - passed
     if held is not None and held.num_rows > start:

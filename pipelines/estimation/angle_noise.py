@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from pipelines.estimation.regression import block_average, padding, regress
 from pipelines.mechanics.motion import Piece
 from pipelines.mechanics.run import Run, kinds_of
-from pipelines.mechanics.slow_motion import below, edge
+from pipelines.mechanics.slow_motion import below
+from pipelines.mechanics.stretches import edge
 from pipelines.model import Model, ParameterLayout, baseline
 
 CUTOFF_HZ = 5.0

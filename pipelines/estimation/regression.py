@@ -10,7 +10,8 @@ from pipelines.errors import InputError
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece
 from pipelines.mechanics.run import Run
-from pipelines.mechanics.slow_motion import edge, filtered, unsure
+from pipelines.mechanics.slow_motion import filtered, unsure
+from pipelines.mechanics.stretches import edge
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 

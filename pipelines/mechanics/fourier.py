@@ -61,9 +61,7 @@ class FourierTrajectory:
         (3, J, 2) array
             Quantity, joint, least and greatest; rad, rad/s and rad/s².
         """
-        ranges = np.array(
-            [[_range(joint) for joint in amplitude] for amplitude in self._amplitudes]
-        )
+        ranges = np.array([list(map(_range, amplitude)) for amplitude in self._amplitudes])
         ranges[0] += self.theta0[:, np.newaxis]
         return ranges
 

@@ -14,14 +14,12 @@ from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import Window, windows
 from pipelines.errors import InputError, about
-from pipelines.mechanics.stretches import Stretches, find_stretches
+from pipelines.mechanics.stretches import Stretches, edge, find_stretches
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.blocks import BlockAverage
 from pipelines.signals.cutoff import Cutoff, choose_cutoff
 from pipelines.signals.low_pass import derivative, low_pass, reach, shortest
 
-EDGE_PERIODS = 1.5
-"""Periods of the cut-off frequency at each end of a segment where the filter lacks one side."""
 SPLINE_REACH = 40
 """Samples over which a cut influences a cubic spline; the influence falls by 3.7 with each."""
 SLOWEST_HZ, FASTEST_HZ = 12.0, 1e6
@@ -78,11 +76,10 @@ class FilteredRecording:
         time, angle = _time_and_angle(rows, self.joints)
         q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
         segment, valid = np.zeros(len(time), dtype=np.int64), np.zeros(len(time), dtype=bool)
-        edge = _edge(rate_hz, self.cutoff.hz)
+        edge_rows = edge(rate_hz, self.cutoff.hz)
         # A stretch that lies only in the margin may be too short to filter; it is dropped.
-        for s in self.stretches.overlapping(
-            window.first + window.core.start, window.first + window.core.stop
-        ):
+        first, last = window.first + window.core.start, window.first + window.core.stop
+        for s in self.stretches.overlapping(first, last):
             here = _rows_of(s, self.stretches, window)
             segment[here] = s
             if self.stretches.samples[s] < shortest(rate_hz, self.cutoff.hz):
@@ -91,11 +88,9 @@ class FilteredRecording:
             q[here], dq[here], ddq[here] = grid.filtered(
                 time[here], angle[here], self.cutoff.hz, self.metadata["filter"]["order"]
             )
-            trusted = slice(
-                max(0, int(self.stretches.start[s]) + edge - window.first),
-                max(0, int(self.stretches.stop[s]) - edge - window.first),
-            )
-            valid[trusted] = True
+            begin = int(self.stretches.start[s]) + edge_rows - window.first
+            end = int(self.stretches.stop[s]) - edge_rows - window.first
+            valid[max(0, begin) : max(0, end)] = True
         return _motion_columns(rows, self.joints, (q, dq, ddq), segment, valid)
 
 
@@ -136,22 +131,16 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
         "cutoff_hz": cutoff.hz,
         "why": cutoff.reason,
     }
-    block = BlockAverage.lasting(settings.block_s, rate_hz)
-    metadata = {
-        **recording.metadata,
-        "filter": how,
-        "regression_filter": block.as_metadata(rate_hz),
-    }
+    block = BlockAverage.lasting(settings.block_s, rate_hz).as_metadata(rate_hz)
+    metadata = recording.metadata | {"filter": how, "regression_filter": block}
     return FilteredRecording(recording, metadata, cutoff, stretches)
 
 
 def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
     if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-        where = (
-            "time.unit in the map, and import again"
-            if imported
-            else "sample_rate_hz in the rig file"
-        )
+        where = "sample_rate_hz in the rig file"
+        if imported:
+            where = "time.unit in the map, and import again"
         raise InputError(
             f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g}"
             f" MHz, which show a joint's motion; correct {where}, or record it again"
@@ -198,18 +187,14 @@ def _cutoff(
 def _refuse_stretches_that_are_all_edge(
     stretches: Stretches, rate_hz: float, cutoff: Cutoff
 ) -> None:
-    edge = _edge(rate_hz, cutoff.hz)
+    rows = edge(rate_hz, cutoff.hz)
     longest = int(stretches.samples[stretches.longest])
-    if longest <= 2 * edge or longest < shortest(rate_hz, cutoff.hz):
+    if longest <= 2 * rows or longest < shortest(rate_hz, cutoff.hz):
         raise InputError(
-            f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f}"
+            f"no stretch without a gap lasts the {2 * rows / rate_hz:.2f} s that a {cutoff.hz:.1f}"
             f" Hz filter needs; the longest has {_count(longest)}: record longer runs, or raise"
             " filter.cutoff_hz"
         )
-
-
-def _edge(rate_hz: float, cutoff_hz: float) -> int:
-    return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
 
 
 def _count(samples: int) -> str:
@@ -232,13 +217,8 @@ def _on_grid(recording: Rows, stretches: Stretches, rate_hz: float) -> Iterator[
 
 def _rows_of(s: int, stretches: Stretches, window: Window) -> slice:
     """Return the rows of a stretch within a window."""
-    rows = window.rows.num_rows
-    return slice(
-        *(
-            int(np.clip(row - window.first, 0, rows))
-            for row in (stretches.start[s], stretches.stop[s])
-        )
-    )
+    ends = np.array([stretches.start[s], stretches.stop[s]]) - window.first
+    return slice(*np.clip(ends, 0, window.rows.num_rows).tolist())
 
 
 def _time_and_angle(rows: pa.Table, joints: Sequence[Joint]) -> tuple[NDArray, NDArray]:
@@ -299,11 +279,7 @@ class _Grid:
         """
         grid, uniform = self._sampled(time, angle)
         smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
-        states = [
-            smooth,
-            derivative(smooth, self._rate_hz, 1),
-            derivative(smooth, self._rate_hz, 2),
-        ]
+        states = [smooth, *(derivative(smooth, self._rate_hz, order) for order in (1, 2))]
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:

@@ -81,15 +81,9 @@ def margins(trajectory: Trajectory, bounds: JointBounds) -> list[Margin]:
     list of Margin
         Six margins, in rad, rad/s and rad/s².
     """
-    allowed, reached = bounds_array(bounds), trajectory.extrema()
+    numbers = np.concatenate([bounds_array(bounds), trajectory.extrema()], axis=2).tolist()
     return [
-        Margin(
-            joint.name,
-            quantity,
-            joint.unit(quantity),
-            *allowed[i, j].tolist(),
-            *reached[i, j].tolist(),
-        )
+        Margin(joint.name, quantity, joint.unit(quantity), *numbers[i][j])
         for j, joint in enumerate(trajectory.joints)
         for i, quantity in enumerate(QUANTITIES)
     ]

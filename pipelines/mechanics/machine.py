@@ -26,13 +26,9 @@ def _collected() -> tuple[Mechanism, ...]:
     """
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
-    mechanisms_of = dict.fromkeys(
-        value
-        for module in modules
-        for value in vars(module).values()
-        if isinstance(value, Mechanism)
-    )
-    for one, other in combinations(mechanisms_of, 2):
+    values = [value for module in modules for value in vars(module).values()]
+    all_mechanisms = dict.fromkeys(value for value in values if isinstance(value, Mechanism))
+    for one, other in combinations(all_mechanisms, 2):
         gravity = (one.has_gravity, other.has_gravity)
         if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
             raise InputError(
@@ -41,7 +37,7 @@ def _collected() -> tuple[Mechanism, ...]:
                 " recording determines its mechanism. Remove one of their files from"
                 " pipelines/mechanics/mechanisms, or give them a different has_gravity"
             )
-    return tuple(mechanisms_of)
+    return tuple(all_mechanisms)
 
 
 MECHANISMS = _collected()

@@ -169,11 +169,8 @@ class Mechanism:
         """
         forms = self.inertia_forms(geometry)
         inertias, axes = np.linalg.eigh(np.tensordot(np.asarray(X, dtype=float), forms, 1))
-        return (
-            float(inertias[0]),
-            float(inertias[-1]),
-            np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0]),
-        )
+        slope = np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0])
+        return float(inertias[0]), float(inertias[-1]), slope
 
     def unrealizable(self, X, geometry: Geometry) -> list[str]:
         """List the conditions of a real machine that inertial parameters violate.

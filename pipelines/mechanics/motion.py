@@ -144,9 +144,8 @@ class Motion:
 
         NaN at a joint without readings.
         """
-        read = (
-            np.full(self.q.shape, np.nan) if self.temperature is None else self.temperature.copy()
-        )
+        measured = self.temperature
+        read = np.full(self.q.shape, np.nan) if measured is None else measured.copy()
         for column in read.T:
             known = np.isfinite(column)
             if known.any() and not known.all():
@@ -156,9 +155,8 @@ class Motion:
     @property
     def on_segments(self) -> NDArray | None:
         """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N, or None."""
-        return (
-            None if self.held_forces is None else self.held_forces.reshape(-1, 2, 2, 3).sum(axis=2)
-        )
+        forces = self.held_forces
+        return None if forces is None else forces.reshape(-1, 2, 2, 3).sum(axis=2)
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
         """Return the torque of the cuffs on a limb.
@@ -271,9 +269,8 @@ class Motion:
         motion = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them again costs more than the correction.
         kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
-        motion.__dict__.update(
-            {name: self.__dict__[name] for name in kept if name in self.__dict__}
-        )
+        cached = vars(self)
+        vars(motion).update({name: cached[name] for name in kept if name in cached})
         return motion
 
 
@@ -297,9 +294,8 @@ def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Ge
     default : Geometry, optional
         Without it, gravity acts on revolute joints, and prismatic joints are level.
     """
-    known = {
-        k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__
-    }
+    stated = metadata.get("geometry", {}).items()
+    known = {key: value for key, value in stated if key in Geometry.__dataclass_fields__}
     slides = all(joint.kind == "prismatic" for joint in joints_of(metadata))
     return replace(default or (Geometry(gravity_m_s2=0.0) if slides else Geometry()), **known)
 
@@ -352,11 +348,8 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         return np.array(frame[[joint.column(quantity) for joint in joints]], dtype=float, order="C")
 
     def if_there(quantity: str) -> NDArray | None:
-        return (
-            per_joint(quantity)
-            if {joint.column(quantity) for joint in joints} <= set(frame.columns)
-            else None
-        )
+        is_there = {joint.column(quantity) for joint in joints} <= set(frame.columns)
+        return per_joint(quantity) if is_there else None
 
     force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
     has_forces = set(force_columns) <= set(frame.columns)

@@ -45,9 +45,7 @@ def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
             f"mechanism.name: found {settings.name!r}, expected a mechanism's name, or a file for a"
             f" new one (docs/mechanisms.md); {suggestion(settings.name, names)}"
         )
-    its = dict.fromkeys(
-        mechanism.kinds for mechanism in MECHANISMS if mechanism.name == settings.name
-    )
+    its = dict.fromkeys(one.kinds for one in MECHANISMS if one.name == settings.name)
     if settings.kinds not in its:
         others = dict.fromkeys(mechanism.name for mechanism in mechanisms_of(settings.all_joints))
         raise SettingsError(
@@ -127,10 +125,9 @@ def read_motions(
         If two files hold the same data, or a training and a validation run share rows of one log.
     """
     _refuse_twins(paths)
-    motions = [read_motion(path, settings, default_geometry) for path in paths]
     named = [
-        replace(motion, file=name)
-        for motion, name in zip(motions, _distinct_names(paths), strict=True)
+        replace(read_motion(path, settings, default_geometry), file=name)
+        for path, name in zip(paths, _distinct_names(paths), strict=True)
     ]
     refuse_seen(named)
     return on_one_scale(named)
@@ -170,11 +167,9 @@ def read_runs(
 
 
 def _motion_rows(path: Path, settings: FilterSettings) -> Rows:
-    return (
-        filtered(RECORDING.scan(path), settings)
-        if contract_of(path) is RECORDING
-        else MOTION.scan(path)
-    )
+    if contract_of(path) is RECORDING:
+        return filtered(RECORDING.scan(path), settings)
+    return MOTION.scan(path)
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:

@@ -133,13 +133,8 @@ class StoredRun:
         fitted = ("angle", "velocity", "acceleration", "torque")
         quantities = [joint.column(quantity) for quantity in fitted for joint in self.rows.joints]
         read = [joint.column("temperature") for joint in self.rows.joints]
-        return [
-            "time_s",
-            *quantities,
-            "segment",
-            "valid",
-            *(c for c in read if c in self._first.column_names),
-        ]
+        temperatures = [name for name in read if name in self._first.column_names]
+        return ["time_s", *quantities, "segment", "valid", *temperatures]
 
     def _motion(self, rows: Any) -> Motion:
         table = Table(rows.to_pandas(), self.rows.metadata, Path(self.file))

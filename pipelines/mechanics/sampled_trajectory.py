@@ -61,12 +61,8 @@ class SampledTrajectory:
         (3, J, 2) array
             Quantity, joint, least and greatest; rad, rad/s and rad/s².
         """
-        return np.array(
-            [
-                [_range(spline, joint) for joint in range(len(self.joints))]
-                for spline in self._splines
-            ]
-        )
+        joints = range(len(self.joints))
+        return np.array([[_range(spline, j) for j in joints] for spline in self._splines])
 
     @cached_property
     def _splines(self) -> tuple[PPoly, PPoly, PPoly]:

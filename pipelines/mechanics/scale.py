@@ -45,9 +45,8 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
     for run in runs:
         for piece in run.pieces(0):
             good = piece.motion.valid & np.isfinite(piece.motion.torque).all(axis=1)
-            q, speed, torque = (
-                x[good] for x in (piece.motion.q, piece.motion.dq, piece.motion.torque)
-            )
+            motion = piece.motion
+            q, speed, torque = motion.q[good], motion.dq[good], motion.torque[good]
             squares += [np.sum(torque**2, axis=0), np.sum(speed**2, axis=0)]
             count += len(q)
             low = np.minimum(low, q.min(axis=0, initial=np.inf))

@@ -6,26 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
 from pipelines.signals.low_pass import derivative, low_pass, shortest
-
-
-def edge(rate_hz: float, cutoff_hz: float) -> int:
-    """Return the length of a stretch's ends, where the filter lacks one side.
-
-    Parameters
-    ----------
-    rate_hz, cutoff_hz : float
-        Sample rate and cut-off, Hz.
-
-    Returns
-    -------
-    int
-        Samples at each end.
-    """
-    # Periods of the cut-off at each end of a stretch where the filter lacks one side.
-    edge_periods = 1.5
-    return int(np.ceil(edge_periods * rate_hz / cutoff_hz))
 
 
 def unsure(motion: Motion, cutoff_hz: float) -> NDArray:

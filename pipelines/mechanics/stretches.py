@@ -97,13 +97,8 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
         starts.extend(start_of[1:])
         origins.extend(origin_of[1:])
         strayed.extend(away[:-1])
-        row, start, origin, stray, before = (
-            row + len(time),
-            start_of[-1],
-            origin_of[-1],
-            away[-1],
-            time[-1],
-        )
+        row, before = row + len(time), time[-1]
+        start, origin, stray = start_of[-1], origin_of[-1], away[-1]
     _refuse_another_rate(steps, rate_hz)
     return Stretches(
         start=np.array(starts, dtype=np.int64),
@@ -121,3 +116,21 @@ def _refuse_another_rate(steps: list[float], rate_hz: float) -> None:
             f"metadata sample_rate_hz is {rate_hz:g}, but time_s advances by {step:g} s "
             f"({1.0 / step:g} Hz); correct the one that is wrong"
         )
+
+
+def edge(rate_hz: float, cutoff_hz: float) -> int:
+    """Return the length of a stretch's ends, where the filter lacks one side.
+
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : float
+        Sample rate and cut-off, Hz.
+
+    Returns
+    -------
+    int
+        Samples at each end.
+    """
+    # Periods of the cut-off at each end of a stretch where the filter lacks one side.
+    edge_periods = 1.5
+    return int(np.ceil(edge_periods * rate_hz / cutoff_hz))

@@ -139,13 +139,12 @@ def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
     """Refuse a table whose coefficients and samples are different motions."""
     # Greatest difference, rad, between samples and their coefficients that is rounding error.
     rounding_rad = 1e-5
-    if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (
-        len(table.joints),
-    ):
+    joints = len(table.joints)
+    if trajectory.a.shape[0] != joints or trajectory.theta0.shape != (joints,):
         raise ContractError(
             f"{table.path}: metadata a, b, theta0_rad: found {trajectory.a.shape[0]} rows and"
             f" {trajectory.theta0.size} mean angles, expected one for each of the"
-            f" {len(table.joints)} joints"
+            f" {joints} joints"
         )
     stated = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
     angles = table.stacked("angle")

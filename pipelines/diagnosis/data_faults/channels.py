@@ -17,8 +17,8 @@ from pipelines.diagnosis.data_faults.fault import (
     stretches,
     when,
 )
-from pipelines.mechanics.kinematics import EDGE_PERIODS
 from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
 
 STALE = 3
@@ -139,7 +139,7 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
     if len(stuck):
         samples = mask_of(stuck, len(angle))
         # The filter spreads the standstill into its neighbourhood.
-        reach = int(np.ceil(EDGE_PERIODS * motion.sample_rate_hz / motion.cutoff_hz))
+        reach = edge(motion.sample_rate_hz, motion.cutoff_hz)
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),

@@ -87,23 +87,13 @@ def _lift(at, state, values, geometry, joint, out):
 
 
 def _broken_inertia(X: NDArray, geometry: Geometry) -> list[str]:
-    return (
-        [f"X1 = {X[0]:.4g} kg·m² is not positive: every rotating part has inertia"]
-        if X[0] <= 0
-        else []
-    )
+    text = f"X1 = {X[0]:.4g} kg·m² is not positive: every rotating part has inertia"
+    return [text] if X[0] <= 0 else []
 
 
 def _broken_mass(X: NDArray, geometry: Geometry) -> list[str]:
-    return [f"X1 = {X[0]:.4g} kg is not positive: every sliding part has mass"] if X[0] <= 0 else []
-
-
-def _inertia_forms(geometry: Geometry) -> NDArray:
-    return np.array([[[1.0]]])
-
-
-def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
-    return np.array([[[1.0]], [[0.0]]])
+    text = f"X1 = {X[0]:.4g} kg is not positive: every sliding part has mass"
+    return [text] if X[0] <= 0 else []
 
 
 _ABSORBED = {"inertia": "X1", "gain": "all parameters together"}
@@ -132,19 +122,19 @@ PENDULUM = Mechanism(
         "payload": _payload_change,
     },
     broken=_broken_inertia,
-    inertia_forms=_inertia_forms_under_gravity,
+    inertia_forms=lambda geometry: np.array([[[1.0]], [[0.0]]]),
     absorbs=_ABSORBED,
 )
 
 TURNTABLE = replace(
     PENDULUM,
-    title=("one revolute joint without gravity: its axis is vertical, or its load balanced"),
+    title="one revolute joint without gravity: its axis is vertical, or its load balanced",
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
     bends_at=(),
     reactions={"rigid_bodies": _inertia},
-    inertia_forms=_inertia_forms,
+    inertia_forms=lambda geometry: np.array([[[1.0]]]),
 )
 
 SLIDE = replace(
@@ -171,6 +161,6 @@ LIFT = replace(
     ),
     along=_lift_along,
     reactions={"rigid_bodies": _lift, "payload": _mass_change},
-    inertia_forms=_inertia_forms_under_gravity,
+    inertia_forms=lambda geometry: np.array([[[1.0]], [[0.0]]]),
     absorbs=_ABSORBED | {"constant": "X2"},
 )
