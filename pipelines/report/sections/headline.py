@@ -73,7 +73,7 @@ def headline(session: Session) -> str:
 
 
 def lead(verdict: Verdict) -> str:
-    """Return the finding in two sentences; the whole summary in files of older versions."""
+    """Return the finding in two sentences; the whole summary if acquisition is at fault."""
     return verdict.finding or verdict.summary
 
 
