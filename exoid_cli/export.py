@@ -104,23 +104,16 @@ def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path])
     from pipelines.export.exported import values_in_words
 
     holdings = exported.holdings(chosen)
-    terms = [
-        {
-            "term": term.effect.label,
-            "held": holding.degree.value,
-            "how": holding.how,
-            "parameters": {
-                p.name: {"value": float(value), "unit": p.unit}
-                for p, value in zip(
-                    term.effect.parameters, term.effect.physical(term.values), strict=True
-                )
-            },
-        }
-        for term, holding in holdings
-    ]
+    terms = []
+    for term, holding in holdings:
+        physical = term.effect.physical(term.values)
+        named = zip(term.effect.parameters, physical, strict=True)
+        values = {p.name: {"value": float(value), "unit": p.unit} for p, value in named}
+        about = {"term": term.effect.label, "held": holding.degree.value, "how": holding.how}
+        terms.append(about | {"parameters": values})
     written = [str(file) for file in files]
-    about = {"to": chosen.name, "run": exported.run, "files": written}
-    console.emit(about | {"warnings": exported.driving(), "terms": terms})
+    result = {"to": chosen.name, "run": exported.run, "files": written}
+    console.emit(result | {"warnings": exported.driving(), "terms": terms})
     rows = [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
     console.table(("term", "held", "how"), rows)
     for sentence in exported.driving():

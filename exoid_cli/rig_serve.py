@@ -66,9 +66,8 @@ def serve(
 
     with starting:
         if not until_input_ends:
-            starting.enter_context(
-                console.starting(f"starting {file.name}; the first start compiles, up to a minute")
-            )
+            what = f"starting {file.name}; the first start compiles, up to a minute"
+            starting.enter_context(console.starting(what))
         from pipelines.rig.server import serve_file  # compiles already
 
         serve_file(

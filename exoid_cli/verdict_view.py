@@ -102,20 +102,11 @@ def _show_router(verdict: "Verdict") -> None:
     parts = {part: words for part, words in ROUTER.items() if any(j.parts[part] for j in joints)}
     variables = list(joints[0].predicted)
     headings = ("joint", *parts.values(), *variables)
-    console.say("")
-    console.table(
-        headings,
-        [
-            (
-                one.joint,
-                *(f"{one.parts[part]:.0%}" for part in parts),
-                *(f"{one.predicted[name]:.0%}" for name in variables),
-            )
-            for one in joints
-        ],
-        title="where the error of rigid body and friction comes from",
-        numbers=", ".join(headings[1:]),
-    )
+    rows = []
+    for one in joints:
+        of_joint = [one.parts[part] for part in parts] + [one.predicted[name] for name in variables]
+        rows.append((one.joint, *(f"{share:.0%}" for share in of_joint)))
+    _show_table("where the error of rigid body and friction comes from", headings, rows)
     console.note(
         f"{_listed(parts.values())}: parts of the mean square, {searched_runs(verdict)}. "
         f"{_listed(variables)}: share that a curve of it alone predicts, validation runs."
@@ -135,21 +126,20 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     if not verdict.causes:
         del errors["extended_rmse_nm"]
     headings = ("joint", *errors.values(), *["excess left"] * bool(verdict.causes))
+    rows = []
+    for joint in joints:
+        excess = [_excess_left(verdict, joint.name)] * bool(verdict.causes)
+        numbers = [f"{getattr(verdict, key)[joint.name]:{digits}}" for key in errors]
+        rows.append((joint.name, *numbers, *excess))
+    effort = either(joint.effort for joint in joints)
+    unit = either(joint.unit("torque") for joint in joints)
+    _show_table(f"{effort} error on runs no fit has seen, {unit}", headings, rows)
+
+
+def _show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table whose columns are numbers but for the first."""
     console.say("")
-    console.table(
-        headings,
-        [
-            (
-                joint.name,
-                *(f"{getattr(verdict, key)[joint.name]:{digits}}" for key in errors),
-                *[_excess_left(verdict, joint.name)] * bool(verdict.causes),
-            )
-            for joint in joints
-        ],
-        title=f"{either(joint.effort for joint in joints)} error on runs no fit has seen, "
-        f"{either(joint.unit('torque') for joint in joints)}",
-        numbers=", ".join(headings[1:]),
-    )
+    console.table(headings, rows, title=title, numbers=", ".join(headings[1:]))
 
 
 def _excess_left(verdict: "Verdict", joint: str) -> str:
@@ -191,25 +181,16 @@ def _in_words(parameter: "Parameter") -> str:
 
 def _show_control(control: "Control") -> None:
     """Print tracking error and peak torque under adaptive control, without and with the causes."""
-    console.say("")
     before, after = control.without, control.with_
     if control.reason or before is None or after is None:
-        console.say(f"Under adaptive control: not compared, {control.reason}.")
+        console.say(f"\nUnder adaptive control: not compared, {control.reason}.")
         return
     headings = ("joint", "error mrad", "error with", "peak N·m", "peak with")
-    console.table(
-        headings,
-        [
-            (
-                joint,
-                f"{1e3 * before.tracking_rmse_rad[joint]:.2f}",
-                f"{1e3 * error:.2f}",
-                f"{before.peak_torque_nm[joint]:.1f}",
-                f"{after.peak_torque_nm[joint]:.1f}",
-            )
-            for joint, error in after.tracking_rmse_rad.items()
-        ],
-        title="tracking error and peak torque under adaptive control, without and with the causes",
-        numbers=", ".join(headings[1:]),
-    )
+    rows = []
+    for joint in after.tracking_rmse_rad:
+        errors = [f"{1e3 * loop.tracking_rmse_rad[joint]:.2f}" for loop in (before, after)]
+        peaks = [f"{loop.peak_torque_nm[joint]:.1f}" for loop in (before, after)]
+        rows.append((joint, *errors, *peaks))
+    title = "tracking error and peak torque under adaptive control, without and with the causes"
+    _show_table(title, headings, rows)
     console.note("Predicted by simulation. The model with the causes may predict worse tracking.")

@@ -38,23 +38,13 @@ class Plant:
 
     def metadata(self) -> dict:
         """Return run, geometry and the parameters of every effect, for a file's metadata."""
-        effects = [
-            {
-                "effect": term.effect.label,
-                **{
-                    p.name: float(v)
-                    for p, v in zip(
-                        term.effect.parameters, term.effect.physical(term.values), strict=True
-                    )
-                },
-            }
-            for term in self.model
-        ]
-        return {
-            "run": self.run,
-            "geometry": self.machine.metadata(self.geometry),
-            "effects": effects,
-        }
+        effects = []
+        for term in self.model:
+            physical = term.effect.physical(term.values)
+            named = zip(term.effect.parameters, physical, strict=True)
+            effects.append({"effect": term.effect.label} | {p.name: float(v) for p, v in named})
+        geometry = self.machine.metadata(self.geometry)
+        return {"run": self.run, "geometry": geometry, "effects": effects}
 
 
 def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:

@@ -140,22 +140,8 @@ class _Loop(NamedTuple):
 CONTROLLER = typeof(RbfController(1.0, 1.0, 1.0, 1.0, 1.0, np.zeros(1), 1.0))
 NETWORK = typeof(_Network(np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1)))
 SEEN = typeof(_Seen(*np.zeros((5, 1))))
-LOOP = types.NamedTuple(
-    [
-        ASSEMBLY,
-        CONTROLLER,
-        WORKSPACE,
-        STAGES,
-        NETWORK,
-        SEEN,
-        states,
-        vector,
-        vector,
-        states,
-        states,
-    ],
-    _Loop,
-)
+TOOLS = (ASSEMBLY, CONTROLLER, WORKSPACE, STAGES, NETWORK, SEEN)
+LOOP = types.NamedTuple([*TOOLS, states, vector, vector, states, states], _Loop)
 
 
 @njit(**INNER)

@@ -25,6 +25,12 @@ class Score:
     samples: int
     """Number of blocks of ``rmse``."""
 
+    def by_joint(self) -> list[dict[str, float]]:
+        """Return the errors of each joint for a file's metadata."""
+        keys = ("rmse_nm", "rmse_unmasked_nm", "torque_rms_nm")
+        errors = np.column_stack([self.rmse, self.rmse_unmasked, self.torque_rms]).tolist()
+        return [dict(zip(keys, row, strict=True)) for row in errors]
+
 
 @dataclass(frozen=True)
 class Validation:
@@ -43,17 +49,8 @@ class Validation:
             By kind of run ("all" pools them), joint, and ``rmse_nm``, ``rmse_unmasked_nm`` or
             ``torque_rms_nm``, N·m.
         """
-        return {
-            run: {
-                joint: {
-                    "rmse_nm": float(score.rmse[j]),
-                    "rmse_unmasked_nm": float(score.rmse_unmasked[j]),
-                    "torque_rms_nm": float(score.torque_rms[j]),
-                }
-                for j, joint in enumerate(self.joints)
-            }
-            for run, score in {**self.by_run, "all": self.pooled}.items()
-        }
+        scores = self.by_run | {"all": self.pooled}
+        return {run: dict(zip(self.joints, s.by_joint(), strict=True)) for run, s in scores.items()}
 
 
 ModelOf = Callable[[Run], Model | None]

@@ -1,6 +1,7 @@
 """The part of a motion below a cut-off lower than its own."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,16 +89,7 @@ def below(motion: Motion, cutoff_hz: float) -> Motion:
         if stretch.stop - stretch.start >= shortest(rate, cutoff_hz):
             dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
     valid = motion.valid & ~unsure(motion, cutoff_hz)
-    return replace(
-        motion,
-        q=q,
-        dq=dq,
-        ddq=ddq,
-        valid=valid,
-        cutoff_hz=cutoff_hz,
-        # Loads and bodies were estimated from the faster motion, and do not apply to this one.
-        load=None,
-        limb_load=None,
-        body=None,
-        limb_body=None,
-    )
+    # Loads and bodies were estimated from the faster motion, and do not apply to this one.
+    estimated: dict[str, Any] = dict.fromkeys(("load", "limb_load", "body", "limb_body"))
+    slow = replace(motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=cutoff_hz)
+    return replace(slow, **estimated)

@@ -107,21 +107,13 @@ def shares(verdict: "Verdict") -> list[Shares]:
     """Return how each joint's residual splits."""
     rows = []
     slides = all(of["angle"] == "m" for of in verdict.units.values())
+    names = {"angle": "position"} if slides else {}
     for joint, router in verdict.router.items():
         depends = {one.variable: one.share_before for one in verdict.depends_on[joint]}
-        rows.append(
-            Shares(
-                joint,
-                router.rms_nm,
-                {part: getattr(router, part) or 0.0 for part in PARTS},
-                router.with_person_only,
-                {
-                    "position" if slides and name == "angle" else name: depends[name]
-                    for name in VARIABLES
-                    if name in depends
-                },
-            )
-        )
+        shown = [name for name in VARIABLES if name in depends]
+        predicted = {names.get(name, name): depends[name] for name in shown}
+        parts = {part: getattr(router, part) or 0.0 for part in PARTS}
+        rows.append(Shares(joint, router.rms_nm, parts, router.with_person_only, predicted))
     return rows
 
 

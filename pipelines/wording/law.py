@@ -7,43 +7,29 @@ LAW = "law:"
 """Prefix of the label of an unlisted law."""
 UNLISTED = "unlisted_"
 """Prefix of the kind of an unlisted effect that resembles a listed cause, before its family."""
-FAMILIES = {
-    "angle": "angle",
-    "other_angle": "angle",
-    "both_angles": "angle",
-    "friction_by_angle": "angle",
-    "friction_by_other_angle": "angle",
-    "speed": "speed",
-    "other_speed": "speed",
-    "load": "load",
-    "other_load": "load",
-    "inertia_by_angle": "transmission",
-    "gain_over_time": "time",
-    "friction_over_time": "time",
-    "time": "time",
-    "hum": "time",
-    "across_joints": "angle",
-    "quantisation": "sensor",
+LAWS = {
+    "angle": ("angle", "a law of {joint}'s angle"),
+    "other_angle": ("angle", "a law of the other joint's angle at {joint}"),
+    "both_angles": ("angle", "a law of both joints' angles at {joint}"),
+    "friction_by_angle": ("angle", "friction of {joint} that depends on its angle"),
+    "friction_by_other_angle": (
+        "angle",
+        "friction of {joint} that depends on the other joint's angle",
+    ),
+    "speed": ("speed", "a law of {joint}'s speed"),
+    "other_speed": ("speed", "a law of the other joint's speed at {joint}"),
+    "load": ("load", "a law of {joint}'s load"),
+    "other_load": ("load", "a law of the other joint's load at {joint}"),
+    "inertia_by_angle": ("transmission", "an inertia of {joint} that depends on its angle"),
+    "gain_over_time": ("time", "a torque gain of {joint} that changes with time"),
+    "friction_over_time": ("time", "friction of {joint} that changes with time"),
+    "time": ("time", "a torque of {joint} that wanders in time and does not repeat"),
+    "hum": ("time", "a tone at {joint} that does not follow the motion"),
+    "across_joints": ("angle", "an elastic torque across both joints"),
+    "quantisation": ("sensor", "a torque of {joint} that is reported in coarse steps"),
 }
-"""The family of each kind of smooth law."""
-IN_WORDS = {
-    "angle": "a law of {joint}'s angle",
-    "other_angle": "a law of the other joint's angle at {joint}",
-    "both_angles": "a law of both joints' angles at {joint}",
-    "speed": "a law of {joint}'s speed",
-    "other_speed": "a law of the other joint's speed at {joint}",
-    "friction_by_angle": "friction of {joint} that depends on its angle",
-    "friction_by_other_angle": "friction of {joint} that depends on the other joint's angle",
-    "load": "a law of {joint}'s load",
-    "other_load": "a law of the other joint's load at {joint}",
-    "inertia_by_angle": "an inertia of {joint} that depends on its angle",
-    "gain_over_time": "a torque gain of {joint} that changes with time",
-    "friction_over_time": "friction of {joint} that changes with time",
-    "time": "a torque of {joint} that wanders in time and does not repeat",
-    "hum": "a tone at {joint} that does not follow the motion",
-    "across_joints": "an elastic torque across both joints",
-    "quantisation": "a torque of {joint} that is reported in coarse steps",
-}
+"""Family and wording of each kind of smooth law."""
+FAMILIES = {kind: family for kind, (family, _) in LAWS.items()}
 FAMILIES_IN_WORDS = {
     "angle": "a law of {joint}'s angle",
     "speed": "a law of {joint}'s speed",
@@ -86,7 +72,7 @@ def law_in_words(label: str, machine: Machine | None = None) -> str:
     kind, joint = kind_and_joint(label)
     if kind.startswith(UNLISTED):
         return f"{family_in_words(family_of_kind(kind), joint, machine)}, similar to a listed cause"
-    return _said_of(IN_WORDS[kind], joint, machine)
+    return _said_of(LAWS[kind][1], joint, machine)
 
 
 def is_of_other_joint(label: str) -> bool:

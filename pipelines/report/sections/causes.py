@@ -14,17 +14,7 @@ def context(content: Content) -> dict[str, Any]:
 
 
 def _cause(cause: Cause) -> dict[str, Any]:
-    return {
-        "words": cause_in_words(cause),
-        "own": per_run_values(cause),
-        "evidence": cause.evidence,
-        "ties": [
-            {
-                "words": cause_in_words(tie),
-                "probability": tie.probability,
-                "why": tie.why,
-                "how": tie.how_to_separate,
-            }
-            for tie in cause.indistinguishable_from
-        ],
-    }
+    alike = cause.indistinguishable_from
+    ties = [tie.model_dump() | {"words": cause_in_words(tie)} for tie in alike]
+    own, evidence = per_run_values(cause), cause.evidence
+    return {"words": cause_in_words(cause), "own": own, "evidence": evidence, "ties": ties}

@@ -57,17 +57,12 @@ class Origin:
 
 def _origins(session: Session) -> list[Origin]:
     """Return every file of a session, oldest first."""
-    rows = [
-        Origin(
-            session.shown(one.path),
-            one.contract,
-            str(one.metadata.get("created_by") or "unknown"),
-            str(one.metadata.get("created_at") or ""),
-            one.sha256,
-            tuple(_input(session, stated) for stated in one.inputs),
-        )
-        for one in session.artifacts
-    ]
+    rows = []
+    for one in session.artifacts:
+        by = str(one.metadata.get("created_by") or "unknown")
+        when = str(one.metadata.get("created_at") or "")
+        inputs = tuple(_input(session, stated) for stated in one.inputs)
+        rows.append(Origin(session.shown(one.path), one.contract, by, when, one.sha256, inputs))
     return sorted(rows, key=lambda origin: (origin.created_at, origin.file))
 
 

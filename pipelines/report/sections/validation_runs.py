@@ -39,20 +39,17 @@ def context(content: Content) -> dict[str, Any]:
 def _runs(content: Content) -> list[ShownRun]:
     session = content.session
     replays = replayed(session)
+    models = tuple(words for _, words in models_of(session).values())
     names = dict.fromkeys([*run_names(session), *replays])
-    return [
-        ShownRun(
-            name,
-            _about(session, name),
-            tuple(chart for chart in content.charts.measured if chart.group == name),
-            name in replays,
-            tuple(words for _, words in models_of(session).values()),
-            tuple(scores(session, name)),
-            lacks_causes(session, name),
-            refusal(session, name),
+    runs = []
+    for name in sorted(names, key=lambda name: "human" not in name):
+        charts = tuple(chart for chart in content.charts.measured if chart.group == name)
+        table = (models, tuple(scores(session, name)))
+        lacking = (lacks_causes(session, name), refusal(session, name))
+        runs.append(
+            ShownRun(name, _about(session, name), charts, name in replays, *table, *lacking)
         )
-        for name in sorted(names, key=lambda name: "human" not in name)
-    ]
+    return runs
 
 
 def _about(session: Session, name: str) -> str:
