@@ -158,21 +158,8 @@ void {name}_torque_reading(double t, double tau[{joints}]) {{
 """
 
 
-def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return header and source; their functions start with the file's name.
-
-    Parameters
-    ----------
-    exported : Exported
-        The model to write.
-    stem : str
-        Name of the files without suffix.
-
-    Returns
-    -------
-    mapping
-        Text by suffix, ``.h`` and ``.c``.
-    """
+def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return header and source; their functions start with the file's name."""
     model, name = equations(exported), function_name(stem, ".c")
     joints = len(model.joints)
     of_memory = ", ".join(dict.fromkeys(model.memory_of))
@@ -229,4 +216,4 @@ def _lines(equations: Iterable[Equation], write: Callable[[Equation], list[str]]
     return "".join(f"{line}\n" for line in indented(lines))
 
 
-C = Format("c", "C99 source", ".c", holding, write)
+C = Format("c", "C99 source", ".c", holding, _write)

@@ -34,21 +34,8 @@ def holding(term: Term) -> Holding:
     return exact("parameters, with intervals and covariance")
 
 
-def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the document's text.
-
-    Parameters
-    ----------
-    exported : Exported
-        The model to write.
-    stem : str
-        Name of the model.
-
-    Returns
-    -------
-    mapping
-        Text by suffix, ``.json``.
-    """
+def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the document's text."""
     contract = "model/1"
     table, mechanism = exported.table, exported.machine.mechanism
     document = {
@@ -103,4 +90,4 @@ def _effect(term: Term) -> dict[str, Any]:
     }
 
 
-JSON = Format("json", "JSON document", ".json", holding, write)
+JSON = Format("json", "JSON document", ".json", holding, _write)

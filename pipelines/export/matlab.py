@@ -96,21 +96,8 @@ end
 """
 
 
-def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the function file.
-
-    Parameters
-    ----------
-    exported : Exported
-        The model to write.
-    stem : str
-        Name of the file without suffix.
-
-    Returns
-    -------
-    mapping
-        Text by suffix, ``.m``.
-    """
+def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the function file."""
     model = equations(exported)
     joints = len(model.joints)
     order = [
@@ -166,4 +153,4 @@ def _statements(equations: Iterable[Equation], write: Callable[[Equation], list[
     return [line for e in equations for line in (_comment([f"{e.label}: {e.text}"]), *write(e))]
 
 
-MATLAB = Format("matlab", "MATLAB function", ".m", holding, write)
+MATLAB = Format("matlab", "MATLAB function", ".m", holding, _write)

@@ -44,21 +44,8 @@ EXACT: dict[Element | None, str] = {
 """Places in the file that hold an element exactly."""
 
 
-def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model's text.
-
-    Parameters
-    ----------
-    exported : Exported
-        The model to write.
-    stem : str
-        Name of the model.
-
-    Returns
-    -------
-    mapping
-        Text by suffix, ``.xml``.
-    """
+def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the model's text."""
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
@@ -198,5 +185,5 @@ MJCF = Format(
     "MuJoCo model",
     ".xml",
     holding_from(EXACT, _friction, "orientation of the joint's frame", "MJCF"),
-    write,
+    _write,
 )

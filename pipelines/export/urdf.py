@@ -32,21 +32,8 @@ EXACT: dict[Element | None, str] = {
 """Places in the file that hold an element exactly."""
 
 
-def write(exported: Exported, stem: str) -> Mapping[str, str]:
-    """Return the model's text.
-
-    Parameters
-    ----------
-    exported : Exported
-        The model to write.
-    stem : str
-        Name of the robot.
-
-    Returns
-    -------
-    mapping
-        Text by suffix, ``.urdf``.
-    """
+def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the model's text."""
     root = ET.Element("robot", name=one_line(stem))
     joints = unique(one_line(joint.name) for joint in exported.joints)
     links = unique([f"{name}_link" for name in joints], ["base", *joints])
@@ -97,5 +84,5 @@ URDF = Format(
     "URDF model",
     ".urdf",
     holding_from(EXACT, _friction, "origin of the joint", "URDF"),
-    write,
+    _write,
 )
