@@ -21,8 +21,7 @@ def design(
     ] = None,
     config: ConfigOption = None,
     evaluate: Annotated[
-        Path | None,
-        typer.Option("--evaluate", metavar="FILE", help="Judge this excitation, Parquet or TOML."),
+        Path | None, typer.Option(metavar="FILE", help="Judge this excitation, Parquet or TOML.")
     ] = None,
     criterion: Annotated[
         Literal["log_det", "condition", "scaled_condition"] | None,

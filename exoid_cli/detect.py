@@ -30,7 +30,7 @@ def detect(
     config: ConfigOption = None,
     rig: Annotated[
         Path | None,
-        typer.Option("--rig", help="A virtual rig's file: the leg that an excitation would move."),
+        typer.Option(help="A virtual rig's file: the leg that an excitation would move."),
     ] = None,
     runs: Annotated[
         Literal["exo_alone", "with_human", "both"],

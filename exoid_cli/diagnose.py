@@ -23,8 +23,7 @@ def diagnose(
         ),
     ] = None,
     output: Annotated[
-        Path | None,
-        output_option("Folder for verdict, tables and figures.", "diagnosed/", "--out"),
+        Path | None, output_option("Folder for verdict, tables and figures.", "diagnosed/", "--out")
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,

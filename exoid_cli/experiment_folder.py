@@ -52,11 +52,7 @@ def settings_in_force(config: Path | None) -> "Experiment":
 
 
 def open_experiment(
-    config: Path | None,
-    out: Path | None = None,
-    problem: str = "",
-    *,
-    allow_damaged: bool = False,
+    config: Path | None, out: Path | None = None, problem: str = "", *, allow_damaged: bool = False
 ) -> ExperimentFolder:
     """Return the experiment to work on.
 

@@ -16,15 +16,11 @@ if TYPE_CHECKING:
 
 def export(
     model: Annotated[
-        Path | None,
-        files_argument("A parameters/1 file.", "identified/parameters.parquet"),
+        Path | None, files_argument("A parameters/1 file.", "identified/parameters.parquet")
     ] = None,
     *,
     to: Annotated[
-        str,
-        typer.Option(
-            "--to", help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats
-        ),
+        str, typer.Option(help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats)
     ],
     output: Annotated[
         Path | None,
@@ -34,9 +30,7 @@ def export(
     ] = None,
     run: Annotated[
         str | None,
-        typer.Option(
-            "--run", help="exo_alone, with_human or human; with_human if there are several."
-        ),
+        typer.Option(help="exo_alone, with_human or human; with_human if there are several."),
     ] = None,
     config: ConfigOption = None,
 ) -> None:

@@ -18,10 +18,7 @@ def figures(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            "--only",
-            metavar="NAME",
-            help="Only this figure; repeatable.",
-            autocompletion=completion.figures,
+            metavar="NAME", help="Only this figure; repeatable.", autocompletion=completion.figures
         ),
     ] = None,
 ) -> None:

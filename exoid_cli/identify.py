@@ -31,8 +31,7 @@ def identify(
         files_argument("motion/1 or recording/1 files.", "motions/RUN.parquet of every run"),
     ] = None,
     output: Annotated[
-        Path | None,
-        output_option("Folder for parameters, residuals and figures.", "identified/"),
+        Path | None, output_option("Folder for parameters, residuals and figures.", "identified/")
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
@@ -89,10 +88,9 @@ def identify(
         run_stages(context, folder, "identify", again=again)
         return
     if (causes or effect) and output is None:
-        option = "--causes" if causes else "--effect"
         raise InputError(
-            f"{option}: no folder is given; name one with -o, since identified/ is for the model"
-            " without"
+            f"{'--causes' if causes else '--effect'}: no folder is given; name one with -o, since"
+            " identified/ is for the model without"
         )
     if output and (output / "verdict.json").exists():
         raise InputError(
@@ -185,20 +183,15 @@ def _report(model: "Identified", machine: "Machine") -> None:
     console.emit(about | {key: getattr(model, key) for key in keys})
     show_parameters(rows, machine.joints, model.one_step.tolist())
     console.say("")
-    scores = {**model.validation.by_run, "all": model.validation.pooled}
-    console.table(
-        ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}"),
-        [
-            (
-                *(run, joint),
-                *(format_value(x[j], machine.joints, 3) for x in (score.rmse, score.rmse_unmasked)),
-                format_value(score.torque_rms[j], machine.joints, 2),
+    errors_of_runs: list[tuple[str, ...]] = []
+    for run, by_joint in model.validation.as_json().items():
+        for joint, errors in by_joint.items():
+            decimals = zip(errors.values(), (3, 3, 2), strict=True)
+            errors_of_runs.append(
+                (run, joint, *(format_value(x, machine.joints, d) for x, d in decimals))
             )
-            for run, score in scores.items()
-            for j, joint in enumerate(model.validation.joints)
-        ],
-        numbers=f"RMSE {unit}, with reversals, torque rms {unit}",
-    )
+    headings = ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}")
+    console.table(headings, errors_of_runs, numbers=", ".join(headings[2:]))
     for sentence in model.remarks:
         console.say(f"{sentence}.")
     kind = "leg" if machine.is_exoskeleton else "machine"

@@ -31,8 +31,7 @@ def import_(
         Path, typer.Option("-o", "--output", help="Folder for the recordings.")
     ] = Path("recordings"),
     guess: Annotated[
-        bool,
-        typer.Option("--guess", help="Propose a map instead; written to --map, if given."),
+        bool, typer.Option("--guess", help="Propose a map instead; written to --map, if given.")
     ] = False,
 ) -> None:
     """Make recordings of logs from other tools; a map says what their columns are.
@@ -83,7 +82,11 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.importing.sanity.leftover_recordings import unused
     from pipelines.settings.import_map import load_map
 
-    _refuse_file_name(output)
+    if output.suffix == ".parquet":
+        raise InputError(
+            f"-o {output}: is a file name, expected the folder of all recordings, such as"
+            f' -o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
+        )
     settings = load_map(map_)
     for leftover in leftovers(output) if output.is_dir() else []:
         console.warn(
@@ -102,14 +105,6 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     console.emit(logs)
     names = [recording["path"].stem for log in logs for recording in log["recordings"]]
     _say_next_step(output, names, map_)
-
-
-def _refuse_file_name(output: Path) -> None:
-    if output.suffix == ".parquet":
-        raise InputError(
-            f"-o {output}: is a file name, expected the folder of all recordings, such as"
-            f' -o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
-        )
 
 
 def _recordings(

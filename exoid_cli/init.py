@@ -12,8 +12,7 @@ from exoid_cli.console import console
 
 def init(
     folder: Annotated[
-        Path,
-        typer.Argument(metavar="DIR", help="Folder of the experiment; created if need be."),
+        Path, typer.Argument(metavar="DIR", help="Folder of the experiment; created if need be.")
     ],
 ) -> None:
     """Start a new experiment: a commented exoid.toml, rigs, and a Makefile.

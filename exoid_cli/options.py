@@ -8,12 +8,10 @@ import typer
 AgainOption = Annotated[bool, typer.Option("--again", help="Redo even if up to date.")]
 YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real rig is moved.")]
 ConfigOption = Annotated[
-    Path | None,
-    typer.Option("--config", help="The experiment's settings.", show_default="exoid.toml"),
+    Path | None, typer.Option(help="The experiment's settings.", show_default="exoid.toml")
 ]
 OutOption = Annotated[
-    Path | None,
-    typer.Option("--out", help="Folder of the results.", show_default="that of exoid.toml"),
+    Path | None, typer.Option(help="Folder of the results.", show_default="that of exoid.toml")
 ]
 
 

@@ -26,17 +26,13 @@ def report(
     ),
     config: Annotated[
         Path | None,
-        typer.Option(
-            "--config", help="exoid.toml, named in the command lines that repeat the work."
-        ),
+        typer.Option(help="exoid.toml, named in the command lines that repeat the work."),
     ] = None,
     compare: Annotated[
-        tuple[Path, Path] | None,
-        typer.Option("--compare", metavar="A B", help="Lay two sessions side by side."),
+        tuple[Path, Path] | None, typer.Option(metavar="A B", help="Lay two sessions side by side.")
     ] = None,
     title: Annotated[
-        str | None,
-        typer.Option("--title", help="The page's title; the folder's name unless given."),
+        str | None, typer.Option(help="The page's title; the folder's name unless given.")
     ] = None,
 ) -> None:
     """Write one self-contained page: verdict, figures, model, and how to repeat the work.

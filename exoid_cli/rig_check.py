@@ -42,8 +42,7 @@ def check(
         typer.Option(help="Whether a person is in the machine; sensors' zeros need an empty one."),
     ] = "exo_alone",
     by_hand: Annotated[
-        bool,
-        typer.Option("--by-hand", help="Guide a manual test with the drives disabled."),
+        bool, typer.Option("--by-hand", help="Guide a manual test with the drives disabled.")
     ] = False,
     move: Annotated[
         bool,

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 def simulate(
     context: typer.Context,
     parameters: Annotated[
-        Path | None,
-        files_argument("A parameters/1 file.", "identified/parameters.parquet"),
+        Path | None, files_argument("A parameters/1 file.", "identified/parameters.parquet")
     ] = None,
     output: Annotated[
         Path | None,
@@ -32,22 +31,15 @@ def simulate(
     run: Annotated[
         Literal["exo_alone", "with_human"] | None,
         typer.Option(
-            "--run",
-            help="Whose parameters.",
-            show_default="with_human, if the model has it; a replay's own",
+            help="Whose parameters.", show_default="with_human, if the model has it; a replay's own"
         ),
     ] = None,
     reference: Annotated[
-        Path | None,
-        typer.Option(
-            "--reference", help="What to follow: trajectory/1 or TOML; a gait unless given."
-        ),
+        Path | None, typer.Option(help="What to follow: trajectory/1 or TOML; a gait unless given.")
     ] = None,
     replay: Annotated[
         Path | None,
-        typer.Option(
-            "--replay", help="A recording/1 or motion/1 to simulate again, with its own run."
-        ),
+        typer.Option(help="A recording/1 or motion/1 to simulate again, with its own run."),
     ] = None,
 ) -> None:
     """Simulate the leg under adaptive RBF control, or replay a recording on the model.
@@ -131,18 +123,16 @@ def _track(
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
+    amplitude, omega = chosen.disturbance_nm, chosen.disturbance_rad_s
+    disturbance = {"amplitude_nm": amplitude, "omega_rad_s": omega}
+    counts, noise_rad = chosen.encoder_counts_per_turn, chosen.encoder_noise_rad
+    noise = {"counts_per_turn": counts, "angle_rad": noise_rad}
     described = describe(inputs, config) | {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
-        "disturbance": {
-            "amplitude_nm": chosen.disturbance_nm,
-            "omega_rad_s": chosen.disturbance_rad_s,
-        },
-        "noise": {
-            "counts_per_turn": chosen.encoder_counts_per_turn,
-            "angle_rad": chosen.encoder_noise_rad,
-        },
+        "disturbance": disturbance,
+        "noise": noise,
         "seed": chosen.seed,
     }
     SIMULATION.write(output / LOOP, frame, described)
@@ -159,23 +149,15 @@ def _track(
     worst = loop.worst_error(chosen.settled_after_s)
     peak = abs(loop.run.torque).max(axis=0)
     names = [joint.name for joint in plant.joints]
-    console.emit(
-        {
-            "largest_error_rad": dict(zip(names, worst.tolist(), strict=True)),
-            "peak_torque_nm": dict(zip(names, peak.tolist(), strict=True)),
-            "sweep": gains.to_dict("records"),
-        }
-    )
-    settled = (
-        f"largest error after {chosen.settled_after_s:g} s"
-        f" ({either(j.unit('angle') for j in plant.joints)})"
-    )
-    strongest = f"peak torque ({either(j.unit('torque') for j in plant.joints)})"
-    console.table(
-        ("joint", settled, strongest),
-        [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
-        numbers=f"{settled}, {strongest}",
-    )
+    errors = dict(zip(names, worst.tolist(), strict=True))
+    torques = dict(zip(names, peak.tolist(), strict=True))
+    result = {"largest_error_rad": errors, "peak_torque_nm": torques}
+    console.emit(result | {"sweep": gains.to_dict("records")})
+    angle, torque = (either(j.unit(q) for j in plant.joints) for q in ("angle", "torque"))
+    settled = f"largest error after {chosen.settled_after_s:g} s ({angle})"
+    strongest = f"peak torque ({torque})"
+    rows = [(name, f"{errors[name]:.4f}", f"{torques[name]:.1f}") for name in names]
+    console.table(("joint", settled, strongest), rows, numbers=f"{settled}, {strongest}")
     tables = [LOOP, *([SWEEP] if len(gains) else [])]
     drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
     console.wrote(output, *tables, *(drawn if chosen.figures else []))
@@ -198,10 +180,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "filter", "mechanism")
-    shared: dict[str, Any] = describe(inputs, config) | {
-        "joints": motion.joint_metadata,
-        "plant": plant.metadata(),
-    }
+    about: dict[str, Any] = {"joints": motion.joint_metadata, "plant": plant.metadata()}
+    shared = describe(inputs, config) | about
     names = [joint.name for joint in plant.joints]
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
@@ -232,12 +212,10 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     _report_replay(result, plant.joints)
     if no_closed_loop:
         console.warn(f"no closed loop for {recording}: {no_closed_loop}")
-    console.wrote(
-        output.parent,
-        output.name,
-        *([] if no_closed_loop else [closed_loop_file.name]),
-        *([output.with_suffix(".png").name] if settings.simulate.figures else []),
-    )
+    written = [output.name, *([] if no_closed_loop else [closed_loop_file.name])]
+    if settings.simulate.figures:
+        written.append(output.with_suffix(".png").name)
+    console.wrote(output.parent, *written)
     for guess in plant.guesses:
         console.warn(f"{guess}. The errors contain the difference")
 
@@ -252,10 +230,7 @@ def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:
         "closed_loop_rmse_rad": f"closed loop ({angle})",
         "closed_loop_rmse_nm": f"closed loop ({torque})",
     }
-    shown = [key for key in headings if key in result]
-    console.table(
-        ("joint", *(headings[key] for key in shown)),
-        [(joint.name, *(f"{result[key][joint.name]:.4g}" for key in shown)) for joint in joints],
-        title="root mean square of simulated less recorded",
-        numbers=", ".join(headings[key] for key in shown),
-    )
+    shown = {key: heading for key, heading in headings.items() if key in result}
+    rows = [(one.name, *(f"{result[key][one.name]:.4g}" for key in shown)) for one in joints]
+    title, numbers = "root mean square of simulated less recorded", ", ".join(shown.values())
+    console.table(("joint", *shown.values()), rows, title=title, numbers=numbers)
