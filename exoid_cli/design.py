@@ -98,16 +98,14 @@ def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any
 
 
 def _show(file: str, quality: "Quality") -> None:
-    console.table(
-        ("how well the regressor is conditioned", "value"),
-        [
-            ("condition number, 8 columns (the paper's criterion)", f"{quality.condition:.1f}"),
-            ("condition number, 4 inertial columns", f"{quality.inertial_condition:.1f}"),
-            ("condition number, columns scaled to unit norm", f"{quality.scaled_condition:.1f}"),
-            ("log det A'A/N", f"{quality.log_det:.2f}"),
-        ],
-        numbers="value",
-    )
+    conditioning = [
+        ("condition number, 8 columns (the paper's criterion)", f"{quality.condition:.1f}"),
+        ("condition number, 4 inertial columns", f"{quality.inertial_condition:.1f}"),
+        ("condition number, columns scaled to unit norm", f"{quality.scaled_condition:.1f}"),
+        ("log det A'A/N", f"{quality.log_det:.2f}"),
+    ]
+    headings: tuple[str, ...] = ("how well the regressor is conditioned", "value")
+    console.table(headings, conditioning, numbers="value")
     console.say("")
     stated = quality.standard_errors.items()
     errors = [(name, f"{value:.2g}", quality.units[name]) for name, value in stated]

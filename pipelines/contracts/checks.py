@@ -175,12 +175,8 @@ def refuse_implausible(column: pa.ChunkedArray, where: Place) -> None:
     ContractError
         A number is larger than ``LARGEST``.
     """
-    _refuse_beyond(
-        LARGEST,
-        column,
-        where,
-        f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop the row",
-    )
+    remedy = "correct the unit or scale of the column, or drop the row"
+    _refuse_beyond(LARGEST, column, where, f", expected at most {LARGEST:g}; {remedy}")
 
 
 def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:

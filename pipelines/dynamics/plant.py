@@ -64,14 +64,10 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
         reasons = mechanism.unrealizable(X, geometry) or [
             f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
         ]
-        whose, remedy = (
-            ("leg", "from motions that separate X1, X2 and X3 better")
-            if mechanism is LEG
-            else (
-                "machine",
-                "from richer motions, with the signs of torque and angle as they should be",
-            )
-        )
+        whose, remedy = "leg", "from motions that separate X1, X2 and X3 better"
+        if mechanism is not LEG:
+            whose = "machine"
+            remedy = "from richer motions, with the signs of torque and angle as they should be"
         raise InputError(
             f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. Its simulation"
             f" diverges; identify again {remedy}, or choose another --run"

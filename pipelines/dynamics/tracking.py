@@ -108,16 +108,10 @@ def track(
     half_steps = np.arange(2 * (n - 1) * substeps + 1) * (0.5 * period / substeps)
     disturbance = settings.disturbance_nm * np.sin(settings.disturbance_rad_s * half_steps)
     wanted = np.stack(reference.at(half_steps), axis=1)
-    run = follow_with_rbf(
-        plant.assembly,
-        _controller(settings, feedback_gain),
-        _encoder(settings, n, joints),
-        wanted,
-        np.repeat(disturbance[:, np.newaxis], joints, axis=1),
-        period,
-        np.zeros(joints),
-        substeps,
-    )
+    controller, encoder = _controller(settings, feedback_gain), _encoder(settings, n, joints)
+    push, start = np.repeat(disturbance[:, np.newaxis], joints, axis=1), np.zeros(joints)
+    loop = (plant.assembly, controller, encoder)
+    run = follow_with_rbf(*loop, wanted, push, period, start, substeps)
     reached = len(run.angle)
     return ClosedLoop(
         np.arange(reached) * period, wanted[:: 2 * substeps, 0][:reached], run, plant.joints, n

@@ -107,11 +107,8 @@ def holding(term: Term) -> Holding:
         return exact("a constant between angles")
     kernels = (effect.reaction, effect.derivative, effect.torque_reading)
     try:
-        outcomes = [
-            _outcome(term, kernel, list(term.values), "at.q", 0)
-            for kernel in kernels
-            if kernel is not None
-        ]
+        present = [kernel for kernel in kernels if kernel is not None]
+        outcomes = [_outcome(term, kernel, list(term.values), "at.q", 0) for kernel in present]
     except NotWritable as error:
         return left_out(str(error))
     if TEMPERATURE in names_in(outcomes, "element"):

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.contracts import Joint
 from pipelines.contracts.provenance import describe
 from pipelines.effects.reference import facts
 from pipelines.export.exported import Exported
@@ -45,15 +46,7 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
         "run": exported.run,
         "mechanism": {"name": mechanism.name, "title": mechanism.title},
         "method": table.metadata.get("method"),
-        "joints": [
-            {
-                "name": joint.name,
-                "kind": joint.kind,
-                "angle_unit": joint.unit("angle"),
-                "torque_unit": joint.unit("torque"),
-            }
-            for joint in exported.joints
-        ],
+        "joints": [_joint(joint) for joint in exported.joints],
         "geometry": exported.machine.metadata(exported.geometry),
         "conventions": CONVENTIONS,
         "parameters": [_plain(row) for row in table.frame.to_dict("records")],
@@ -66,6 +59,11 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
     return {str(key): None if pd.isna(value) else value for key, value in row.items()}
+
+
+def _joint(joint: Joint) -> dict[str, str]:
+    units = {f"{quantity}_unit": joint.unit(quantity) for quantity in ("angle", "torque")}
+    return {"name": joint.name, "kind": joint.kind} | units
 
 
 def _effect(term: Term) -> dict[str, Any]:

@@ -53,14 +53,9 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
             high = np.maximum(high, q.max(axis=0, initial=-np.inf))
     torque, speed = np.sqrt(squares / max(count, 1))
     # A joint at rest or a dead channel has no scale; such runs are refused elsewhere.
-    return tuple(
-        Scale(
-            torque=float(torque[j]) / torque_nm if torque[j] > 0 else 1.0,
-            speed=float(speed[j]) / speed_rad_s if speed[j] > 0 else 1.0,
-            # Angles do not scale with the machine, because its equations contain their sines.
-            travel=float(high[j] - low[j]) / travel_rad
-            if joint.kind == "prismatic" and high[j] > low[j]
-            else 1.0,
-        )
-        for j, joint in enumerate(runs[0].machine.joints)
-    )
+    # Angles do not scale with the machine, because its equations contain their sines.
+    slides = np.array([joint.kind == "prismatic" for joint in runs[0].machine.joints])
+    travel = np.where(slides & (high > low), (high - low) / travel_rad, 1.0)
+    torque = np.where(torque > 0, torque / torque_nm, 1.0)
+    speed = np.where(speed > 0, speed / speed_rad_s, 1.0)
+    return tuple(Scale(*row) for row in np.column_stack([torque, speed, travel]).tolist())

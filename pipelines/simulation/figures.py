@@ -100,14 +100,9 @@ def draw_replay(
     """
     with plt.rc_context(STYLE):
         columns = 1 if closed_loop is None else 2
-        figure, axes = plt.subplots(
-            2 * len(joints),
-            columns,
-            figsize=(6 * columns, 4 * len(joints)),
-            sharex="col",
-            squeeze=False,
-            height_ratios=[2, 1] * len(joints),
-        )
+        size, heights = (6 * columns, 4 * len(joints)), [2, 1] * len(joints)
+        shape: dict[str, Any] = {"figsize": size, "height_ratios": heights, "squeeze": False}
+        figure, axes = plt.subplots(2 * len(joints), columns, sharex="col", **shape)
         for j, joint in enumerate(joints):
             _windows(axes[2 * j, 0], axes[2 * j + 1, 0], open_loop, joint)
             if closed_loop is not None:

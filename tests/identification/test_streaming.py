@@ -68,7 +68,7 @@ def test_a_figure_of_a_long_run_has_rows_from_all_of_it_and_the_error_of_all_of_
     whole = pd.DataFrame(
         {"time_s": np.arange(n), "scored": rng.random(n) < 0.8, "left": rng.standard_normal(n)}
     )
-    drawn = figures._Drawn(whole.iloc[:0])
+    drawn = figures._RunData(whole.iloc[:0])
     for start in range(0, n, 37):
         drawn.add(whole.iloc[start : start + 37], ["left"])
     assert 50 <= len(drawn.frame) <= 100

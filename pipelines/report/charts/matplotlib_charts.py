@@ -33,12 +33,8 @@ def chart_figure(chart: Chart) -> Figure:
     chart = chart.thinned(ROWS)
     cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
     heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
-    figure, axes = _rows(
-        len(chart.panels),
-        (NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)),
-        sharex=True,
-        height_ratios=heights,
-    )
+    size = (NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights))
+    figure, axes = _rows(len(chart.panels), size, sharex=True, height_ratios=heights)
     for axis, panel in zip(axes, chart.panels, strict=True):
         _draw(axis, chart, panel)
     axes[-1].set_xlabel(chart.x_label)
@@ -99,13 +95,9 @@ def budget_figure(bars: Sequence[Bar]) -> Figure:
         axis.set_title(title, loc="left", fontsize=9)
         axis.set_xlabel(f"mean square error, ({bar.unit})²")
         axis.grid(visible=False)
-        axis.legend(
-            [Patch(color=TONES[segment.tone]) for segment in shown],
-            [f"{segment.label}: {digits(segment.rms)} {bar.unit}" for segment in shown],
-            loc="center left",
-            bbox_to_anchor=(1.01, 0.5),
-            fontsize=8,
-        )
+        patches = [Patch(color=TONES[s.tone]) for s in shown]
+        labels = [f"{s.label}: {digits(s.rms)} {bar.unit}" for s in shown]
+        axis.legend(patches, labels, loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8)
     return figure
 
 

@@ -46,22 +46,19 @@ def render(
         "charts": {chart.key: _chart(chart) for chart in charts},
         "animations": [_animation(one) for one in animations],
     }
-    return (
-        _environment()
-        .get_template(template)
-        .render(
-            context,
-            style=Markup(style),
-            style_hash=_digest(style),
-            scripts=[Markup(script) for script in scripts],
-            script_hashes=[_digest(script) for script in scripts],
-            data=Markup(_in_a_script(data)),
-            provenance=Markup(_in_a_script(_provenance(artifacts))),
-            uplot_version=_uplot_version(_asset("uPlot.iife.min.js")),
-            uplot_license=Markup(_asset("uPlot.LICENSE")),
-            version=__version__,
-            made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
-        )
+    page = _environment().get_template(template)
+    return page.render(
+        context,
+        style=Markup(style),
+        style_hash=_digest(style),
+        scripts=[Markup(script) for script in scripts],
+        script_hashes=[_digest(script) for script in scripts],
+        data=Markup(_in_a_script(data)),
+        provenance=Markup(_in_a_script(_provenance(artifacts))),
+        uplot_version=_uplot_version(_asset("uPlot.iife.min.js")),
+        uplot_license=Markup(_asset("uPlot.LICENSE")),
+        version=__version__,
+        made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
     )
 
 
@@ -84,13 +81,9 @@ def _asset(name: str) -> str:
 
 @cache
 def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_asset),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    loader, undefined = jinja2.FunctionLoader(_asset), jinja2.StrictUndefined
+    environment = jinja2.Environment(loader=loader, undefined=undefined, autoescape=True)
+    environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters |= {"digits": digits, "digits_for": digits_for}
     return environment
 

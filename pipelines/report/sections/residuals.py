@@ -71,14 +71,11 @@ def context(content: Content) -> dict[str, Any]:
 
 def _predicted(session: Session, joint: Joint) -> list[Predicted]:
     words = {one.variable: one.title for one in _against(session, joint)}
-    return [
-        Predicted(
-            words.get(one.variable, one.variable.replace("_", " ")),
-            one.share_before,
-            one.share_after if session.causes else None,
-        )
-        for one in session.dependences(joint)
-    ]
+    rows = []
+    for one in session.dependences(joint):
+        title = words.get(one.variable, one.variable.replace("_", " "))
+        rows.append(Predicted(title, one.share_before, one.share_after if session.causes else None))
+    return rows
 
 
 def _against(session: Session, joint: Joint) -> list[Against]:
