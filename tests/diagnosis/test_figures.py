@@ -43,7 +43,7 @@ SESSIONS = {
     ],
     "unknown": lambda: [humming(m) for m in session(seed=7, seconds=40.0)],
     "spoilt": lambda: [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)],
-    "nothing": session,
+    "nothing": lambda: session(seconds=40.0),
 }
 NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@knee")
 """What is named in some of them, whatever may be tied with it."""
