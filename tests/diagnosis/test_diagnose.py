@@ -90,7 +90,8 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
 
 @pytest.mark.slow
 def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joints_speed():
-    diagnosis = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
+    drag = dict(seed=3, seconds=40.0, trained=SLOW, drag=28.0)
+    diagnosis = diagnose(session("quadratic_drag", "hip", **drag))
     assert diagnosis.after.fit.rms[0] > 0.95 * diagnosis.before.fit.rms[0], (
         "it is a twentieth of the error at most"
     )
