@@ -60,7 +60,9 @@ async def by_hand(
     # Least force of a push, as a share of safety.cuff_force_n.
     push_share = 0.025
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
-    await operator.ready("Hold the leg: its drives are now disabled. The machine must be empty.")
+    await operator.ready(
+        "Hold the leg: its drives stay disabled from now on. The machine must be empty."
+    )
     for probe in probes:
         await probe.read()
         if isinstance(probe.part, Drive):
