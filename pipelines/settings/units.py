@@ -1,4 +1,4 @@
-"""The units of logs, and their conversion to SI."""
+"""Units of logs and registers, and their conversion to SI."""
 
 from dataclasses import dataclass
 from math import pi

@@ -1,10 +1,11 @@
 """A register: where a value lies in a device, and how its bits are read."""
 
 from math import inf
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from pipelines.settings import units
 from pipelines.settings.base import Settings
 
 RegisterType = Literal[
@@ -22,28 +23,12 @@ REGISTERS = {
 }
 """Registers of 16 bits that a value takes."""
 
-UNITS = {
-    "1": 1.0,
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "deg": 0.017453292519943295,
-    "rad/s": 1.0,
-    "deg/s": 0.017453292519943295,
-    "rpm": 0.10471975511965977,
-    "A": 1.0,
-    "mA": 1e-3,
-    "N": 1.0,
-    "kN": 1e3,
-    "°C": 1.0,
-    "s": 1.0,
-    "ms": 1e-3,
-    "us": 1e-6,
-}
-"""SI value of one of each unit that a register can hold."""
-
 Unit = Literal[
     "1", "rad", "mrad", "deg", "rad/s", "deg/s", "rpm", "A", "mA", "N", "kN", "°C", "s", "ms", "us"
 ]
+
+UNITS = {"1": 1.0} | {unit: units.UNITS[unit].factor for unit in get_args(Unit) if unit != "1"}
+"""SI value of one of each unit that a register can hold."""
 
 DIMENSION = {
     "sequence": ("1",),
