@@ -122,7 +122,8 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     from pipelines.contracts.joints import HIP_AND_KNEE, either
 
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
-    errors = dict(ERRORS)
+    # Files of older versions lack one of these errors.
+    errors = {key: words for key, words in ERRORS.items() if getattr(verdict, key)}
     if not verdict.causes:
         del errors["extended_rmse_nm"]
     headings = ("joint", *errors.values(), *["excess left"] * bool(verdict.causes))

@@ -56,9 +56,9 @@ class Tie(Named):
 
     why: str
     how_to_separate: str
-    probability: Number | None
-    per_run: bool
-    """Whether its values differ from run to run."""
+    probability: Number | None = None
+    per_run: bool = False
+    """Whether its values differ from run to run; files of older versions lack it."""
 
 
 class OneRun(_Object):
@@ -68,8 +68,8 @@ class OneRun(_Object):
     purpose: str
     values: dict[str, Number | None]
     """By the parameters' names; null if the cause does not occur in this run."""
-    ci95: dict[str, Interval | None]
-    """Null for values fitted to this run alone."""
+    ci95: dict[str, Interval | None] = {}
+    """Null for values fitted to this run alone; files of older versions lack it."""
 
 
 class Known(Named):
@@ -87,10 +87,10 @@ class Cause(Named):
     gain: Gain
     indistinguishable_from: list[Tie]
     evidence: list[str]
-    fitted_on_validate: list[str]
+    fitted_on_validate: list[str] = []
     """Names of the parameters that are fitted to each validation run."""
-    each_run: list[OneRun]
-    """Empty if all runs share all values."""
+    each_run: list[OneRun] = []
+    """Empty if all runs share all values; files of older versions lack it."""
 
     @property
     def per_run(self) -> bool:
@@ -165,7 +165,7 @@ class Posterior(_Object):
     unlisted: Probability
     causes: dict[str, Probability]
     laws: dict[str, Probability]
-    systematic_error_removed: dict[str, Probability]
+    systematic_error_removed: dict[str, Probability] = {}
 
 
 class Loop(_Object):
@@ -238,20 +238,20 @@ class Verdict(_Object):
 
     status: str
     summary: str
-    finding: str | None
+    finding: str | None = None
     """The summary without acquisition and noise floor; None if acquisition is at fault."""
-    acquisition_at_fault: bool
-    findings: list[Finding]
-    """Empty if nothing is missing."""
-    sought_on: Literal["train", "all"]
-    """The runs in which causes were sought."""
-    router: dict[str, Shares]
-    posterior: Posterior | None
+    acquisition_at_fault: bool = False
+    findings: list[Finding] = []
+    """Empty if nothing is missing; files of older versions lack it and the next three."""
+    sought_on: Literal["train", "all"] = "train"
+    """The runs in which causes were sought; files of older versions lack it."""
+    router: dict[str, Shares] = {}
+    posterior: Posterior | None = None
     """None if acquisition is at fault."""
     caveats: list[str]
     scoring: dict[str, Any]
-    torque_rms_nm: ByJoint
-    """Rms of the measured torque."""
+    torque_rms_nm: ByJoint | None = None
+    """Rms of the measured torque; files of older versions lack it."""
     noise_floor_nm: dict[str, Annotated[Number, Field(gt=0.0)]] = Field(min_length=1)
     baseline_rmse_nm: ByJoint
     extended_rmse_nm: ByJoint
@@ -263,9 +263,11 @@ class Verdict(_Object):
     control: Control
     error_budget: dict[str, ByJoint]
     depends_on: dict[str, list[Dependence]]
-    reversals: list[Reversal]
+    reversals: list[Reversal] = []
+    """Files of older versions lack it."""
     units: dict[str, dict[str, str]]
-    known: list[Known]
+    known: list[Known] = []
+    """Files of older versions lack it."""
     causes: list[Cause]
     data_faults: list[Fault]
     residual: Residual | None
@@ -306,11 +308,12 @@ class Verdict(_Object):
             "error_budget",
             "depends_on",
             "units",
-            "torque_rms_nm",
         ):
             yield key, getattr(self, key)
         if self.router:
             yield "router", self.router
+        if self.torque_rms_nm is not None:
+            yield "torque_rms_nm", self.torque_rms_nm
         for key, loop in (("without", self.control.without), ("with", self.control.with_)):
             if loop:
                 yield f"control.{key}.tracking_rmse_rad", loop.tracking_rmse_rad

@@ -1,6 +1,7 @@
 """A verdict's findings as rows to be shown: the missing physics and its probability.
 
-For terminal and report alike. If acquisition is at fault there is nothing to show.
+For terminal and report alike, from the keys ``findings``, ``router`` and ``posterior`` of a
+verdict; files of older versions lack these, and then nothing is shown.
 """
 
 from collections.abc import Iterator

@@ -42,11 +42,14 @@ def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
     assert "excess left" not in printed
 
 
-def test_an_error_stands_next_to_its_torque(capsys):
+def test_an_error_stands_next_to_its_torque_which_older_files_lack(capsys):
     show_verdict(checked_verdict(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
-    lines = capsys.readouterr().out.splitlines()
-    knee = next(line.split() for line in lines if line.startswith("knee "))
+    show_verdict(checked_verdict(), HIP_AND_KNEE)
+    knee, older = [
+        line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")
+    ][::2]
     assert knee[:3] == ["knee", "12.250", "0.272"]
+    assert older[:2] == ["knee", "0.272"]
 
 
 def test_a_gait_is_printed_of_a_leg_alone(capsys):
@@ -186,6 +189,10 @@ def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_ever
     assert "No cause was sought. Correct the acquisition, and record again." in printed
     assert "- run_2.parquet, hip_angle_rad: the hip's angle is stuck" in printed
     assert "is anything missing?" not in printed
+
+
+def test_a_verdict_of_an_older_version_is_shown_without_findings(capsys):
+    assert "is anything missing?" not in shown(capsys)
 
 
 def test_what_slides_depends_on_its_position(capsys):

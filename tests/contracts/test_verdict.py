@@ -56,6 +56,10 @@ def test_a_whole_verdict_is_read_as_it_stands(tmp_path, joints):
     assert verdict.read(path).model_dump(by_alias=True, exclude_unset=True) == whole
 
 
+def test_a_verdict_of_an_older_version_has_no_findings_and_is_read():
+    verdict.check(verdict_of(), "older")
+
+
 def test_where_acquisition_is_at_fault_there_is_no_posterior():
     decision = decision_of() | {"findings": [], "posterior": None}
     verdict.check(verdict_of(acquisition_at_fault=True, causes=[], **decision), "faulty")

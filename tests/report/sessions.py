@@ -146,15 +146,8 @@ def verdict_of(joints=LEG, **changes):
         "contract": "verdict/1",
         "status": "explained",
         "summary": f"Missing from the simulation: cogging at the {last} (probability 0.90).",
-        "finding": None,
-        "findings": [],
-        "sought_on": "train",
-        "router": {},
-        "posterior": None,
-        "acquisition_at_fault": False,
         "caveats": [],
         "scoring": {"bandwidth_hz": 17.7, "mask": "|v| < 0.04 rad/s", "samples": 800},
-        "torque_rms_nm": {name: 12.25 for name in of_joints},
         "noise_floor_nm": {name: 0.2718282 for name in of_joints},
         "baseline_rmse_nm": of_joints,
         "extended_rmse_nm": reduced,
@@ -193,8 +186,6 @@ def verdict_of(joints=LEG, **changes):
             ]
             for name in of_joints
         },
-        "reversals": [],
-        "known": [],
         "units": {
             joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
             for joint in joints
@@ -221,12 +212,10 @@ def verdict_of(joints=LEG, **changes):
                         "why": "both follow the angle",
                         "how_to_separate": "turn it slowly",
                         "probability": 0.1,
-                        "per_run": False,
                     }
                 ],
                 "evidence": ["it takes 0.50 of 0.82"],
                 "fitted_on_validate": [],
-                "each_run": [],
             }
         ],
         "data_faults": [],
@@ -306,7 +295,6 @@ def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
             "unlisted": law,
             "causes": {f"{effect}@{last}": p for effect, p in zip(effects, each, strict=True)},
             "laws": {f"law:angle@{last}": law},
-            "systematic_error_removed": {},
         },
     }
 

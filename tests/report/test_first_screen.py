@@ -81,6 +81,7 @@ def test_bars_with_tied_causes_are_of_the_likeliest_and_say_so(tmp_path):
 
 def test_an_error_is_told_beside_the_torque_that_was_measured(tmp_path):
     folder = write_session(tmp_path / "leg")
+    assert "measured" not in top(folder)
     write_verdict(folder, torque_rms_nm={"hip": 22.512, "knee": 12.25})
     assert "; measured" in top(folder) and "22.5" in top(folder)
 
@@ -104,7 +105,7 @@ def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_
     assert 'href="#faults"' not in top(folder)
 
 
-def test_without_a_finding_the_summary_leads_and_no_fault_is_told_twice(tmp_path):
+def test_a_verdict_of_an_older_version_leads_with_its_summary_and_tells_no_fault_twice(tmp_path):
     folder = write_session(tmp_path / "leg")
     write_verdict(folder, summary="Found. Faulty.", data_faults=[FAULT])
     assert '<p class="lead">Found. Faulty.</p>' in top(folder)

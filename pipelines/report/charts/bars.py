@@ -65,8 +65,8 @@ class Fall:
     floor: float
     unexplained: float | None
     """Share of the excess over the floor that remains; None without an excess."""
-    torque: float
-    """Rms of the measured torque."""
+    torque: float | None = None
+    """Rms of the measured torque; None in files of older versions."""
 
     @property
     def highest(self) -> float:

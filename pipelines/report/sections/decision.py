@@ -61,7 +61,7 @@ def context(content: Content) -> dict[str, Any]:
 
 
 def decision(verdict: Verdict) -> Decision | None:
-    """Return a verdict's decision; None if acquisition is at fault."""
+    """Return a verdict's decision; None in files of older versions."""
     cases = outcomes(verdict)
     if not cases:
         return None

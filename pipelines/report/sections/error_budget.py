@@ -65,11 +65,12 @@ def falls(verdict: Verdict) -> list[Fall]:
     for joint, before in verdict.baseline_rmse_nm.items():
         after = verdict.extended_rmse_nm[joint] if verdict.causes else None
         floor, unexplained = verdict.noise_floor_nm[joint], verdict.unexplained[joint]
-        unit, torque = torque_unit(verdict, joint), verdict.torque_rms_nm[joint]
+        torque = (verdict.torque_rms_nm or {}).get(joint)
+        unit = torque_unit(verdict, joint)
         results.append(Fall(joint, unit, before, after, floor, unexplained, torque))
     return results
 
 
 def torque_unit(verdict: Verdict, joint: str) -> str:
     """Return the unit of a joint's torque or force."""
-    return verdict.units[joint]["torque"]
+    return verdict.units[joint].get("torque", "N·m")

@@ -73,7 +73,7 @@ def headline(session: Session) -> str:
 
 
 def lead(verdict: Verdict) -> str:
-    """Return the finding in two sentences; the whole summary if acquisition is at fault."""
+    """Return the finding in two sentences; the whole summary in files of older versions."""
     return verdict.finding or verdict.summary
 
 

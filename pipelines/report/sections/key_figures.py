@@ -1,4 +1,4 @@
-"""The numbers of the first screen: gain, remaining error and simulation error."""
+"""The numbers of the first screen: probability, gain, remaining error and simulation error."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -37,7 +37,11 @@ def tiles(session: Session) -> list[Tile]:
     verdict = session.verdict
     if not verdict:
         return []
-    results = [_gain_tile(verdict, cause) for cause in verdict.causes[:2]]
+    # The tree of findings shows each probability; verdicts of older versions have no tree.
+    skipped = bool(verdict.findings)
+    results = [
+        tile for cause in verdict.causes[:2] for tile in _cause_tiles(verdict, cause)[skipped:]
+    ]
     for fall in falls(verdict):
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
@@ -59,16 +63,28 @@ def worst_joint(session: Session) -> Joint | None:
     return next((joint for joint in session.joints if joint.name == name), None)
 
 
-def _gain_tile(verdict: Verdict, cause: Cause) -> Tile:
+def _cause_tiles(verdict: Verdict, cause: Cause) -> list[Tile]:
     gain, (low, high) = cause.gain.rmse_reduction_nm, cause.gain.ci95
     joint = cause.gain.joint
-    remaining, unit = verdict.extended_rmse_nm[joint], torque_unit(verdict, joint)
+    remaining = verdict.extended_rmse_nm[joint]
     qualifier = ", given the other causes" if len(verdict.causes) > 1 else ""
-    small = (
-        f"{digits(remaining + gain)} → {digits(remaining)} {unit} at {the(joint)}{qualifier};"
-        f" 95 %: {digits(low)} … {digits(high)}"
-    )
-    return Tile(f"gain of {cause_in_words(cause)}", digits(gain), unit, small)
+    unit, ties = torque_unit(verdict, joint), len(cause.indistinguishable_from)
+    words = cause_in_words(cause)
+    return [
+        Tile(
+            "probability" + (", with its ties" if ties else ""),
+            f"{100 * cause.probability:.0f}",
+            "%",
+            words + (f", or one of {ties} that these data cannot separate from it" if ties else ""),
+        ),
+        Tile(
+            f"gain of {words}",
+            digits(gain),
+            unit,
+            f"{digits(remaining + gain)} → {digits(remaining)} {unit} at {the(joint)}{qualifier};"
+            f" 95 %: {digits(low)} … {digits(high)}",
+        ),
+    ]
 
 
 def _simulation_tiles(session: Session, verdict: Verdict) -> list[Tile]:
