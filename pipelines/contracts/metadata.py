@@ -115,7 +115,6 @@ class RunKeys(TableKeys):
     gaps: list[tuple[Finite, Annotated[int, Field(gt=0)]]] | None = None
     abort: str | None = None
     recovered: bool | None = None
-    unchecked: bool | None = None
     clocks: dict[str, Clock] | None = None
     latency: Latency | None = None
     controller: dict[str, Controller] | None = None

@@ -1,5 +1,6 @@
 """The devices of the virtual rig: registers of drives and force sensors."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -25,7 +26,7 @@ READ_WRITE = 23
 """Function code of the exchange that ends a cycle in lockstep."""
 
 
-class Device:
+class Device(ABC):
     """Registers of one device, filled at each request with the sample that is latched then."""
 
     def __init__(
@@ -88,11 +89,11 @@ class Device:
         """Return the sample that the device has latched."""
         return self.rig.sample
 
+    @abstractmethod
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
-        raise NotImplementedError
 
-    def _show_records(self, address: int, count: int) -> None:
+    def _show_records(self, address: int, count: int) -> None:  # noqa: B027 - an optional hook
         """Put requested records of earlier samples into the registers; a device may have none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:

@@ -50,7 +50,7 @@ class Journal:
         self._failure: OSError | None = None
         self._last_words: dict[bytes, bytes] | None = None
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Exclusive: a journal that exists is what is left of another run.
+        # "x" never overwrites: an existing journal may hold the only samples of an earlier run.
         self._file = open(path, "xb", buffering=0)  # noqa: SIM115, it stays open from the first sample to the last
         self._identity = os.fstat(self._file.fileno())
         take(self._file, wait=True)
