@@ -49,16 +49,17 @@ class JournalFile:
         with open(path, "rb") as file:
             try:
                 # A copy has a checksum, the head itself none: where they differ, the copy is right.
-                head = find_head(file)
-                is_whole = head is not None and head == _between(file, 0, len(head))
+                self._head = find_head(file) or _part_at(file, 0)
+                is_whole = self._head == _between(file, 0, len(self._head))
+                self.schema = pa.ipc.open_stream(self._head).schema
+                self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
             except OSError as error:
-                raise _disk_error(path, error) from error
-        if head is None:
-            raise ContractError(f"{path}: {_why_no_journal(path)}")
-        self._head = head
-        self._lost = 0 if is_whole else len(head)
-        self.schema = pa.ipc.open_stream(head).schema
-        self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
+                if error.errno is not None:  # of the disk, not of Arrow
+                    raise _disk_error(path, error) from error
+                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
+            except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
+                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
+        self._lost = 0 if is_whole else len(self._head)
 
     def batches(self) -> Iterator[Batch]:
         """Yield all undamaged batches; after damage or a cut, search for the next one.

@@ -144,6 +144,13 @@ def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other
         assert numbers == written.untouched(begin, end), at
 
 
+def test_no_batch_is_read_by_a_head_that_it_was_not_written_after(written, tmp_path):
+    lost = written.bytes.replace(b"exoid-head:", b"other-head:")
+    assert written.recovered(lost, tmp_path / "made.parquet") == set(range(SAMPLES))
+    for at in range(0, written.bytes.index(b"exoid-head:") - 1000, 13):
+        assert written.recovered(flipped(lost, at, at % 8), tmp_path / "made.parquet") == set()
+
+
 def test_a_journal_of_which_nothing_can_be_read_is_not_reported_as_of_no_use(written):
     begin, end = written.places[0][0], written.places[-1][1]
     written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])

@@ -368,28 +368,48 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         recover(tmp_path / "pipe")
 
 
+def without_copies(path):
+    """Make a journal one whose copies of the head are both damaged."""
+    path.write_bytes(path.read_bytes().replace(b"exoid-head:", b"exoid-held:"))
+
+
+@pytest.mark.parametrize("copies", [True, False])
 @pytest.mark.parametrize("at", [6, 20, 300])
-def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, at):
+def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path, at, copies):
+    if not copies:
+        without_copies(killed)
     content = bytearray(killed.read_bytes())
     content[at] ^= 1 << 4
     killed.write_bytes(content)
-    recovery = recover(killed)
-    assert (recovery.summary.samples, recovery.summary.damaged) == (147, True)
+    if copies:
+        recovery = recover(killed)
+        assert (recovery.summary.samples, recovery.summary.damaged) == (147, True)
+    else:
+        for refuse in (recover, refuse_leftover):
+            with pytest.raises(InputError) as refused:
+                refuse(killed)
+            assert str(refused.value).startswith(
+                f"{killed}: the head of its {len(content)} bytes, which names the"
+            )
+            assert "keep it, it may hold samples" in str(refused.value)
+            assert "delete" not in str(refused.value)
     assert killed.read_bytes() == content
 
 
-def test_a_journal_without_a_whole_head_is_refused_and_kept(killed):
-    content = killed.read_bytes().replace(b"exoid-head:", b"exoid-held:")
-    killed.write_bytes(content)
-    for refuse in (recover, refuse_leftover):
-        with pytest.raises(InputError) as refused:
-            refuse(killed)
-        assert str(refused.value).startswith(
-            f"{killed}: the head of its {len(content)} bytes, which names the"
-        )
-        assert "keep it, it may hold samples" in str(refused.value)
-        assert "delete" not in str(refused.value)
-    assert killed.read_bytes() == content
+def test_whatever_bit_of_a_head_without_a_copy_is_flipped_what_is_refused_is_named_and_kept(
+    killed, tmp_path
+):
+    without_copies(killed)
+    whole, output = killed.read_bytes(), tmp_path / "made.parquet"
+    for at in range(0, len(JournalFile(killed)._head), 7):
+        killed.write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
+        try:
+            recover(killed, output)
+            output.unlink()
+        except InputError as error:
+            assert str(error).startswith((f"{killed}: ", f"{output}: "))
+            assert "delete" not in str(error)
+            assert killed.exists()
 
 
 @pytest.mark.parametrize(
