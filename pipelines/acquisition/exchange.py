@@ -43,7 +43,7 @@ class Exchange:
         answers = await self.machine.cycle(self._cycle, partial(self._in_turn, decide))
         self.latencies.add(time.perf_counter() - asked_at)
         for joint, drive in enumerate(self.machine.drives):
-            self._supervisor.trackers[joint].mark_answered(drive.sent_at)
+            self._supervisor.trackers[joint].mark_answered(drive.answered_at)
             self.update(joint)
         return answers
 
@@ -114,4 +114,4 @@ class Exchange:
 
     def sent_at(self, joint: int) -> float:
         """Return when a drive was sent something last, or is being sent it."""
-        return max(self.machine.drives[joint].sent_at, self._supervisor.trackers[joint].sent_at)
+        return self._supervisor.trackers[joint].sent_at

@@ -47,8 +47,8 @@ class Drive:
         self._newest_sequence = 0
         self.was_sent = False
         """Whether any set-point was on its way to the drive; else it need not be disabled."""
-        self.sent_at = 0.0
-        """Host's clock, s, when it answered the last set-point; late on a shared line."""
+        self.answered_at = 0.0
+        """Host's clock, s, when it answered the last set-point."""
         self.statuses: list[DriveStatus] = []
         """Reported statuses that were not passed on yet, as a request may have been cancelled."""
 
@@ -165,7 +165,7 @@ class Drive:
         before, self._sent = self._sent, nan
         asked = time.perf_counter()
         answer = await self.device.exchange(self.write_block, words, self.read_block)
-        self._sent, self.sent_at = before, time.monotonic()
+        self._sent, self.answered_at = before, time.monotonic()
         reading = self._reading(answer, asked)
         self._sent = reference
         return reading
