@@ -288,7 +288,7 @@ def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_pa
     _, err = again.communicate(timeout=60)
     assert again.returncode == 2
     assert f"{journal_of(output)}: holds {len(frame)} samples" in err
-    assert len(err.strip().splitlines()) == 1
+    assert len(said(err).strip().splitlines()) == 1
 
 
 def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(start, experiment):
@@ -296,7 +296,7 @@ def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(start, experi
     process = start(arguments)
     _, err = process.communicate(timeout=60)
     assert "plant.exo_inertial: no real leg has these" in err
-    assert (process.returncode, len(err.strip().splitlines())) == (2, 1)
+    assert (process.returncode, len(said(err).strip().splitlines())) == (2, 1)
 
 
 def status_of(client, unit):
