@@ -2,50 +2,60 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
+
+from pipelines.contracts.joint_units import Kind, unit_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Kind = Literal["revolute", "prismatic"]
-
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity at a joint: patterns of column name and unit for each kind of joint."""
+    """A quantity at a joint: the pattern of its columns' names, and its unit."""
 
-    revolute: str
-    revolute_unit: str
-    prismatic: str
-    prismatic_unit: str
+    name: str
+    unit: str
+    """The unit at a revolute joint."""
+    prismatic_name: str = ""
+    """The pattern at a prismatic joint, where it is another one."""
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "angle": Quantity("{joint}_angle_rad", "rad", "{joint}_position_m", "m"),
+    "angle": Quantity("{joint}_angle_{unit}", "rad", "{joint}_position_{unit}"),
     "angle_measured": Quantity(
-        "{joint}_angle_measured_rad", "rad", "{joint}_position_measured_m", "m"
+        "{joint}_angle_measured_{unit}", "rad", "{joint}_position_measured_{unit}"
     ),
-    "reference": Quantity("{joint}_reference_rad", "rad", "{joint}_reference_m", "m"),
-    "error": Quantity("{joint}_error_rad", "rad", "{joint}_error_m", "m"),
-    "velocity": Quantity("{joint}_velocity_rad_s", "rad/s", "{joint}_velocity_m_s", "m/s"),
-    "velocity_measured": Quantity(
-        "{joint}_velocity_measured_rad_s", "rad/s", "{joint}_velocity_measured_m_s", "m/s"
-    ),
-    "acceleration": Quantity(
-        "{joint}_acceleration_rad_s2", "rad/s²", "{joint}_acceleration_m_s2", "m/s²"
-    ),
-    "torque": Quantity("{joint}_torque_nm", "N·m", "{joint}_force_n", "N"),
+    "reference": Quantity("{joint}_reference_{unit}", "rad"),
+    "error": Quantity("{joint}_error_{unit}", "rad"),
+    "velocity": Quantity("{joint}_velocity_{unit}", "rad/s"),
+    "velocity_measured": Quantity("{joint}_velocity_measured_{unit}", "rad/s"),
+    "acceleration": Quantity("{joint}_acceleration_{unit}", "rad/s²"),
+    "torque": Quantity("{joint}_torque_{unit}", "N·m", "{joint}_force_{unit}"),
     "torque_measured": Quantity(
-        "{joint}_torque_measured_nm", "N·m", "{joint}_force_measured_n", "N"
+        "{joint}_torque_measured_{unit}", "N·m", "{joint}_force_measured_{unit}"
     ),
-    "predicted": Quantity("{joint}_predicted_nm", "N·m", "{joint}_predicted_n", "N"),
-    "residual": Quantity("{joint}_residual_nm", "N·m", "{joint}_residual_n", "N"),
-    "network": Quantity("{joint}_network_nm", "N·m", "{joint}_network_n", "N"),
-    "rmse_before": Quantity("rmse_before_{joint}_nm", "N·m", "rmse_before_{joint}_n", "N"),
-    "rmse_after": Quantity("rmse_after_{joint}_nm", "N·m", "rmse_after_{joint}_n", "N"),
-    "current": Quantity("{joint}_current_a", "A", "{joint}_current_a", "A"),
-    "temperature": Quantity("{joint}_temperature_c", "°C", "{joint}_temperature_c", "°C"),
+    "predicted": Quantity("{joint}_predicted_{unit}", "N·m"),
+    "residual": Quantity("{joint}_residual_{unit}", "N·m"),
+    "network": Quantity("{joint}_network_{unit}", "N·m"),
+    "rmse_before": Quantity("rmse_before_{joint}_{unit}", "N·m"),
+    "rmse_after": Quantity("rmse_after_{joint}_{unit}", "N·m"),
+    "current": Quantity("{joint}_current_{unit}", "A"),
+    "temperature": Quantity("{joint}_temperature_{unit}", "°C"),
 }
+ENDINGS = {
+    "rad": "rad",
+    "rad/s": "rad_s",
+    "rad/s²": "rad_s2",
+    "N·m": "nm",
+    "m": "m",
+    "m/s": "m_s",
+    "m/s²": "m_s2",
+    "N": "n",
+    "A": "a",
+    "°C": "c",
+}
+"""How the name of a column ends, by its unit."""
 
 
 def the(joint: str) -> str:
@@ -62,14 +72,13 @@ class Joint:
 
     def column(self, quantity: str) -> str:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
-        pattern = QUANTITIES[quantity]
-        chosen = pattern.revolute if self.kind == "revolute" else pattern.prismatic
-        return chosen.format(joint=self.name)
+        one = QUANTITIES[quantity]
+        pattern = one.name if self.kind == "revolute" else one.prismatic_name or one.name
+        return pattern.format(joint=self.name, unit=ENDINGS[self.unit(quantity)])
 
     def unit(self, quantity: str) -> str:
         """Return the unit of a quantity at this joint, as printed: ``"rad/s"``."""
-        pattern = QUANTITIES[quantity]
-        return pattern.revolute_unit if self.kind == "revolute" else pattern.prismatic_unit
+        return unit_at(self.kind, QUANTITIES[quantity].unit)
 
     @property
     def place(self) -> str:

@@ -25,13 +25,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joint_units import Scale, unit_at
 from pipelines.effects.element import Element
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
 from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
-from pipelines.mechanics.units import Scale, unit_at
 
 WIDE = 4.0
 """Ratio of a typical range's ends above which a parameter varies by factors."""

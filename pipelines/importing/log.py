@@ -197,7 +197,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
 def _channels(settings: ImportMap) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
-            gain = reading.gain(transmission.TARGETS[name][joint.kind])
+            gain = reading.gain(transmission.dimension_at(joint.kind, name))
             yield Channel(
                 joint.joint.column(name),
                 f"joint[{i}].{name}",

@@ -7,13 +7,13 @@ from itertools import combinations
 from pkgutil import iter_modules
 from typing import Any
 
+from pipelines.contracts.joint_units import Scale
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import InputError
 from pipelines.mechanics import mechanisms
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
-from pipelines.mechanics.units import Scale
 
 
 def _collected() -> tuple[Mechanism, ...]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import Kind
+from pipelines.contracts.joint_units import Kind
 from pipelines.mechanics.geometry import Geometry
 
 

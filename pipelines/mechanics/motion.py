@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joint_units import Scale
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.errors import InputError
@@ -16,7 +17,6 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.load import Load, LoadColumns
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
-from pipelines.mechanics.units import Scale
 from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 

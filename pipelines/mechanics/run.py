@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 import pyarrow as pa
 
+from pipelines.contracts.joint_units import Scale
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
-from pipelines.mechanics.units import Scale
 
 RUNS = ("exo_alone", "with_human")
 

@@ -2,12 +2,12 @@
 
 import pandas as pd
 
+from pipelines.contracts.joint_units import FIRST_MOMENT
 from pipelines.effects import RUNS, Effect
 from pipelines.effects.baseline import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine
-from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model.model import Model, Term, effect_named, term_from
 
 

@@ -9,7 +9,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from pipelines.contracts.joints import Joint, Kind
+from pipelines.contracts.joint_units import Kind
+from pipelines.contracts.joints import Joint
 from pipelines.errors import SettingsError
 from pipelines.settings import transmission
 from pipelines.settings.base import Positive, Settings, load_toml
@@ -182,7 +183,7 @@ class JointSettings(Settings):
     @model_validator(mode="after")
     def _units_lead_to_the_joint(self) -> Self:
         for quantity, reading in self.readings():
-            target = transmission.TARGETS[quantity][self.kind]
+            target = transmission.dimension_at(self.kind, quantity)
             try:
                 _refuse_other_units(reading.unit, transmission.sources(target))
                 reading.gain(target)
@@ -192,7 +193,7 @@ class JointSettings(Settings):
 
     def readings(self) -> Iterator[tuple[str, JointReadingSettings]]:
         """Yield the quantities that the log has, and their readings."""
-        for quantity in transmission.TARGETS:
+        for quantity in transmission.LOGGED:
             reading = getattr(self, quantity)
             if reading is not None:
                 yield quantity, reading

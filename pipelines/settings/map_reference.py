@@ -4,7 +4,7 @@ from pydantic import BaseModel
 
 from pipelines.settings.import_map import ImportMap
 from pipelines.settings.reference import rows_of, sections_of
-from pipelines.settings.transmission import GEARED, TARGETS, paths
+from pipelines.settings.transmission import GEARED, paths
 from pipelines.settings.units import ALIASES, UNITS
 
 INTRODUCTION = """\
@@ -47,9 +47,7 @@ def _drive_trains() -> str:
     rows = [
         f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} |"
         f" {_geared(target)} |"
-        for target in dict.fromkeys(
-            target for kinds in TARGETS.values() for target in kinds.values()
-        )
+        for target in GEARED
         for source in dimensions
         for way in paths(source, target)
         if way

@@ -4,7 +4,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from pipelines.contracts.joints import HIP_AND_KNEE, Joint, Kind, in_words
+from pipelines.contracts.joint_units import Kind
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
 from pipelines.settings.physical_bounds import Gravity, Length

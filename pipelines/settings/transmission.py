@@ -4,17 +4,17 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import pi, prod
 
-from pipelines.contracts.joints import Kind
+from pipelines.contracts.joint_units import Kind, unit_at
+from pipelines.contracts.joints import QUANTITIES
+from pipelines.settings.units import UNITS
 
-TARGETS: dict[str, dict[Kind, str]] = {
-    "angle": {"revolute": "angle", "prismatic": "length"},
-    "reference": {"revolute": "angle", "prismatic": "length"},
-    "velocity": {"revolute": "angular velocity", "prismatic": "velocity"},
-    "torque": {"revolute": "torque", "prismatic": "force"},
-    "current": {"revolute": "current", "prismatic": "current"},
-    "temperature": {"revolute": "temperature", "prismatic": "temperature"},
-}
-"""Dimension of each quantity, for each kind of joint."""
+LOGGED = ("angle", "reference", "velocity", "torque", "current", "temperature")
+"""Quantities of a joint that a log may hold."""
+
+
+def dimension_at(kind: Kind, quantity: str) -> str:
+    """Return the dimension of a quantity at a kind of joint: an angle, or a length."""
+    return UNITS[unit_at(kind, QUANTITIES[quantity].unit)].dimension
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from pipelines.contracts import CONTRACTS, verdict
-from pipelines.contracts.joints import QUANTITIES
+from pipelines.contracts.joints import Joint
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "contracts.md").read_text(encoding="utf-8")
@@ -36,7 +36,7 @@ def section_of(label: str) -> str:
 @pytest.mark.parametrize("contract", CONTRACTS, ids=lambda contract: contract.name)
 def test_every_column_stands_in_its_tables_section(contract):
     columns = {
-        QUANTITIES[column.name].revolute.format(joint="*") if column.per_joint else column.name
+        Joint("*").column(column.name) if column.per_joint else column.name
         for column in contract.columns
     }
     assert columns - names_in(section_of(contract.label)) == set()

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from pipelines.contracts.joint_units import UNITS, unit_at
 from pipelines.contracts.joints import Joint
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
@@ -12,7 +13,6 @@ from pipelines.mechanics.instant import Instant
 from pipelines.mechanics.machine import MECHANISMS, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
-from pipelines.mechanics.units import UNITS, unit_at
 
 EARTH, LEVEL = Geometry(gravity_m_s2=9.81), Geometry(gravity_m_s2=0.0)
 every = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda m: m.title.split(":")[0])

@@ -10,11 +10,11 @@ from functools import cached_property
 
 from numpy.typing import NDArray
 
+from pipelines.contracts.joint_units import FIRST_MOMENT
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
-from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
 RELAXATION = 0.5

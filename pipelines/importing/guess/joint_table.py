@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.joints import Kind
+from pipelines.contracts.joint_units import Kind
 from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, counts_in_a_turn, guess_units
@@ -16,7 +16,7 @@ from pipelines.importing.guess.torque import TorqueFit, fit_torque
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.sanity.plausibility import STRONGEST
 from pipelines.importing.sources.source import Columns
-from pipelines.settings.transmission import TARGETS
+from pipelines.settings.transmission import dimension_at
 from pipelines.settings.units import UNITS
 
 FOLLOWS = 0.7
@@ -192,7 +192,7 @@ class _JointWriter:
             self.used.append(meaning.column)
             self.proposal.table(f"[joint.{quantity}]", f"{self.where}.{quantity}")
             self.proposal.key("column", meaning.column, self.joint.why.get(quantity, ""))
-            dimensions = (TARGETS[quantity][self.kind], "counts")
+            dimensions = (dimension_at(self.kind, quantity), "counts")
             if meaning.unit is not None and UNITS[meaning.unit].dimension in dimensions:
                 unit = meaning.unit
                 self.proposal.key("unit", unit, FROM_NAME)

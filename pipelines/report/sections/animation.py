@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts import Table
-from pipelines.contracts.joints import Kind
+from pipelines.contracts.joint_units import Kind
 from pipelines.report.sections.fit_quality import MODELS, replayed
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session

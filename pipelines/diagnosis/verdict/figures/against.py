@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from pipelines.contracts.joint_units import unit_at
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
-from pipelines.mechanics.units import unit_at
 from pipelines.plotting.style import NOISE
 from pipelines.signals.binned_mean import binned_mean
 

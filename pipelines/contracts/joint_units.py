@@ -4,9 +4,9 @@ A quantity's unit also determines how it scales with the machine: at twice the t
 twice as stiff.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from pipelines.contracts.joints import Kind
+Kind = Literal["revolute", "prismatic"]
 
 
 class Unit(NamedTuple):
