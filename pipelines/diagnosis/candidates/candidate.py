@@ -109,6 +109,7 @@ class Candidate:
         start : int, optional
             Number of the first column.
         """
+        # A transformed motion gives a column for each direction, or one for the shape.
         width = max(1, len(self.directions))
         per_run = [self.effect.per_run] * width if self.transforms_motion else None
         return TermColumns.of(self.effect, kinds, per_run, start)
@@ -130,6 +131,7 @@ class Candidate:
         if self.directions:
             sizes = [_largest(self.effect, direction) for direction in self.directions]
         elif self.transforms_motion:
+            # The column is the change of torque at this very shape, so its amplitude is one.
             sizes = [1.0]
         else:
             sizes = [max(map(abs, parameter.typical)) for parameter in self.effect.linear]
@@ -149,6 +151,7 @@ class Candidate:
             for i, p in enumerate(self.effect.shape)
             if self.is_free(i) and not (p.swept or p.per_run)
         ]
+        # With directions the amplitudes are the shape, and have a prior of their own.
         offs = [
             self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions
         ]
@@ -161,6 +164,7 @@ class Candidate:
     def is_free(self, i: int) -> bool:
         """Return whether shape ``i`` is fitted, not held at a default or one of its forms."""
         parameter = self.effect.shape[i]
+        # A direction frees a shape with a default, as an encoder's error twice a turn.
         spanned = any(shape[i] != 0.0 for shape in self.directions)
         return not parameter.forms and (parameter.default is None or spanned)
 
@@ -173,6 +177,7 @@ class Candidate:
     @property
     def onset(self) -> int | None:
         """Place of the shape that is the instant of onset in each run, None without one."""
+        # In the catalogue a per-run shape that adds torque is always an instant.
         own = (
             i for i, p in enumerate(self.effect.shape) if p.per_run and not self.transforms_motion
         )
@@ -181,6 +186,8 @@ class Candidate:
 
 def transforms_motion(effect: Effect) -> bool:
     """Return whether an effect changes kinematics or readings, and adds no torque of its own."""
+    # A torque sensor with a free shape acts on the whole torque, so no column is its own. One that
+    # only adds a torque, such as an offset, has a column.
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (
         effect.torque_reading is not None and shaped
@@ -213,6 +220,7 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
     if parameter.unit not in TURNS or effect.joint is None:
         return -np.inf
     j = runs[0].motion.joints.index(effect.joint)
+    # All runs share the wave, so the one with the widest sweep decides.
     swept = max(float(np.ptp(run.state[0][:, j])) for run in runs)
     return WAVES * 2.0 * np.pi / swept
 
@@ -242,7 +250,9 @@ def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
             if plain.label in known:
                 continue
             yield plain
+            # In a single run, a value for each run is the plain candidate again.
             if effect.may_differ and len(kinds) > 1:
                 yield effect(joint=joint, on=machine, each_run=True)
+            # On the wearer the cuffs measure it too: it is another candidate than on the machine.
             if effect.may_be_worn and "with_human" in kinds:
                 yield effect(joint=joint, run="with_human", on=machine)

@@ -36,6 +36,7 @@ class CandidateRows:
         self._plain = [columns_under((), run, baseline) for run in self._slow]
         self._plain_rows = regression.rows([columns for columns, _ in self._plain])
         names = runs[0].motion.joints
+        # The 90 % quantile counts: a wave must be resolved in most blocks, not in the fastest few.
         steps = np.max(
             [np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs],
             axis=0,
@@ -65,6 +66,7 @@ class CandidateRows:
             parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
             rows = self._regression.rows(self._expanded(candidate, parts))
         elif candidate.directions:
+            # The effect is linear along its directions, so each gives its column by itself.
             shapes = ((shape,) * len(self._kinds) for shape in candidate.directions)
             single = [Candidate(candidate.effect, own) for own in shapes]
             rows = np.hstack([self._transformed(one, others) for one in single])
@@ -153,9 +155,13 @@ class CandidateRows:
                 for (_, y), run in zip(transformed, runs, strict=True)
             ]
         )
+        # The baseline is fitted again: values from the plain motion are biased without the effect.
+        # Other causes of the set are fitted too, or the baseline would imitate them.
         target = regression.torque_rows + change[:, 0]
         wide = columns if others is None else np.hstack([columns, others])
         values = _least_squares(wide, target)[: columns.shape[1]]
+        # From y + change = C' v follows y = C v + ((C' - C) v - change). The bracket is the column
+        # that the plain baseline C lacks.
         return ((columns - self._plain_rows) @ values)[:, np.newaxis] - change, values
 
 

@@ -64,6 +64,8 @@ class Cause:
             Number of the set with whose other causes it was refined; -1 where it was refined alone.
         """
         typical = fitted.candidate.typical(regression.kinds)
+        # Typical amplitudes make columns of unlike units comparable. The singular vectors are then
+        # orthonormal shares, the likeliest direction first.
         _, size, turned = np.linalg.svd(
             regression.shares(fitted.columns) * typical, full_matrices=False
         )
@@ -72,6 +74,7 @@ class Cause:
             return None
         amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
         rows = fitted.columns @ amplitudes
+        # Before projection: by these values the baseline changes if the cause takes its part over.
         imitation = regression.baseline_values(np.hstack([rows, slopes]))
         # Typical amplitudes are known roughly. Exact ones give variances like the squares of sizes.
         variance = size[kept] / size[kept].sum()

@@ -55,9 +55,11 @@ def law_rows(
     has_cuffs = bool(np.isfinite(prepared.noise.density[joints:]).any())
     kinds = {run.motion.run for run in prepared.runs}
     parts = [(list(laws), _both(drives, zero))]
+    # One kind of run without cuffs cannot separate the wearer's share from the machine's.
     if "with_human" in kinds and (len(kinds) == 2 or has_cuffs):
         parts.append(([replace(law, wearer="human") for law in laws], _both(worn, worn)))
     if has_cuffs:
+        # Cuff forces may be wrong where the drives' torque is right.
         chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
@@ -75,6 +77,7 @@ def _hums(prepared: PreparedRuns, joints: int) -> Iterator[tuple[list[LawColumn]
         width, count = 2 * len(tones), len(prepared.runs)
         columns = [np.zeros((*run.measured.shape, width * count)) for run in prepared.runs]
         for r, run in enumerate(prepared.runs):
+            # At the full rate: a hum may turn several times within one block.
             phase = 2.0 * np.pi * np.outer(run.motion.time, tones)
             waves = run.average(np.hstack([np.sin(phase), np.cos(phase)]))
             columns[r][:, j, r * width : (r + 1) * width] = waves * prepared.torque[j]
@@ -86,6 +89,7 @@ def _coarse_steps(
 ) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the column of each joint whose torque may have coarse steps."""
     runs = prepared.runs
+    # A measured torque would be rounded already; the predicted one shows where steps fall.
     predicted = [run.slow(x) for run, x in zip(runs, prepared.predicted, strict=True)]
     residual = [
         run.slow(np.nan_to_num(run.motion.torque)) - x
@@ -136,6 +140,7 @@ def curve_rows(
         curves, variance = curves_of_time(run)
         # Noise adds twice its density over the duration to the square of a cosine's amplitude.
         duration = max(float(run.time[-1] - run.time[0]), LENGTH_S)
+        # The constant counts as the slowest cosine, as pink noise has no finite density at 0.
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
         noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration
         for j in range(regression.joints):

@@ -88,6 +88,7 @@ class Library:
         cause, a small one has another shape than alone.
         """
         grown, main = self, self.causes[number]
+        # With its derivatives the main cause may change its shape a little as a partner is fitted.
         rows_of_main = np.hstack([main.columns, main.derivative])
         alone = ShapeRefinement(self.rows, self.regression, rows_of_main)
         partners = [
@@ -108,6 +109,7 @@ class Library:
         if own is None:
             return self
         count, number = len(self.causes), len(self.contexts)
+        # These shapes belong to this set: counted alone as well, a cause would count twice.
         own = [replace(cause, context=number) for cause in own]
         context = Context(tuple(range(count, count + len(own))), tuple(laws))
         return replace(self, causes=(*self.causes, *own), contexts=(*self.contexts, context))
@@ -116,6 +118,7 @@ class Library:
         """Return the causes of a set, each refined with the rest of it fitted freely."""
         regression = self.regression
         shaped = [n for n, cause in enumerate(refined_causes) if has_shapes(cause.candidate)]
+        # Without a free shape, or without a partner, refinement would change nothing.
         if not shaped or len(refined_causes) + len(laws) < 2:
             return None
         rows = [self._law(label) for label in laws]
@@ -161,6 +164,7 @@ def build_library(prepared: PreparedRuns, report: Report = silent) -> Library:
     -------
     Library
     """
+    # No form follows a real effect exactly, so a share of the residual counts as noise.
     misfit = CRITERIA.form_misfit * prepared.slow_rms
     regression = DecisionRegression.of(
         prepared.runs, prepared.columns, prepared.noise, prepared.torque, misfit
@@ -178,6 +182,7 @@ def build_library(prepared: PreparedRuns, report: Report = silent) -> Library:
         causes += shapes
         grids += [tuple(fits)] if fits else []
         left_out += [] if shapes else [effect.label]
+    # The coarse search sees slow waves only: block averages lose the fast ones.
     causes += _ripples(prepared, alone, regression)
     in_library = {cause.candidate.label for cause in causes}
     laws, law_columns = law_rows(prepared, regression)
@@ -216,6 +221,7 @@ def _ripples(
             ripple = effect(joint, on=machine).with_parts(len(orders))
             fitted = alone.fit(Candidate(ripple, (orders,) * len(prepared.runs)))
             if fitted is not None:
+                # Order tracking has refined the orders already, so they need no derivatives.
                 none = np.zeros((len(fitted.columns), 0))
                 ripples.append(Cause.of(fitted, none, regression, first=True))
     return [cause for cause in ripples if cause is not None]

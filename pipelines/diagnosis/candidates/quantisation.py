@@ -60,13 +60,16 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     x, y = np.concatenate(torque), np.concatenate(residual)
     if not len(x) or not rms > 0.0:
         return None
+    # Bins first: each step then costs the same, however long the recordings are.
     middle = float(np.median(x))
     edges = middle + rms * np.linspace(-REACH, REACH, BINS + 1)
     counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=y)[0]
     # Far from zero the phase of a line turns faster with its step.
     count = round(PEAKS * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
+    # Even spacing in 1 / h, because all lines have the same width there.
     per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms
     waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))
+    # The phase is known: a line of opposite sign is no rounding error, and does not count.
     along, size = waves @ totals, waves**2 @ counts
     explained = np.where(along > 0.0, along**2 / np.maximum(size, 1.0), 0.0)
     best = int(np.argmax(explained))

@@ -66,6 +66,7 @@ def screened(
         starts = [
             Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)
         ]
+    # The best stiffness depends on the rigid bodies behind the spring, so both kinds are tried.
     if effect.swings:
         fits = [fitted for start in starts for fitted in alone.fits_of_transmission(start)]
     else:
@@ -120,6 +121,7 @@ def _grid(
     effect: Effect, runs: Sequence[Run], regression: DecisionRegression
 ) -> Iterator[tuple[float, ...]]:
     """Yield the shapes to try."""
+    # A rhythm has too many maxima for a grid. A periodogram shows all of them at once.
     if [p.unit for p in effect.shape] == ["Hz"]:
         yield from ((f,) for f in _rhythms(effect, runs, regression))
         return
@@ -182,6 +184,7 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
         return np.array([parameter.default])
     low, high = parameter.typical
     if parameter.unit in TURNS:
+        # A larger step would miss the narrow maximum of a wave.
         return np.arange(low, high, parameter.grain)
     wide = low > 0.0 and high / low > 4.0
     space = np.geomspace if wide else np.linspace
@@ -199,6 +202,7 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
     for time, values in regression.series(j):
         if not len(time):
             continue
+        # Each run has its own phase, so powers add up. The mean would leak into low frequencies.
         angle = 2.0 * np.pi * np.outer(tried, time)
         level = values - values.mean()
         power += np.abs(np.exp(1j * angle) @ level) ** 2 / len(time)

@@ -92,6 +92,7 @@ class ShapeRefinement:
         """Return rows (N, k) less the baseline and the other causes; zero for rounding."""
         plain = self._regression.project(rows)
         plain -= self._basis @ (self._basis.T @ plain)
+        # What the baseline explains but for rounding would get an enormous amplitude.
         size = np.linalg.norm(rows, axis=0)
         return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
 
@@ -106,14 +107,17 @@ class ShapeRefinement:
         amplitudes, gain = _solved(plain, self._measured)
         as_is = gain
         if candidate.transforms_motion and not candidate.directions:
+            # At amplitude one the torque is that of this very shape, at another of no effect.
             remainder = self._measured - plain.sum(axis=1)
             as_is = 0.5 * float(self._measured @ self._measured - remainder @ remainder)
         return CandidateFit(candidate, columns, amplitudes, gain, as_is)
 
     def best_of(self, fits: Sequence[CandidateFit]) -> CandidateFit | None:
         """Return the fit of an effect that explains most here, from fits made elsewhere."""
+        # The best instants depend on the part that other causes explain, so they are sought again.
         if fits[0].candidate.onset is not None:
             return self._with_onsets(fits[0].candidate)
+        # Only amplitudes are fitted again: new rows would cost as much as the coarse search.
         return max(
             (self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.score
         )
@@ -189,6 +193,8 @@ class ShapeRefinement:
         After its onset an effect acts as if it had always been present: the column of an instant is
         that of the whole run, zero before it.
         """
+        # Coordinate search: the best instant of one run at a time, those of the others held. The
+        # amplitude is common, so the runs cannot be searched apart.
         at, count = candidate.onset, len(candidate.shapes)
         assert at is not None
         times = {r: self._regression.time[self._regression.run == r] for r in range(count)}
@@ -198,6 +204,8 @@ class ShapeRefinement:
         onsets, own = [NEVER] * count, {r: np.zeros(len(self._measured)) for r in times}
         for sweep in range(SWEEPS):
             for r, t in times.items():
+                # After the first sweep an onset is sought within one step of its last place. A run
+                # without one is searched as a whole again, as the amplitude may have changed.
                 fine = sweep > 0 and onsets[r] != NEVER
                 ends = (
                     (onsets[r] - steps[r], onsets[r] + steps[r])
@@ -214,6 +222,7 @@ class ShapeRefinement:
                 columns = self._project(begun)
                 gains = self._gains(others[:, np.newaxis] + columns)
                 best = int(np.argmax(gains))
+                # The best of so many instants gains by chance: about the logarithm of their number.
                 worth = gains[best] > self._gains(others[:, np.newaxis])[0] + np.log(ONSETS)
                 onsets[r] = float(instants[best]) if worth else NEVER
                 own[r] = columns[:, best] * worth
@@ -234,11 +243,14 @@ class ShapeRefinement:
 
     def _scaled(self, start: CandidateFit) -> CandidateFit:
         """Return a candidate that transforms the motion, its shape scaled by the amplitude."""
+        # A small effect is nearly proportional to its shape, so its amplitude shows the shape to
+        # try. A negative one shows none: it would be a negative delay or stiffness.
         effect, (amplitude, *others) = start.candidate.effect, start.amplitudes
         if not start.candidate.transforms_motion or others or amplitude <= 0.0:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         if parameter.by_factors:
+            # The twist of a spring is proportional to its compliance, so the stiffness is divided.
             value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
@@ -262,6 +274,7 @@ class ShapeRefinement:
             step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
             moved = self._rows(fitted.candidate.moved(i, step), self._others)
             if moved is not None and moved.shape == fitted.columns.shape:
+                # Amplitudes are held: this is the slope of the prediction, per unit of change.
                 slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / DIFFERENCE
         return slopes
 
@@ -275,6 +288,7 @@ class ShapeRefinement:
         # An effect that transforms the motion has no amplitude: its shape alone explains the rest.
         remainder = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
         solution, _ = _solved(plain, remainder)
+        # Only the slopes' coefficients are used: amplitudes are fitted again at each new shape.
         length = 1.0
         for _ in range(LENGTHS):
             candidate = fitted.candidate
@@ -302,6 +316,7 @@ def _shaped(fitted: CandidateFit) -> CandidateFit:
     """Return a candidate that is linear in its shapes, at the shape given by its amplitudes."""
     candidate = fitted.candidate
     directions = np.array(candidate.directions)
+    # A form is no size, so amplitudes do not scale it.
     held = np.array([bool(parameter.forms) for parameter in candidate.effect.shape])
     shape = np.where(held, directions[0], fitted.amplitudes[: len(directions)] @ directions)
     shapes = (tuple(shape.tolist()),) * len(candidate.shapes)
@@ -328,6 +343,7 @@ def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
 def _unit_of(parameter: Parameter) -> float:
     """Return a shape's unit of change: its grain, its range, or zero if it changes by factors."""
     low, high = parameter.typical
+    # Along waves and tones the likelihood has many maxima: a step stays within one of them.
     if parameter.unit in TURNS:
         return parameter.grain
     if parameter.unit == "Hz":
@@ -387,6 +403,7 @@ def changed(
         Runs that change; all by default.
     """
     parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
+    # Slopes are local, and a full step may lead far beyond their validity.
     step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))
     value = now + step * unit if unit else now * np.exp(step)
     return candidate.reshaped(i, float(np.clip(value, *reach(parameter))), runs)

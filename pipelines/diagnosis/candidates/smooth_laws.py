@@ -122,8 +122,10 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
     parts: list[tuple[int | slice, NDArray]] = []
     for j in range(joints):
         for kind, degree, column in _laws_of(run, spans, load, j):
+            # Real laws are smooth: the prior variance falls with the degree.
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
             parts.append((j, column))
+    # The energy is a polynomial in two angles, so other machines have no such law.
     if joints == 2:
         for degree, pulls in _across_joints(_scaled_angle(run, spans), spans):
             laws.append(LawColumn(ACROSS, None, "all", 1.0 / (1.0 + degree)))
@@ -151,14 +153,17 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     degree = np.arange(ACROSS_DEGREE + 1)
     # Rms of each polynomial and of its slope over the whole range.
     rms, steep = 1.0 / np.sqrt(2.0 * degree + 1.0), np.sqrt(0.5 * degree * (degree + 1.0))
+    # Dividing by half the range makes the slope one by the angle itself, by the torque a share.
     units = spans.half_range * spans.torque
     for a, b in product(degree, degree):
+        # Degree 0 has no torque. Degree 1 has a constant one, as the law of a joint's angle has.
         if 2 <= a + b <= ACROSS_DEGREE:
             pulls = (
                 np.column_stack([slope[a, :, 0] * value[b, :, 1], value[a, :, 0] * slope[b, :, 1]])
                 / units
             )
             largest = max(steep[a] * rms[b] / units[0], rms[a] * steep[b] / units[1])
+            # The torque's degree is one less than the energy's.
             yield int(a + b - 1), pulls / largest
 
 
@@ -170,12 +175,16 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     here, way, force = v[:, j], sign[:, j], tau[:, j]
     yield from _polynomials("angle", q[:, j], range(10))
     yield from _speed_laws(here, way)
+    # Coulomb friction first, then viscous. Degree 0 of both is in the baseline.
     yield from _scaled("friction_by_angle", q[:, j], range(1, 5), way)
     yield from _scaled("friction_by_angle", q[:, j], range(1, 4), here)
     yield from _scaled("inertia_by_angle", q[:, j], range(3), a[:, j])
     root = np.sqrt(np.abs(force))
+    # The first two are friction that grows with the load. The others are a gain that depends on the
+    # load's sign or size.
     for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
         yield "load", 1, column
+    # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
     for k in range(4):
         yield "gain_over_time", k, force * np.cos(k * phase)
@@ -216,6 +225,8 @@ def _scaled(
 def _speed_laws(v: NDArray, way: NDArray) -> Iterator[tuple[str, int, NDArray]]:
     """Yield laws of a speed (m,) in units of its rms, even and odd, smooth and peaked at zero."""
     size = np.abs(v)
+    # Even parts are friction that differs with direction, odd ones a friction curve that bends. The
+    # peaks are Stribeck's, with exponents 1 and 2.
     even = (size, v**2, size**3)
     odd = (way * v**2, v**3, way * np.sqrt(size))
     peaks = (way * np.exp(-size / 0.2), way * np.exp(-((size / 0.6) ** 2)))
@@ -241,7 +252,9 @@ def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
     """
     elapsed = run.time - run.time[0]
     duration = float(elapsed[-1]) + 1e-6
+    # Curve k has k half waves, and so the frequency k / (2 duration).
     k = np.arange(min(MOST_CURVES, int(2.0 * WANDER_HZ * duration)) + 1)
     curves = np.cos(np.pi * np.outer(elapsed / duration, k))
+    # A random walk's power falls with the square of the frequency above the corner.
     variance = 1.0 / (1.0 + (k / (2.0 * duration * WANDER_CORNER_HZ)) ** 2)
     return curves, 2.0 * variance / variance.sum()

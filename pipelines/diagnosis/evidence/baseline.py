@@ -116,5 +116,6 @@ def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
         Values of the baseline.
     """
     layout = baseline.layout
+    # The wearer's body adds to the machine's: the drives move both.
     body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
     return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

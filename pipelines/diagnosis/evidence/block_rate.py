@@ -42,4 +42,5 @@ def at_block_rate(run: Run) -> Run:
         sequence=None,
         metadata={**motion.metadata, "regression_filter": block.as_metadata(rate_hz)},
     )
+    # Blocks of one sample: the averages must not be taken a second time.
     return replace(run, motion=slow, block=block, starts=np.arange(len(run.time)), fast=None)

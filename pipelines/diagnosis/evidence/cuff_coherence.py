@@ -52,6 +52,7 @@ def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
         known = np.isfinite(drive) & np.isfinite(cuff)
         if known.sum() < FEWEST:
             continue
+        # A push on the limb reaches the drive undiminished, so the plain difference removes it.
         before, after = np.mean(drive[known] ** 2), np.mean((drive - cuff)[known] ** 2)
         if before > LOUDER * after:
             # Neighbouring differences share a period: half of them are independent.

@@ -49,6 +49,7 @@ class DecisionBand:
         blocks = np.concatenate(starts)[:, np.newaxis] + np.arange(k)
         usable = run.usable[blocks]
         count = usable.sum(axis=1)
+        # Near a reversal an average has fewer blocks, more noise, and so less weight.
         weight = np.where(count >= LEAST_SHARE * k, count / k, 0.0)
         operators = tuple(
             _averaging(blocks, usable[:, :, o], count[:, o], len(run.time))
@@ -69,6 +70,7 @@ class DecisionBand:
         (M, O, ...) array
             In the unit of ``values``.
         """
+        # An output that was not measured is NaN, which a weight of zero would not remove.
         finite = np.nan_to_num(values)
         return np.stack([op @ finite[:, o] for o, op in enumerate(self.operators)], axis=1)
 

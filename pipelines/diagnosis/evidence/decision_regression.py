@@ -77,6 +77,7 @@ class DecisionRegression:
         bands = tuple(DecisionBand.of(run) for run in runs)
         sd, memory = noise.averaged(LENGTH_S)
         sigma = np.hypot(sd, misfit)
+        # An output without a known noise was not measured: it has no weight.
         precision = np.where(sigma > 0.0, 1.0 / np.where(sigma > 0.0, sigma, 1.0), 0.0)
         roots = tuple(np.sqrt(band.weight) * precision for band in bands)
         weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
@@ -153,6 +154,7 @@ class DecisionRegression:
     @cached_property
     def _inverse(self) -> NDArray:
         """Matrix from rows to the baseline values that come nearest to them, (b, N)."""
+        # Columns of equal length: the rank must not depend on the parameters' units.
         size = np.linalg.norm(self.baseline, axis=0)
         size = np.where(size > 0.0, size, 1.0)[:, np.newaxis]
         return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=RANK) / size)
@@ -175,6 +177,7 @@ class DecisionRegression:
     @cached_property
     def baseline_variance(self) -> NDArray:
         """The variance that each output's noise gives each baseline value, (b, O)."""
+        # Rows have unit variance and are independent, so squares of the inverse add up.
         of_output = self.output[:, np.newaxis] == np.arange(len(self.torque))
         return np.asarray(self._inverse**2 @ of_output)
 
@@ -218,6 +221,7 @@ class DecisionRegression:
         (R, k) array
             Rows of the drives.
         """
+        # Whitened rows mix neighbours, but a share is of the torque itself.
         use, columns = self.of_drives, self._coloured.solve(columns)
         roots = np.concatenate([root.ravel() for root in self.roots])[self.weighty][use]
         weight = np.concatenate([band.weight.ravel() for band in self.bands])[self.weighty][use]
@@ -241,11 +245,13 @@ def _whitening(
         Correlation of adjacent averages.
     """
     outputs, number = len(memory), np.cumsum(weighty) - 1
+    # The first average of a run, or after a gap, has none before it.
     follows = np.concatenate([np.diff(b.time, prepend=-np.inf) < 1.5 * LENGTH_S for b in bands])
     row = np.flatnonzero(weighty)
     before = np.maximum(row - outputs, 0)
     has = follows[row // outputs] & weighty[before]
     r = np.where(has, np.nan_to_num(memory)[row % outputs], 0.0)
+    # The part that is not predicted has variance 1 - r², and is scaled to one again.
     own = 1.0 / np.sqrt(1.0 - r**2)
     N = len(row)
     there = np.flatnonzero(has)
@@ -271,4 +277,5 @@ def _orthonormal(columns: NDArray) -> NDArray:
     """Return an orthonormal basis (N, r) of columns (N, b), without those that add nothing."""
     size = np.linalg.norm(columns, axis=0)
     q, r = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])
+    # QR invents a direction for a column that depends on those before it.
     return q[:, np.abs(np.diag(r)) > RANK]

@@ -27,6 +27,7 @@ def downsampled(motion: Motion) -> Motion:
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion
+    # Forces are read less often than angles: without interpolation most averages would be NaN.
     motion, starts = replace(motion, forces=motion.held_forces), every.starts(motion.segment)
     averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)
@@ -36,6 +37,7 @@ def downsampled(motion: Motion) -> Motion:
     # A mean of readings is no reading: it lies between the encoder's counts.
     if motion.measured_angle is not None:
         averaged["measured_angle"] = motion.measured_angle[starts + every.decimation // 2]
+    # The regression filter lasts as long as before, in samples of the lower rate.
     blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))
     rate = motion.sample_rate_hz / every.decimation
     return replace(

@@ -39,6 +39,7 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
     """
     refuse_several_machines(motions)
     for motion in motions:
+        # Other machines may be of any size, so no torque is too large for them.
         if motion.machine.is_exoskeleton:
             _refuse_monsters(motion)
         _refuse_one_angle_twice(motion)
@@ -67,6 +68,7 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
     if motion.measured_angle is None or not motion.valid.any():
         return
     q = motion.measured_angle[motion.valid]
+    # A constant has no correlation, and a standstill has a message of its own.
     moving = np.flatnonzero(np.ptp(q, axis=0) > 0.0)
     for one, other in combinations(moving, 2):
         alike = float(np.corrcoef(q[:, one], q[:, other])[0, 1])
@@ -103,6 +105,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     machine = motions[0].machine
     least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
+        # First: a constant angle is the reason why a joint seems not to move.
         _refuse_dead_angle(motions, j)
         lasts = _seconds(motions, [m[:, j] for m in moving])
         if lasts < least:
@@ -133,6 +136,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Raise InputError for a torque that is constant while its joint moves."""
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
     if len(values) and np.ptp(values) == 0.0:
+        # Adding zero turns a -0.0 into 0.0 in the message.
         raise silent_torque(motions, motions[0].machine.joints[joint], float(values[0]) + 0.0)
 
 

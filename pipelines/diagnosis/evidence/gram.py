@@ -73,6 +73,7 @@ def solve(gram: Gram, weights: NDArray) -> NDArray:
     """
     A = np.einsum("o,oij->ij", weights, gram.columns)
     b = np.einsum("o,oi->i", weights, gram.measured)
+    # At unit length the ridge shrinks all columns alike, whatever their units.
     size = np.sqrt(np.maximum(np.diag(A), np.finfo(float).tiny))
     scaled = A / np.outer(size, size) + RIDGE * np.eye(len(b))
     return np.linalg.solve(scaled, b / size) / size
@@ -95,6 +96,7 @@ def error(gram: Gram, values: NDArray) -> NDArray:
     """
     quadratic = np.einsum("i,oij,j->o", values, gram.columns, values)
     linear = np.einsum("i,oi->o", values, gram.measured)
+    # Rounding can make this difference of large squares negative.
     return np.maximum(gram.square - 2 * linear + quadratic, 0.0)
 
 
@@ -116,6 +118,7 @@ def weights_under(gram: Gram) -> NDArray:
     weights = np.where(gram.count > 0, 1.0, 0.0)
     for _ in range(PASSES):
         squares = error(gram, solve(gram, weights))
+        # An output without any error would have infinite weight.
         least = 1e-9 * np.maximum(gram.count, 1)
         weights = np.where(gram.count > 0, gram.count / np.maximum(squares, least), 0.0)
     return weights

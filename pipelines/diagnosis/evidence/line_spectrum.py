@@ -90,6 +90,7 @@ class Spectrum:
         tail = float(fdtrc(2 * self.phases, around, ratio / self.phases))
         # Maxima between independent places are higher than at them.
         places = 2.5 * (1.0 + (self.cycles[-1] - self.cycles[0]) / self.width)
+        # By logarithms, because a small chance would be lost to rounding in 1 - p.
         return float(-np.expm1(searches * places * np.log1p(-min(tail, 1.0 - 1e-12))))
 
 
@@ -123,6 +124,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     searched : Orders
         Range and width of the search, cycles per turn.
     """
+    # Sum the scores over a grid of angles: there a line is periodic at any speed.
     finest = GRID * searched.highest
     step = 2.0 * np.pi / finest
     first = min(float(channel.grid.angle.min()) for channel in channels)
@@ -134,6 +136,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
         share = place - below
         total += np.bincount(below, channel.score * (1.0 - share), len(total))
         total += np.bincount(below + 1, channel.score * share, len(total))
+    # Zero padding: a line between two orders of a coarse spectrum would lose power.
     points = max(len(total), int(OVERSAMPLED * finest / searched.width))
     length = fft.next_fast_len(points, real=True)
     transform = fft.rfft(total, length)
@@ -144,6 +147,7 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     orders = orders[kept]
     # Splitting damps the transform by the square of a sinc.
     power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
+    # The information changes slowly with the order, so it is interpolated between some.
     some = orders[:: max(1, len(orders) // 256)]
     information = np.sum([_information_at(channel, some) for channel in channels], axis=0)
     information = np.maximum(information, LEAST_INFORMED * np.max(information))
@@ -169,6 +173,7 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
     least_hz : float
         Lowest frequency to search, Hz.
     """
+    # All runs are padded to twice the longest, so that their frequencies agree.
     longest = max(len(channel.grid.mask) / channel.grid.rate_hz for channel in channels)
     step = 0.5 / longest
     count = int(0.5 * min(channel.grid.rate_hz for channel in channels) / step)
@@ -181,6 +186,7 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
         x = np.zeros(round(grid.rate_hz / step))
         x[grid.place] = channel.score
         information = np.maximum(len(channel.score) * channel.weight(hz), TINY)
+        # Each run has its own phase, so ratios add up, not amplitudes.
         ratio += np.abs(fft.rfft(x)[kept]) ** 2 / information
     level = _level(ratio, 2 * AROUND_IN_TIME, len(channels))
     if channels[0].grid.period_s:
@@ -193,7 +199,9 @@ def _level(ratio: NDArray, around: int, phases: int) -> NDArray:
     edges = np.linspace(0, len(ratio), max(1, len(ratio) // around) + 1).astype(int)
     medians = [np.median(ratio[a:b]) for a, b in pairwise(edges)]
     middle = 0.5 * (edges[:-1] + edges[1:])
+    # In stationary noise a sum of ``phases`` ratios has a gamma distribution with this median.
     level = np.interp(np.arange(len(ratio)), middle, medians) / float(gammaincinv(phases, 0.5))
+    # A quiet neighbourhood must not raise a ratio.
     return np.maximum(level, 1.0)
 
 
@@ -213,6 +221,7 @@ def _with_harmonics(
     harmonics = np.arange(first, last + 1.0) / period_s
     if not len(harmonics):
         return level
+    # A harmonic falls between grid points, so the highest of three counts as its height.
     place = np.clip(np.round((harmonics - hz[0]) / step).astype(int), 1, len(hz) - 2)
     at = np.maximum(np.maximum(ratio[place - 1], ratio[place]), ratio[place + 1])
     padded = np.pad(at, HARMONICS, mode="edge")

@@ -18,6 +18,7 @@ def above_the_motion_hz(run: Run) -> float:
 
 def _band_hz(run: Run) -> float:
     """Return the frequency, Hz, below which the joints' speeds have nearly all their power."""
+    # The speed, not the angle, because it weights fast parts of the motion more.
     speed = run.slow(run.motion.dq)[run.motion.valid]
     power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)
     share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)

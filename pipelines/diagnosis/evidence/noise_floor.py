@@ -50,6 +50,7 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
         d = [p[:, o] for p in pairs if len(p)]
         known = np.concatenate(d)
         known = known[np.isfinite(known)]
+        # Fewer differences determine neither a variance nor a correlation.
         if len(known) > 20:
             time = _correlation_time(d)
             # The subtracted average held a part of the noise too.
@@ -72,11 +73,13 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     (k, O) array
         N·m; NaN where a sample is not usable.
     """
+    # With less than two periods, some phases of the motion would have no difference.
     period = run.motion.period_s
     if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
         return np.zeros((0, residual.shape[1]))
     width = run.block.decimation / run.motion.sample_rate_hz
     shift = period / width
+    # Blocks are compared as they are where the period is a whole number of them.
     whole = round(shift)
     if abs(shift - whole) > 0.1:
         # The period is no whole number of blocks: interpolate the later one.
@@ -93,6 +96,7 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     later = ahead[inside]
     same_phase = np.abs(run.time[later] - run.time[now] - period) < 0.3 * width
     usable = run.usable[now] & run.usable[later] & same_phase[:, np.newaxis]
+    # A difference of two independent values has twice the variance of one.
     return np.where(usable, (residual[later] - residual[now]) / np.sqrt(2), np.nan)
 
 
@@ -120,6 +124,7 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
     for lag in range(1, 40):
         products = np.concatenate([s[lag:] * s[:-lag] for s in series])
         rho = np.nanmean(products) / variance
+        # Beyond the first small correlation the sum would collect errors of estimates.
         if not rho > 0.05:
             break
         total += 2 * rho

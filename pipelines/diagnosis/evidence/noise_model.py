@@ -92,6 +92,8 @@ class NoiseModel:
         tuple of (O,) arrays
             N·m, and 0 to 1.
         """
+        # An average passes the density times a squared sinc, and little above its fourth zero. The
+        # density has two sides, hence the factor 2.
         hz = np.linspace(0.0, 4.0 / length_s, 2001)
         passed = self.at(np.maximum(hz, WANDER_HZ)) * np.sinc(hz * length_s) ** 2
         variance = 2.0 * np.trapezoid(passed, hz, axis=1)
@@ -112,6 +114,7 @@ class NoiseModel:
             N·m.
         """
         sd, memory = self.averaged(length_s)
+        # Slow sums of correlated averages vary more than those of independent ones, by this factor.
         return np.asarray(sd * np.sqrt((1.0 + memory) / (1.0 - memory)))
 
     def excess(self, hz: NDArray, length_s: float) -> NDArray:
@@ -131,6 +134,7 @@ class NoiseModel:
         """
         sd, memory = self.averaged(length_s)
         turn = np.multiply.outer(memory, np.cos(2.0 * np.pi * hz * length_s))
+        # Whitening treats averages as a sequence of first order; this is the density of one.
         of_order_one = (sd**2 * (1.0 - memory**2) * length_s) / (1.0 + memory**2 - 2.0 * turn.T)
         return np.maximum(self.at(hz) - of_order_one.T, 0.0)
 
@@ -181,6 +185,7 @@ def _spectrum_of(
     sizes = np.array([power.sum() / share.sum() for _, power, share in pieces])
     if not sizes.any():
         return np.nan, np.nan, np.nan
+    # Events first: a step in one piece would raise the density of all.
     alike = sizes <= UNLIKE * np.median(sizes)
     chosen = [piece for piece, is_alike in zip(pieces, alike, strict=True) if is_alike]
     frequency, power, share = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
@@ -188,6 +193,8 @@ def _spectrum_of(
     tried = CORRELATION_S[2.0 * np.pi * band[0] * CORRELATION_S <= 1.0]
     first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(tried, frequency)) ** 2)
     shapes = first[:, np.newaxis] + pink[:, np.newaxis] * PINK_HZ / frequency
+    # For each shape the likeliest density is a closed form, so only shapes are tried. There
+    # Whittle's sum of power / S is constant, and the sum of log S remains.
     densities = np.sum(power / shapes, axis=2) / share.sum()
     misfit = share.sum() * np.log(densities) + np.log(shapes) @ share
     t, p = np.unravel_index(np.argmin(misfit), misfit.shape)

@@ -126,6 +126,7 @@ class Run:
         """
         if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
+        # The sensors turn with the links: at another angle a force has another lever arm.
         cuffs = self.motion.cuff_torque(link.q)
         assert cuffs is not None, "a run that has cuffs has their forces"
         joints = len(self.motion.joints)
@@ -155,6 +156,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
+    # Next to a gap a low-pass lacks the samples of one side.
     trusted = motion.valid if cutoff_hz is None else motion.valid & ~unsure(motion, cutoff_hz)
     valid = block.all(trusted, starts)
     usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
@@ -164,13 +166,16 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
         outputs.append(np.full_like(motion.torque, np.nan))
         usable = np.hstack([usable, np.zeros_like(usable)])
     else:
+        # Cuffs do not measure the joint's friction, so slow motion does no harm, only turns do.
         known = np.isfinite(block.mean(cuffs, starts))
         outputs.append(cuffs)
         steady = block.all(away_from_turns(motion), starts)
         usable = np.hstack([usable, (valid & steady)[:, np.newaxis] & known])
+    # A filter would spread one NaN over its whole stretch.
     whole = np.nan_to_num(np.hstack(outputs))
     slow = whole if cutoff_hz is None else filtered(motion, whole, cutoff_hz)
     length = motion.period_s or FOLD_S
+    # Rounding must not move the first block of a period into the one before.
     number = np.floor(time / length + 1e-9).astype(int)
     # A short run has no whole period for each fold, so its stretches are assigned to folds instead.
     part = min(length, (time[-1] - time[0]) / FOLDS + 1e-6)

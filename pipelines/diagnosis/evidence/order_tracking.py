@@ -221,6 +221,7 @@ def _lines_of_joint(
     swept = _swept(moving)
     if not swept > 0.0:
         return JointLines((), nothing(Kind.ANGLE), nothing(Kind.TIME))
+    # A joint that sweeps little needs more cycles a turn for the fewest waves.
     lowest, highest = bounds
     orders = Orders(swept, max(lowest, LEAST_WAVES * 2.0 * np.pi / swept), highest)
     search = _Search(moving, orders)
@@ -236,6 +237,7 @@ def _lines_of_joint(
             lines = search.refined([lines[0].without(-1), lines[1]])
         channels = search.remainder(lines)
         spectra = [search.spectrum(kind, channels) for kind in Kind]
+    # Each step holds the other kind of line, so all are refined once more at the end.
     if tried:
         lines = search.refined(lines)
         channels = search.remainder(lines)
@@ -284,6 +286,7 @@ def _strongest(
         ratio = spectrum.log_likelihood_ratio.copy()
         before = [cycles for kind, cycles in tried if kind is spectrum.kind]
         for cycles in before:
+            # A line that was tried in vain would come first again, for ever.
             ratio[np.abs(spectrum.cycles - cycles) < APART * spectrum.width] = 0.0
         if len(before) >= MOST_LINES or not len(ratio):
             continue
@@ -355,6 +358,7 @@ class _Search:
             The residual less the lines, in each run.
         """
         if kind is Kind.TIME:
+            # Over a long run a small error of the frequency turns the phase.
             cycles = self._sharpened(cycles, channels)
         products = np.array(
             [
@@ -363,9 +367,11 @@ class _Search:
             ]
         )
         information_of = np.array(
+            # The mean square of a sine is one half.
             [0.5 * information(channel, kind, cycles) for channel in channels]
         )
         if kind is Kind.ANGLE:
+            # A ripple has one phase in all runs, so their products add up first.
             products, information_of = (
                 np.broadcast_to(products.sum(axis=0), products.shape),
                 information_of.sum(),
@@ -413,6 +419,7 @@ class _Search:
         """Return the likeliest lines on the way from some lines to others, which may overshoot."""
         if not len(now):
             return now
+        # Along the way the log likelihood is a parabola, and slope over bend its summit.
         slope = bend = TINY
         for r, (waves, channel) in enumerate(zip(self.waves, channels, strict=True)):
             torque = then.torque(waves, r) - now.torque(waves, r)
@@ -460,6 +467,7 @@ class _Search:
         """
         significant = []
         for known, spectrum in zip(lines, spectra, strict=True):
+            # Lines are subtracted now, so near neighbours show a steep level that no line raises.
             level = spectrum.steep_level if len(known) else spectrum.level
             for number, cycles in enumerate(known.cycles):
                 amplitudes = known.amplitudes[:, number]
@@ -469,6 +477,7 @@ class _Search:
                 if alarm > FALSE_ALARMS:
                     continue
                 size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
+                # Over the angle all runs have the same amplitudes, so the first shows the phase.
                 sine, cosine = amplitudes[0]
                 phase = float(np.arctan2(cosine, sine)) if known.kind is Kind.ANGLE else np.nan
                 significant.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
@@ -511,9 +520,11 @@ def _step_over_angle(
         for i, order in enumerate(lines.cycles):
             sine, cosine = lines.amplitudes[0, i]
             s, c = wave(Kind.ANGLE, order)
+            # The third column is the derivative of the line's torque by its order.
             columns[3 * i : 3 * i + 3] = s, c, grid.angle * (sine * c - cosine * s)
         right += columns @ channel.score
         for i, order in enumerate(lines.cycles):
+            # A sample is weighted by the noise at the frequency that the line has there.
             columns[3 * i : 3 * i + 3] *= np.sqrt(channel.weight(order * grid.hz_per_order))
         normal += columns @ columns.T
     change = _solved(normal, right).reshape(count, 3)
@@ -529,6 +540,7 @@ def _step_over_time(
     """Return lines over time after a step along their amplitudes in each run."""
     if not len(lines):
         return lines
+    # Frequencies stay: they were sharpened when each line was added.
     amplitudes = lines.amplitudes.copy()
     for r, (wave, channel) in enumerate(zip(waves, channels, strict=True)):
         columns = np.array([wave(Kind.TIME, hz) for hz in lines.cycles])
@@ -541,6 +553,7 @@ def _step_over_time(
 
 def _solved(normal: NDArray, right: NDArray) -> NDArray:
     """Return the least-norm solution of normal equations, (p, p) and (p,), columns scaled alike."""
+    # Two lines next to each other make the equations singular, hence the least norm.
     size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-9)[0]
     return np.asarray(scaled / size)

@@ -68,9 +68,12 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
     gram = gram_of_runs(runs, columns)
     weights = weights_under(gram)
     values = solve(gram, weights)
+    # No column of the baseline needs a load, so its bodies are known first.
     loaded = tuple(with_load(run, baseline, values) for run in runs)
     residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
+    # Errors of the baseline repeat with the motion, so they cancel between periods.
     noise = noise_model(loaded, residuals)
+    # Blocks of 25 ms lose lines above 18 Hz, so these are sought at the full rate.
     predicted = _at_full_rate(loaded, baseline, values)
     motions = [run.motion for run in loaded]
     lines = lines_in(

@@ -82,6 +82,7 @@ def _of_joint(
     total = float(np.mean(everything**2)) if len(everything) else 0.0
     if not total > 0.0:
         return ResidualShares(0.0, 1.0, None, None, 0.0, 0.0, None)
+    # The noise is an estimate of its own, and may exceed the error that it is a part of.
     noisy = min(float(np.nan_to_num(noise.averaged(LENGTH_S)[0][j])) ** 2, total)
     means = np.array([v.mean() if len(v) else 0.0 for v in values])
     counts = np.array([len(v) for v in values])
@@ -92,6 +93,7 @@ def _of_joint(
     ]
     products = np.concatenate(repeated)
     above = max(total - noisy, 0.0)
+    # Without a period nothing shows whether the excess repeats, so it stays unsplit.
     if not len(products):
         between = min(between, above)
         return ResidualShares(
@@ -104,6 +106,7 @@ def _of_joint(
             None,
         )
     repeats = float(np.clip(products.mean(), 0.0, above))
+    # A constant of one run repeats in all of its periods, so it is subtracted from that share.
     between = min(between, repeats)
     return ResidualShares(
         np.sqrt(total),
@@ -125,6 +128,7 @@ def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:
     ahead = np.searchsorted(time, time + period - 0.5 * LENGTH_S)
     inside = ahead < len(time)
     now, later = np.flatnonzero(inside), ahead[inside]
+    # A period need not be a whole number of averages: half of one is near enough in phase.
     same = np.abs(time[later] - time[now] - period) <= 0.5 * LENGTH_S
     use = same & known[now] & known[later]
     return values[now[use]] * values[later[use]]
@@ -140,8 +144,10 @@ def _with_person_only(
         products = np.concatenate(own) if own else np.zeros(0)
         if not len(products):
             return None
+        # Noise can make a mean of products negative; a power is not.
         powers.append(max(float(products.mean()), 0.0))
     alone, worn = powers
+    # The difference exists in the runs with a person only, and they are a part of the total.
     of_all = sum(len(r) for r in repeated)
     share = (
         sum(

@@ -88,6 +88,7 @@ def slowed(
     k = max(1, round(length_s / width))
     whole = len(residual) // k * k
     time = run.time[:whole].reshape(-1, k)
+    # A group across a gap lasts longer than its blocks together, and is not used.
     together = time[:, -1] - time[:, 0] < (k - 0.5) * width
     there = run.usable[:whole].reshape(-1, k, residual.shape[1])
     count = there.sum(axis=1)

@@ -118,6 +118,7 @@ class Grid:
         used = trace.usable
         hz_per_order = np.abs(trace.speed[used]) / (2.0 * np.pi)
         place = np.round((trace.time - trace.time[0]) * trace.rate_hz).astype(int)
+        # The grid has a place for every instant, so that phases stay right across gaps.
         mask = np.zeros(fft.next_fast_len(int(place[-1]) + 1, real=True))
         mask[place[used]] = 1.0
         hz = fft.rfftfreq(len(mask), 1.0 / trace.rate_hz)
@@ -149,6 +150,8 @@ class Grid:
         """
         fast = self.fast(residual)
         spectrum = np.interp(self.hz, *noise(fast, self.mask, self.rate_hz))
+        # The score is F' (F r) / S, with the filter F = 1 - smooth that lines pass too. The
+        # spectrum is that of F r: where F is nearly zero the ratio would explode, hence the ramp.
         gain = self.passed * (1.0 - self.smooth) / spectrum
         return Channel(self, gain, _filtered(fast, gain)[self.place])
 
@@ -167,6 +170,7 @@ class Grid:
         """
         x = np.zeros_like(self.mask)
         x[self.place] = torque
+        # Divided by the usable share of the window, the local mean is right next to gaps.
         return (x - _filtered(x, self.smooth) / self.around) * self.mask
 
 
@@ -254,6 +258,7 @@ def noise(x: NDArray, mask: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
     window = np.hanning(length)
     starts = np.arange(0, len(x) - length + 1, max(1, length // 2))
     rows = starts[:, np.newaxis] + np.arange(length)
+    # Segments count by their usable part, or gaps would lower the noise.
     used = max(float(np.sum(mask[rows] * window**2)), 1e-12)
     power = np.sum(np.abs(fft.rfft(x[rows] * window, axis=1)) ** 2, axis=0) / used
     # A median over frequencies: a narrow line does not count as noise.

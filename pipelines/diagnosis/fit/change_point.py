@@ -69,6 +69,7 @@ class Onset:
         residual = np.concatenate([without[:best], throughout[best:]])
         pull = np.where(learnt, weights * (without - throughout), 0.0)
         size = float(np.sum(pull * (without - throughout)))
+        # Their running sum is the noise by which the likelihoods of two instants differ.
         scores = np.sum(pull * residual, axis=1, keepdims=True)
         noise = float(long_run_covariance(lambda: [(0, scores)], 1).covariance[0, 0])
         instants = np.concatenate([[ALWAYS], 0.5 * (run.time[1:] + run.time[:-1]), [NEVER]])
@@ -97,6 +98,7 @@ class Onset:
         misfit : (O,) array
             Model error that depends on the motion, and so is correlated from block to block, N·m.
         """
+        # Model error is alike over some blocks, so the variance of its sum is that much larger.
         wrong = run.blocks_in(ALIKE_S) * float(np.sum((self.pull * misfit) ** 2))
         doubt = CRITICAL * (self.inflation + wrong / self.size) if self.size > 0.0 else np.inf
         held = np.flatnonzero(self.squares <= self.squares.min() + doubt)

@@ -36,6 +36,7 @@ def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
     model = fitted_model(fit, baseline, run.motion.run)
     if not any(cause.effect.per_run for cause in fit.causes):
         return model
+    # The table's per-run values are of another run, so they are fitted to this one.
     own = {term.effect.label: term.values for term in settled(fit, run, baseline)}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 

@@ -69,6 +69,7 @@ def _halves(run: Run) -> NDArray:
 
 
 def _shared_term(cause: Candidate) -> Term:
+    # A shape that runs share is equal in all of them; per-run ones are fitted to this run.
     return cause.term(0)
 
 
@@ -87,6 +88,7 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     begins = [
         (number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None
     ]
+    # Without any onset first: an instant of another run would bias the other values.
     terms = [_shared_term(cause) for cause in fit.causes]
     for place in begins:
         terms = _with_shape(terms, *place, NEVER)
@@ -120,6 +122,7 @@ def _learn_amplitudes(
     bent, (columns, measured) = _bent(
         fit, terms, run, baseline, columns_under(terms, run, baseline), learnt
     )
+    # Only the run's own amplitudes are fitted, or it would be no validation of the shared ones.
     values = shared.copy()
     values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
     return values, measured - columns @ values, bent
@@ -147,6 +150,7 @@ def _bent(
     for _ in range(NEWTON_STEPS if places else 0):
         columns, measured = plain
         slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
+        # Own amplitudes move with the shapes, or shapes would make up for their errors.
         wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
         steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
         for (number, i), step in zip(places, steps, strict=True):
@@ -162,6 +166,7 @@ def _solved(columns: NDArray, target: NDArray, learnt: NDArray, weights: NDArray
     """Return the amplitudes (k,) of columns (m, O, k) that fit a target (m, O) where learnt."""
     root = np.sqrt(weights) * learnt
     A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
+    # A column is zero where its effect never acts: the least norm makes its amplitude zero.
     return np.asarray(np.linalg.lstsq(A, (target * root).ravel(), rcond=1e-9)[0])
 
 

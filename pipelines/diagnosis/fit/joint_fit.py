@@ -151,6 +151,7 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
     squares = error(gram, values)
     rms = np.sqrt(squares / np.maximum(count, 1))
     weights = np.where(there, 1.0 / np.maximum(rms, 1e-6) ** 2, 0.0)
+    # The cost is minus the log likelihood with each variance at its estimate, up to a constant.
     return weights, rms, float(np.sum(count[there] * np.log(rms[there])))
 
 
@@ -172,6 +173,7 @@ def onsets_of(
     baseline : Baseline
         The fit's baseline.
     """
+    # The two extremes suffice: an onset in between is made of both.
     ends = [
         fitted.instead(number, fitted.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)
     ]
@@ -212,6 +214,7 @@ def slope(
     step = step_of(cause, i, max(run, 0))
     moved = cause.moved(i, step, None if run < 0 else [run])
     ahead = stacked_columns(fitted.instead(number, moved), runs, baseline)
+    # Readings change as well as predictions where a sensor or a link moves.
     return [
         ((c @ fitted.values - y) - (d @ fitted.values - z)) / step
         for (c, y), (d, z) in zip(ahead, plain, strict=True)

@@ -76,6 +76,7 @@ class Refinement:
 
     def _start(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit of the shapes as they are, with the library's rigid bodies."""
+        # A machine has one set of bodies, so those of the first transmission count.
         bodies = next((cause.bodies for cause in causes if cause.bodies), None)
         if bodies is None:
             return self._fit(causes, self._runs, None)
@@ -121,6 +122,7 @@ class Refinement:
                     if form != cause.shapes[0][i]:
                         causes = best.instead(number, cause.reshaped(i, form))
                         tried.append(self._fit(causes, runs, best.loads))
+        # Forms compete at their own best shapes, not at those of the present form.
         if len(tried) > 1:
             tried = [self._stepped(one, runs) for one in tried]
         return min(tried, key=lambda one: one.cost)
@@ -138,6 +140,7 @@ class Refinement:
                 for r, shape in enumerate(cause.shapes)
             ]
             causes = best.instead(number, cause.with_own(i, instants))
+            # The likeliest instant prefers a simple answer, which may cost a little more than now.
             best = min((best, self._fit(causes, runs, best.loads)), key=lambda one: one.cost)
         return best
 
@@ -153,6 +156,7 @@ class Refinement:
             for r, (columns, _) in enumerate(plain)
         ]
         gram = gram_of_runs(runs, wide, [measured for _, measured in plain])
+        # Only the steps of shapes are used: amplitudes are fitted again at each length.
         steps = solve(gram, self._weights)[len(best.values) :]
         length = 1.0
         for _ in range(HALVINGS):
@@ -169,6 +173,7 @@ class Refinement:
         for number, cause in enumerate(fitted.causes):
             for i, unit in free_shapes(cause):
                 own = i == cause.per_run_transform
+                # A run in which the cause does not act has no slope, and no shape to fit.
                 acting = fitted.columns_of(number).runs if own else (-1,)
                 places += [(number, i, run, unit) for run in acting]
         return places

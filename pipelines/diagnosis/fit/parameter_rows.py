@@ -37,6 +37,7 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     (p, p) array
         Covariance.
     """
+    # The covariance has places for shapes and onsets too, which have no linear value.
     units = np.eye(len(sure.covariance))
     values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
     rows: list[Row] = []
@@ -50,6 +51,7 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
             rows += rows_of(term.effect, fitted, units[term.slice], step)
     onsets: dict[int, tuple[float, float]] = {}
     for number in range(len(fit.causes)):
+        # The table has one value of each parameter: that of the first run with the cause.
         first = fit.columns_of(number).runs[0]
         onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
         effect = fit.causes[number].effect
@@ -58,6 +60,7 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     T = np.array([row.slope for row in rows])
     covariance = T @ sure.covariance @ T.T
     frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
+    # An onset is not Gaussian, so its own interval replaces that of its variance.
     for row, ends in onsets.items():
         frame.loc[row, ["ci95_low", "ci95_high"]] = ends
     return frame, covariance
@@ -96,6 +99,7 @@ def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray
     cause, columns = fit.causes[number], fit.columns_of(number)
     linear = len(cause.effect.linear)
     slopes = np.zeros((len(cause.effect.fitted), len(sure.covariance)))
+    # Each value is one of the covariance's parameters, so its slope is a unit vector.
     slopes[np.arange(linear), columns.places(run)] = 1.0
     for order, (which, i, r) in enumerate(sure.shapes):
         if which == number and r in (-1, run):

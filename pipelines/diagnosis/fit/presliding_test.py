@@ -111,6 +111,7 @@ class _About:
         coulomb_torque = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(
             motion
         )
+        # Coulomb friction is left out of the model here, and added again in each way of reversing.
         rest = filtered(motion, motion.torque[:, j] - coulomb_torque[:, j], CUTOFF_HZ)
         return cls(motion, model, j, read, speed, rest, level, near)
 
@@ -129,6 +130,7 @@ class _About:
         """
         column = np.zeros((*self.motion.q.shape, 1))
         column[:, self.j, 0] = self.level * side(self)
+        # A gain or a delay of the torque sensor acts on friction too.
         seen = self.model.observed(column, self.motion)[:, self.j, 0]
         return (self.rest - filtered(self.motion, seen, CUTOFF_HZ))[self.near]
 
@@ -184,6 +186,7 @@ def _of_joint(
     scale = baseline.machine.scale(joint)
     count = max(_count(about.read) for about in (*train, *validate))
     shortest, longest = max(SHORTEST * scale.travel, COUNTS * count), LONGEST * scale.travel
+    # A coarse encoder does not show travels as short as presliding.
     if 2.0 * shortest > longest:
         return None
     travels = np.geomspace(shortest, longest, TRAVELS)
@@ -199,6 +202,7 @@ def _of_joint(
     beaten, otherwise = (_best(some, rivals)[1] for some in (train, validate))
     remaining = _power(validate, over[best])
     independent = CUTOFF_HZ * sum(about.seconds for about in train)
+    # The travel was chosen on the training runs, so the validation runs must gain as well.
     ratios = trained / beaten, remaining / otherwise
     if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
         return None
@@ -266,6 +270,7 @@ def dahl(angle: NDArray, grain: float, travel: float) -> NDArray:
         if abs(away) > grain:
             way = 1.0 if away > 0.0 else -1.0
             z = way + (z - way) * np.exp(-(abs(away) - grain) / travel)
+            # The dead band follows the angle, as play does.
             at = angle[i] - way * grain
         out[i] = z
     return out

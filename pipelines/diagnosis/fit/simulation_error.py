@@ -33,6 +33,7 @@ def simulation_error(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArr
             result = replay(model_of_run(fit, baseline, run), run.motion, WINDOW_S, WINDOW_S)
         except (ExoidError, ZeroDivisionError):
             return None
+        # Angles of a simulation that diverges overflow; the result is then None.
         with np.errstate(over="ignore"):
             squares = squares + np.sum(result.error**2, axis=(0, 1))
         count += result.error.shape[0] * result.error.shape[1]

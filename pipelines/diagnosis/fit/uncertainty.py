@@ -102,6 +102,7 @@ def uncertainty(
         np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2)
         for r, c in enumerate(columns)
     ]
+    # Sandwich: curvature of the fit outside, and the variance of its scores inside.
     weights = fit.weights
     gram = sum(
         np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a)
@@ -111,13 +112,16 @@ def uncertainty(
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a)
         for run, e, a in zip(runs, residuals, wide, strict=True)
     ]
+    # First noise: correlated scores, each run a stretch of its own.
     filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
+    # Then model error: it is the same in many blocks, so their number multiplies its variance.
     misfit = np.maximum(imperfect, slow_error(runs, residuals).excess)
     for run, a in zip(runs, wide, strict=True):
         filling = filling + np.einsum(
             "mo,o,moi,moj->ij", run.usable, _correlated_blocks(run) * (weights * misfit) ** 2, a, a
         )
     for place in _shapes(fit.causes, len(runs), fitted=False):
+        # Held shapes: uniform over the typical range, whose variance is its square over 12.
         low, high = fit.causes[place[0]].effect.shape[place[1]].typical
         assumed = slope(fit, place, runs, baseline, plain)
         pull = sum(
@@ -126,15 +130,18 @@ def uncertainty(
         )
         filling = filling + np.outer(pull, pull) * (high - low) ** 2 / 12.0
     for at, (number, i, _) in enumerate(forms, start=len(gram) - len(forms)):
+        # Forms: the typical range is prior information, which counts as an observation would.
         low, high = fit.causes[number].effect.shape[i].typical
         gram[at, at] += 12.0 / (high - low) ** 2
         filling[at, at] += 12.0 / (high - low) ** 2
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     covariance = inverse @ filling @ inverse
+    # An effect's own approximations remain, however many data there are.
     for at, (number, i, r) in enumerate(places, start=len(fit.values)):
         if i == 0:
             cause = fit.causes[number]
             covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
+    # An onset gets the variance that gives its interval with the same critical value.
     onsets = _onsets(fit, runs, baseline, misfit)
     return Uncertainty(
         block_diag(

@@ -87,6 +87,7 @@ def without_each(
     """
     validated, runs = {}, with_loads_of(train, fitted, baseline)
     for label in dict.fromkeys(cause.label for cause in fitted.causes):
+        # The loads stay, so that the difference is due to the cause alone.
         rest = [cause for cause in fitted.causes if cause.label != label]
         validated[label] = ValidationResult.of(
             fit(rest, runs, baseline, weights, fitted.loads), validate, baseline
@@ -113,6 +114,7 @@ def removed_share(less: ValidationResult, whole: ValidationResult) -> float | No
         At the joint where the cause gains most; None where the model without it is at the noise
         floor.
     """
+    # Where the cause gains most: at other joints the share would be mostly noise.
     joint = int(np.argmax(less.errors.rms - whole.errors.rms))
     floor, without, with_it = (
         float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms)
@@ -137,6 +139,7 @@ def log_likelihoods(validated: ValidationResult, noise: NoiseModel) -> NDArray:
     (J,) array
     """
     joints = len(validated.runs[0].motion.joints)
+    # The effective deviation allows for correlation, so averages count as independent.
     sigma = noise.sigma(LENGTH_S)[:joints]
     known, total = np.isfinite(sigma), np.zeros(joints)
     for run, residual in zip(validated.runs, validated.residuals, strict=True):

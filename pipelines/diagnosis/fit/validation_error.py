@@ -68,6 +68,7 @@ def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
     for run, residual in zip(runs, residuals, strict=True):
         J = len(run.motion.joints)
         chosen = scored(run)
+        # Errors within a period are dependent, so whole periods are drawn in the bootstrap.
         length = run.motion.period_s or STRETCH_S
         number = np.floor(run.time / length).astype(int)
         number -= number.min()
@@ -108,6 +109,7 @@ def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0)
         joint = int(np.argmax(before.rms - after.rms))
     rng = np.random.default_rng(seed)
     blocks = len(before.counts)
+    # The same blocks for both models, so that noise that they share cancels.
     drawn = rng.integers(0, blocks, (RESAMPLES, blocks))
     counts = np.maximum(before.counts[drawn].sum(axis=1), 1)
     worth = [np.sqrt(e.squares[drawn, joint].sum(axis=1) / counts) for e in (before, after)]

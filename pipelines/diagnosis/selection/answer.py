@@ -102,6 +102,7 @@ def _best(posterior: Posterior) -> Set:
     """
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
     has_all = [labels for labels in posterior.by_labels if likely <= labels]
+    # Labels may be likely each by itself, and never occur in one set.
     labels = max(has_all or posterior.by_labels, key=lambda key: posterior.by_labels[key])
     return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
 

@@ -146,6 +146,7 @@ class Evidence:
         """Compute the products of a library's columns."""
         X, at = _stack(library)
         regression = library.regression
+        # Output by output, because each output's likelihood has a power of its own.
         outputs = [regression.output == o for o in range(len(regression.torque))]
         parts = [(X[rows], regression.measured[rows]) for rows in outputs]
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
@@ -164,6 +165,7 @@ class Evidence:
 
     def packed(self) -> dict[str, Any]:
         """Return a row of a table, with symmetric matrices as their upper triangles."""
+        # Single precision, because the Gram matrices are nearly all of a stored session.
         upper = np.triu_indices(self.gram.shape[1])
         return {
             "gram": self.gram[:, *upper].astype(np.float32).tobytes(),
@@ -231,6 +233,7 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     most : int
         Number of these curves that belong to this output.
     """
+    # Slow noise comes first, so that only the part that the rest adds to it counts in full.
     rest = np.setdiff1d(np.arange(len(gram)), slow)
     order = np.concatenate([slow, rest]).astype(int)
     free = np.full(len(gram), 1.0 / CRITERIA.explained_share**2)
@@ -238,6 +241,7 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     next_to_noise = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
     if not most:
         return next_to_noise
+    # All columns free, less the part above: the part that slow noise explains.
     of_slow_noise = max(_beyond_noise(gram, right, free, 0) - next_to_noise, 0.0)
     return next_to_noise + min(of_slow_noise, most)
 
@@ -285,6 +289,7 @@ def _stack(library: Library) -> tuple[NDArray, _Places]:
 
 def _elements(library: Library, at: _Places) -> list[Element]:
     names = library.prepared.baseline.joints
+    # A law is one element with all of its columns: none of them is missing by itself.
     laws = _laws_by_kind(library.laws, at.laws)
     for j in range(len(names)):
         own = [
@@ -297,6 +302,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         _of_cause(number, cause, at, library.prepared)
         for number, cause in enumerate(library.causes)
     ]
+    # Laws of the cuffs alone are no elements. They count in the explained part only.
     elements += [
         Element(
             label=law_label(kind, None if j is None else names[j]),
@@ -325,6 +331,8 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
 
     ``any_form`` has laws by label.
     """
+    # Such a law stands for the cause in any form. So it needs no step along shapes, and has no
+    # amplitude with a sign.
     best = {e.label: e for e in elements if e.label in any_form and e.first and e.context < 0}
     of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
     return [
@@ -361,6 +369,7 @@ def _shown(kind: Kind, joint: int, prepared: PreparedRuns) -> list[Shown]:
     """Return the evidence of a joint's lines of one kind."""
     phases = 1 if kind is Kind.ANGLE else len(prepared.runs)
     lines = prepared.lines[joint].of_kind(kind)
+    # The rms of a sinusoid is its amplitude over the root of two.
     rms = np.sqrt(2.0) * float(prepared.torque[joint])
     return [(line.log_likelihood_ratio, line.amplitude / rms, phases) for line in lines]
 
@@ -368,6 +377,7 @@ def _shown(kind: Kind, joint: int, prepared: PreparedRuns) -> list[Shown]:
 def _of_cause(number: int, cause: Cause, at: _Places, prepared: PreparedRuns) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
+    # Only the ripple of order tracking has lines: the coarse search finds slower waves.
     tracked = (
         effect.order_tracked and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
     )
@@ -403,6 +413,7 @@ def _positive(cause: Cause) -> list[int]:
         # A column is the effect at its shape. Reversed, it would be a spring that pushes, or a
         # negative delay.
         free = [p for p in effect.shape if p.default is None]
+        # A gain, without a unit, does nothing at one, and may be on either side of it.
         return [0] if all(p.typical[0] >= 0 and p.unit != "1" for p in free) else []
     if len(effect.linear) != len(cause.amplitudes):
         return []  # some amplitude is per run
@@ -412,9 +423,11 @@ def _positive(cause: Cause) -> list[int]:
 def _background(library: Library, at: _Places):
     """Yield the background of a good rig: column, relative variance, and variance of noise."""
     for curve, place in zip(library.curves, at.curves, strict=True):
+        # Slow noise has its measured variance, not a share of the torque.
         yield int(place), 0.0, curve.noise
     for cause, places in zip(library.causes, at.causes, strict=True):
         effect = cause.candidate.effect
+        # Each cause once, at its best shape: further shapes and variants would make the rig worse.
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
             yield from (

@@ -69,6 +69,7 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     if 1.0 - posterior.nothing < CRITERIA.likely:
         return []
     results = [_of_cause(posterior, named) for named in answer.named]
+    # Elements that a named cause or its ties stand for are not reported a second time.
     named = {label for one in results for label, _ in one.causes}
     rest = frozenset(
         i for i, element in enumerate(posterior.elements) if element.label not in named
@@ -82,6 +83,7 @@ def _of_cause(posterior: Posterior, named: NamedCause) -> Finding:
     alternatives = ((element.label, named.alone), *named.ties)
     labels = dict(alternatives)
     members = [one for one in posterior.elements if one.label in labels]
+    # A level on which ties differ would hold a part of their probability only.
     shared = {
         level: getattr(element, level)
         for level in LEVELS
@@ -112,6 +114,7 @@ def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
             for finding, inside in _likely(posterior, rest, node):
                 yield finding
                 covered |= inside
+        # The next level up reports only elements that no finding covers yet.
         rest -= covered
 
 

@@ -45,6 +45,7 @@ def kept_share(
         Between 0 and 1.
     """
     intercept, slope = np.asarray(look_alike)
+    # One less the chance of a true cause, whose log odds are a + b ln r.
     resembles = expit(-intercept - slope * np.log(np.maximum(removed, LEAST)))
     return np.asarray(1.0 - np.maximum(resembles - np.asarray(smooth_law_ratio), 0.0))
 
@@ -65,6 +66,7 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
     """
     kept: dict[str, float] = {}
     for labels, share in removed.items():
+        # The data do not separate ties from the cause, so they lose the same share.
         kept |= dict.fromkeys(
             labels, float(kept_share(share, _smooth_law_ratio(posterior, labels)))
         )

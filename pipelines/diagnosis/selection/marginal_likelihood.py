@@ -43,6 +43,7 @@ class MarginalLikelihood:
             power(drives, criteria.drive_weight, criteria.model_error),
             power(cuffs, criteria.cuff_weight, criteria.cuff_model_error),
         )
+        # The background is in every set, so it is integrated out once for all of them.
         gram = np.einsum("o,oij->ij", self.power, evidence.gram)
         self.gram, self.right = _without(gram, self.power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
@@ -91,6 +92,7 @@ class MarginalLikelihood:
         elements = [self.evidence.elements[i] for i in chosen]
         amplitudes = np.array(self.criteria.amplitudes)
         try:
+            # Of the mixture over sizes only the nearest is computed: the others add little.
             nearest = [
                 amplitudes[np.argmin(np.abs(np.log(amplitudes / size)))]
                 for size in self.sizes(chosen)
@@ -102,6 +104,7 @@ class MarginalLikelihood:
             value = self._log_evidence(columns, variance, elements)
         except np.linalg.LinAlgError:
             return -np.inf
+        # The sizes are equally likely, so one of them has its share of the prior for each element.
         return (
             value
             - len(chosen) * float(np.log(len(amplitudes)))
@@ -128,6 +131,7 @@ class MarginalLikelihood:
         """
         elements = [self.evidence.elements[i] for i in chosen]
         columns = np.concatenate([self.parts[i] for i in chosen])
+        # The widest prior shrinks an estimate least.
         largest = max(self.criteria.amplitudes) ** 2
         variance = np.concatenate([self._variance(e, largest) for e in elements])
         system = self.gram[np.ix_(columns, columns)] + np.diag(1.0 / variance)
@@ -163,9 +167,11 @@ class MarginalLikelihood:
         known = self.evidence.nonnegative
         if known is None:
             return 0.0
+        # The values with causes, b - P a, are Gaussian: their mean and variance follow from a's.
         half = _forward(lower, sd[:, np.newaxis] * known.imitation.T[columns])
         variance = known.variance @ (1.0 / self.power)
         values, spread = known.alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
+        # Relative to the empty set, whose friction or inertia may be negative by noise already.
         return float(np.sum(log_ndtr(values / spread) - log_ndtr(known.alone / np.sqrt(variance))))
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
@@ -186,6 +192,7 @@ class MarginalLikelihood:
         one, other = np.triu_indices(len(numbers), 1)
         apart = labels[one] != labels[other]
         one, other = one[apart], other[apart]
+        # A few common widths: thousands of small systems are solved at once.
         columns, sd, width = self._padded(numbers)
         odds = np.empty(len(one))
         for a in WIDTHS:
@@ -202,6 +209,7 @@ class MarginalLikelihood:
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and their true widths."""
+        # A padded column has no prior variance: it adds a row of the unit matrix, and no evidence.
         columns = np.zeros((len(chosen), WIDEST), dtype=int)
         sd, width = np.zeros((len(chosen), WIDEST)), np.zeros(len(chosen), dtype=int)
         for n, i in enumerate(chosen):
@@ -268,6 +276,7 @@ def _without(
     system = gram[np.ix_(background, background)] * np.outer(sd, sd)
     system[np.diag_indices_from(system)] += 1.0
     lower = np.linalg.cholesky(system)
+    # Schur's complement: the products of all columns less the part that the background takes.
     X = _forward(lower, gram[background] * sd[:, np.newaxis])
     u = _forward(lower, right[background] * sd)
     return gram - X.T @ X, right - X.T @ u
@@ -298,12 +307,14 @@ def _shown(element: Element, c: Criteria) -> float:
         of_cause = [_line(ratio, variance, phases, size) for size in c.amplitudes]
         of_rig = [0.0, _line(ratio, variance, phases, c.background_line)]
         odds.append(float(logsumexp(of_cause)) - np.log(len(of_cause)) - float(logsumexp(of_rig)))
+    # Further lines may be of another origin, so none of them counts against the cause.
     first, *others = sorted(odds, reverse=True)
     return first + float(sum(np.logaddexp(0.0, others)))
 
 
 def _line(ratio: float, variance: float, phases: int, share: float) -> float:
     """Return the log Bayes factor of a line with a prior share against none."""
+    # Sine and cosine of each phase have half of the squared share each.
     prior = 0.5 * share**2
     return ratio * prior / (prior + variance) - phases * float(np.log1p(prior / variance))
 

@@ -95,6 +95,7 @@ class Posterior:
         inside = np.array([not labels.isdisjoint(self.labels_of(chosen)) for chosen in self.sets])
         if not inside.any():
             return self
+        # The empty set has no label, so the sets outside are never without probability.
         wanted = float(logit(min(probability, SURE)))
         lacking = wanted - float(
             logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside])
@@ -188,6 +189,7 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
         if len(elements) > 1 and causes:
             laws = tuple(e.variant for e in elements if e.is_law)
             contexts.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
+        # Sets come by falling probability: all after the empty one are less likely than nothing.
         if not chosen or len(contexts) == CONTEXTS:
             break
     return list(contexts.values())
@@ -215,6 +217,8 @@ def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[i
     for i in np.argsort(-weigh.alone):
         if elements[i].context < 0:  # others count in their own set only
             shapes.setdefault(elements[i].variant, []).append(int(i))
+    # Screening sees few columns of an element, and a wandering torque has dozens. So it is paired
+    # with the best elements instead.
     wide = [i for i, e in enumerate(elements) if e.is_law and e.name == TIME]
     several = [i for own in shapes.values() for i in own[:SHAPES] if i not in wide]
     return several, [own[0] for own in shapes.values()], wide

@@ -65,6 +65,7 @@ def weights(criteria: Criteria) -> NDArray:
         In the order of ``FEATURES``.
     """
     by_name = {name: getattr(criteria, name) for name in FEATURES}
+    # n elements add n base rates, and n - 1 further ones subtract all but one.
     by_name["cause"] += criteria.base_rate
     by_name["law"] += criteria.base_rate
     by_name["further"] -= criteria.base_rate

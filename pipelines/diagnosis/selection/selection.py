@@ -117,6 +117,7 @@ class Selection:
 
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
+        # A search of all runs has shapes in validation runs too, to which nothing is fitted.
         candidate = self.library.causes[element.place].candidate
         return (
             replace(candidate, shapes=candidate.shapes[: self.by_all.train_count])
@@ -187,6 +188,7 @@ class Selection:
         """
         assert self.searched is not None
         charged = {**self.charged, **charges}
+        # A charge moves probability to other sets, and must not lower causes that did no harm.
         floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
         weighed = _with_floors(self.searched.judged(charged), floors)
         again = replace(self._reweighed(weighed), charged=charged)
@@ -241,6 +243,7 @@ class Selection:
         in_place = (
             chosen for own, chosen in has_it if rest <= own and one.element.label not in own
         )
+        # Perhaps no weighed set has the tie in its place: then its best set shows the shape.
         best = next(in_place, has_it[0][1])
         elements = (self.posterior.elements[i] for i in best)
         return next(element for element in elements if element.label == label)
@@ -257,6 +260,7 @@ def _lowered(one: NamedCause, charges: Mapping[str, float], elements: Sequence[E
 
 def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> Posterior:
     """Return the posterior where each group of labels has at least its least probability."""
+    # To raise one group lowers the others, so they take turns until none changes.
     for _ in range(ROUNDS):
         before = weighed
         for members, probability in floors.items():
@@ -303,6 +307,7 @@ def weighed(prepared: PreparedRuns, report: Report = silent) -> tuple[Library, E
     auxiliary = auxiliary_evidence(prepared)
     evidence = Evidence.of(library, auxiliary)
     result = posterior(evidence)
+    # The first posterior names sets that are worth a joint refinement, which is expensive.
     refined = library
     for number in strongest(result):
         refined = refined.with_partners(number, PARTNERS)
