@@ -32,7 +32,9 @@ UNITS = {
     "N·m·s²/rad²": Unit("N·s²/m²", 1, 0, -2),
     "N·m/rad": Unit("N/m", 1, -1, 0),
     "N·m/rad²": Unit("N/m²", 1, -2, 0),
+    # An inertia is torque per acceleration, and accelerations scale as speed² / travel.
     "kg·m²": Unit("kg", 1, 1, -2),
+    # A first moment times gravity is a torque, and gravity is the same for every machine.
     "kg·m": Unit("kg", 1, 0, 0),
     "rad": Unit("m", 0, 1, 0),
     "rad/s": Unit("m/s", 0, 0, 1),

@@ -49,6 +49,7 @@ def polish(
     # Generations without this relative gain after which the cost stagnates.
     patience, least_gain = 60, 1e-6
     size = len(start)
+    # Default weights and constants of the tutorial, for a given population.
     rank = np.arange(1, population // 2 + 1)
     weights = np.log(population / 2 + 0.5) - np.log(rank)
     weights /= weights.sum()
@@ -66,11 +67,14 @@ def polish(
     for generation in range(generations):
         if generation % generations_per_decomposition == 0:
             eigenvalues, axes = np.linalg.eigh(covariance)
+            # Rounding may make the least eigenvalue negative.
             lengths = np.sqrt(np.maximum(eigenvalues, 1e-20))
         steps = (rng.standard_normal((population, size)) * lengths) @ axes.T
         candidates = mean + sigma * steps
+        # A repair changes candidates, but not the steps from which mean and covariance learn.
         cost = costs(candidates)
         order = np.argsort(cost)
+        # The right side is NaN while best_cost is infinite, and then any cost is a gain.
         if not cost[order[0]] >= best_cost - least_gain * abs(best_cost):
             last_gain = generation
         if cost[order[0]] < best_cost:
@@ -80,14 +84,17 @@ def polish(
         chosen = steps[order[: len(weights)]]
         step = weights @ chosen
         mean = mean + sigma * step
+        # C^(-1/2) times the step. Its path is longer than expected if steps agree in direction.
         whitened = axes @ ((axes.T @ step) / lengths)
         path_sigma = (1 - c_sigma) * path_sigma + np.sqrt(c_sigma * (2 - c_sigma) * mu) * whitened
         length = np.linalg.norm(path_sigma) / expected_length
+        # After a long path sigma grows. Then path_c pauses, or the covariance would grow as well.
         steady = length < (1.4 + 2 / (size + 1)) * np.sqrt(
             1 - (1 - c_sigma) ** (2 * (generation + 1))
         )
         path_c = (1 - c_c) * path_c + steady * np.sqrt(c_c * (2 - c_c) * mu) * step
         covariance = (1 - c_1 - c_mu) * covariance + c_1 * np.outer(path_c, path_c)
+        # Rank-mu update: the weighted scatter of the better half.
         covariance += c_mu * (chosen.T * weights) @ chosen
         sigma *= np.exp(min(1.0, c_sigma / damping * (length - 1)))
     return best, best_cost

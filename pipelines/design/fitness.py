@@ -255,9 +255,11 @@ def repair(candidate, problem, work):
             low, high = problem.bounds[0, joint]
             theta0 = min(max(candidate[4 * free + joint], low), high)
             candidate[4 * free + joint] = theta0
+        # One scale for all three quantities, or they would not be one motion.
         scale = 1.0
         for quantity in range(3):
             low, high = _extent(work.motion[2 * quantity + joint], n)
+            # Velocity and acceleration of a periodic motion have zero mean.
             mean = theta0 if quantity == 0 else 0.0
             scale = min(scale, room(problem.bounds[quantity, joint, 1] - mean, high))
             scale = min(scale, room(mean - problem.bounds[quantity, joint, 0], -low))
@@ -267,6 +269,7 @@ def repair(candidate, problem, work):
                 candidate[start : start + free] *= scale
             for quantity in range(3):
                 work.motion[2 * quantity + joint] *= scale
+        # The mean angle comes last, because only the motion about it shrinks.
         for i in range(samples):
             work.motion[joint, i] += theta0
 
@@ -311,6 +314,7 @@ def fill_columns(problem, work):
     sines(q[1], sine[2], sine[3])
     for i in range(q.shape[1]):
         dq = (q[2, i], q[3, i])
+        # sin(q1 + q2) from known sines and cosines costs less than another series.
         sin_leg = sine[0, i] * sine[3, i] + sine[1, i] * sine[2, i]
         hip, knee = regressor_rows(
             sine[0, i], sin_leg, sine[2, i], sine[3, i], dq, (q[4, i], q[5, i]), length, gravity
@@ -346,6 +350,7 @@ def gram_matrix(columns):
         Of the eight parameters.
     """
     gram = np.zeros((PARAMETERS, PARAMETERS))
+    # Rows of hip and knee add up. Only the lower triangle is summed.
     for i in range(6):
         for j in range(i + 1):
             gram[HIP_PARAMETERS[i], HIP_PARAMETERS[j]] += _dot(columns[i], columns[j])
@@ -378,6 +383,7 @@ def _log_determinant(gram):
             factor[j, j] -= factor[j, k] ** 2
         if factor[j, j] <= 0.0:
             return -np.inf
+        # Before its root, a diagonal element is a factor of the determinant.
         total += math.log(factor[j, j])
         factor[j, j] = math.sqrt(factor[j, j])
         for i in range(j + 1, len(factor)):

@@ -80,6 +80,7 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
     return Quality(
         condition=_condition(stacked),
         inertial_condition=_condition(stacked[:, : len(INERTIAL)]),
+        # A joint at rest has a column of zeros, which stays zero: the condition is infinite.
         scaled_condition=_condition(stacked / np.where(size > 0.0, size, 1.0)),
         log_det=float(np.linalg.slogdet(stacked.T @ stacked / samples)[1]),
         standard_errors=dict(zip(parameters, errors.tolist(), strict=True)),
@@ -151,12 +152,14 @@ def standard_errors(
     weight = away_from_reversals(motion) / np.array([noise.hip_nm, noise.knee_nm])
     A = paper_model().regressor(motion) * weight[:, :, np.newaxis]
     correlated = noise.correlation_s > 0.0
+    # Correlation of the noise of adjacent samples.
     rho = np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if correlated else 0.0
     # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier +
     # earlier'A.
     earlier = lfilter([0.0, rho], [1.0, -rho], A, axis=0)
     information = np.einsum("njp,njq->pq", A, A)
     cross = np.einsum("njp,njq->pq", A, earlier)
+    # The inverse would have fewer than three correct digits.
     if _condition(information) * np.finfo(float).eps > 1e-3:
         return np.full(A.shape[2], np.inf)
     inverse = np.linalg.inv(information)

@@ -73,6 +73,7 @@ def search(
         start = swarm.best_position[arc[np.argmin(swarm.best_cost[arc])]]
         candidate, cost = polish(
             start,
+            # The swarm has located the valley, so that the polish starts with small steps.
             0.05 * spread,
             lambda positions: costs(positions, fine),
             rng,
@@ -103,6 +104,8 @@ def _problem(
         criterion=settings.criterion,
         theta0=None if settings.theta0_rad == "free" else np.array(settings.theta0_rad),
         basis=basis_of(settings.harmonics, settings.rest_to_rest),
+        # The bound between samples costs 0.3 % of the amplitude at 40 samples per harmonic. At 100
+        # it costs 0.05 %.
         samples=max(samples, samples_per_harmonic * settings.harmonics),
     )
 
@@ -145,6 +148,7 @@ def spread_of(problem: Problem) -> NDArray:
         rad.
     """
     half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
+    # An angle of amplitude A at frequency w has the velocity w A and the acceleration w² A.
     powers = problem.speeds ** np.arange(3)[:, np.newaxis]
     # A coordinate alone reaches the tightest of its three bounds first.
     reach = (half[:, :, np.newaxis] / powers[:, np.newaxis, :]).min(axis=0)
@@ -156,6 +160,7 @@ def _first_swarm(
     settings: DesignSettings, problem: Problem, spread: NDArray, rng: np.random.Generator
 ) -> Swarm:
     shape = (settings.particles, len(spread))
+    # Most of these break a bound; their repair puts them onto the bounds.
     position = rng.standard_normal(shape) * spread
     if problem.theta0_is_free:
         low, high = problem.bounds[0].T
@@ -183,6 +188,7 @@ def _let_fly(
     for look in range(looks):
         fly(swarm, problem, settings.topology == "ring", iterations_per_look, rng)
         lowest = swarm.best_cost.min()
+        # The right side is NaN while best is infinite, and then any cost is a gain.
         if not lowest >= best - least_gain * abs(best):
             best, last_gain = lowest, look
         report((look + 1) / looks, lowest)

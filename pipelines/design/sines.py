@@ -28,6 +28,8 @@ def sines(x, sine, cosine):
     s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10 = SINE
     c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11 = COSINE
     for i in range(x.size):
+        # Reduction to [-pi/2, pi/2]. Each half turn changes both signs; a branch would prevent
+        # vector instructions.
         half_turns = np.floor(x[i] * (1.0 / math.pi) + 0.5)
         r = x[i] - math.pi * half_turns
         sign = 1.0 - 2.0 * (half_turns - 2.0 * np.floor(0.5 * half_turns))

@@ -74,9 +74,11 @@ def fly(swarm, problem, ring, iterations, rng):
                 theirs = swarm.best_position[leader, d] - x[d]
                 v[d] = INERTIA * v[d] + PULL * (rng.random() * own + rng.random() * theirs)
                 x[d] += v[d]
+            # It repairs x in place, so that the particle itself returns into the bounds.
             value = cost(x, problem, work)
             if value < swarm.best_cost[i]:
                 swarm.best_cost[i] = value
                 swarm.best_position[i] = x
+                # Without a ring, a better particle leads from now on, within the same sweep.
                 if value < swarm.best_cost[leader]:
                     leader = i

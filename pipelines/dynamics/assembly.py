@@ -84,6 +84,7 @@ ASSEMBLY = types.NamedTuple(
 
 
 def _addresses(kernels: Sequence, blank) -> NDArray:
+    # The decorators return static methods for classes; the blanks here are in none.
     return np.array([address(kernel or blank.__func__) for kernel in kernels], dtype=np.int64)
 
 
@@ -121,6 +122,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             raise InputError(
                 f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most"
             )
+        # A motor without inertia could not be integrated in front of its spring.
         sprung[joint[i]], inertias[joint[i]] = i, motor_inertia(effect, model, geometry)
     return Assembly(
         joints=len(joints),
@@ -194,7 +196,9 @@ def cuffed(effects: Iterable[Effect]) -> bool:
 
 
 def _group(effect: Effect, has_cuffs: bool) -> int:
+    # A compliant cuff is the spring: the whole machine is on its motors' side.
     on_motor = not effect.on_limb if has_cuffs else effect.side is Side.DRIVE
+    # Inertial terms first, because only they enter the mass matrices.
     return 2 * on_motor + (not effect.inertial)
 
 

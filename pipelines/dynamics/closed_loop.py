@@ -44,9 +44,11 @@ def closed_loop(model: Model, motion: Motion) -> Motion:
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():
         loop = loop_at_rest(a, motion.q[stretch.start])
+        # A stretch that began at rest would have to catch up first.
         loop.state[[DQ, DTHETA]] = loop.speed[:] = motion.dq[stretch.start]
         loop.reference[:] = reference[stretch.start]
         start, warmth = motion.time[stretch.start], temperature[stretch]
+        # The true motion of the links, because instruments are to be free of the sensors' errors.
         truth = follow(a, drives, loop, reference[stretch], start, warmth)[3]
         q[stretch], dq[stretch], ddq[stretch] = truth[:, 0], truth[:, 1], truth[:, 2]
     if not np.isfinite(ddq).all():
@@ -86,9 +88,11 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
         rate = np.where(rate > 0.0, rate, RATE_HZ)
     else:
         mass = masses(a)[0].mean(axis=0).diagonal()
+        # Two equal poles at the bandwidth: critical damping at the mean inertia of each joint.
         kp, kd = bandwidth_rad_s**2 * mass, 2.0 * bandwidth_rad_s * mass
         limit, rate = np.full(len(mass), np.inf), np.full(len(mass), RATE_HZ)
     rate_hz = max(min(RATE_HZ, *rate), motion.sample_rate_hz)
+    # Ideal encoders, since counts would add noise to the instruments.
     return make_drives(kp, kd, limit, np.zeros(len(each)), rate_hz, motion.sample_rate_hz)
 
 

@@ -33,6 +33,7 @@ def compiled_once(signature):
         compiled = njit(signature, **ALLOCATING_NOTHING)(function)
         # The signature is part of the name, so that cached code of another version does not match.
         symbol = f"{function.__module__}.{function.__qualname__}{signature}"
+        # Callers refer to the machine code by this name; the linker resolves it.
         binding.add_symbol(symbol, address(compiled))
 
         @wraps(function)
@@ -54,6 +55,7 @@ def compiled_once(signature):
             status, value = context.call_conv.call_function(
                 builder, there, signature.return_type, signature.args, arguments
             )
+            # A division by zero in the callee has to reach the caller as an exception.
             with cgutils.if_unlikely(builder, status.is_error):
                 context.call_conv.return_status_propagate(builder, status)
             return value

@@ -154,8 +154,10 @@ def _prepare(a, w, t, state, memory, load):
     links, others, drives, last = a.bounds[0], a.bounds[1], a.bounds[2], a.bounds[3]
     q, dq, theta, dtheta = state[Q], state[DQ], state[THETA], state[DTHETA]
     for j in range(a.joints):
+        # Only drives have dry friction that can hold; links need the sign alone.
         w.link_direction[j] = np.sign(dq[j])
     _mass_and_rest(a, w, links, others, t, q, dq, w.link_direction, load, memory, w.mass, w.rest)
+    # Terms without inertia need one evaluation, and not one more for each joint.
     if drives > others:
         at = Instant(t, q, dq, w.zero, w.link_direction, load, a.temperature)
         _react(a, others, drives, at, memory, w.rest)
@@ -167,9 +169,12 @@ def _prepare(a, w, t, state, memory, load):
         term = a.sprung[j]
         if term < 0:
             if not a.cuffed:
+                # A rigid joint has one coordinate. A rotor's inertia acts at its own joint, so that
+                # only the diagonal counts.
                 w.mass[j, j] += w.motor_mass[j, j]
         else:
             values = a.values[a.value_at[term] : a.value_at[term + 1]]
+            # Positive while the motor is ahead: the spring then pushes the link forward.
             w.passed[j] = spring_at(a.springs[term])(theta[j] - q[j], dtheta[j] - dq[j], values)
 
 
@@ -184,12 +189,14 @@ def _accelerate_both(a, w, state, drive, rates):
     w.both_masses[:] = 0.0
     for j in range(joints):
         motor = joints + j
+        # At a rigid joint the torques of motor and link are one equation, in the link's row.
         row = j if a.sprung[j] < 0 else motor
         for k in range(joints):
             w.both_masses[j, k] = w.mass[j, k]
             w.both_masses[row, joints + k] = w.motor_mass[j, k]
         if a.sprung[j] < 0:
             w.both[j] = drive[j] - w.friction[j] - w.rest[j]
+            # The motor's row states that both accelerations are equal.
             w.both_masses[motor, motor], w.both_masses[motor, j], w.both[motor] = 1.0, -1.0, 0.0
         else:
             w.both[j] = w.passed[j] - w.rest[j]
@@ -209,6 +216,7 @@ def _eliminate(A, b):
     """
     n = b.shape[0]
     for i in range(n):
+        # Rows of equal accelerations make the matrix unsymmetric, so that pivots have to be chosen.
         pivot = i
         for row in range(i + 1, n):
             if abs(A[row, i]) > abs(A[pivot, i]):
@@ -230,6 +238,7 @@ def _eliminate(A, b):
 @njit(cache=True, inline="always")
 def _finish(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt for a direction of dry friction, after ``_prepare``."""
+    # Drive terms at zero acceleration, because their inertia is in the mass matrix.
     w.friction[:] = 0.0
     at = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load, a.temperature)
     _react(a, a.bounds[2], a.bounds[4], at, memory, w.friction)
@@ -329,6 +338,7 @@ def _grip(a, w, t, state, memory, load, drive, rates, j):
 
     It is negative for dry friction.
     """
+    # Dry friction is linear in the direction, so that both ends give the slope.
     now = w.direction[j]
     w.direction[j] = -1.0
     _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
@@ -368,6 +378,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
     for j in range(a.joints):
         w.direction[j] = np.sign(state[DTHETA, j])
     accelerations(a, w, t, state, memory, w.direction, load, drive, rates)
+    # Most steps have no reversal, and need this one evaluation only.
     crossing = False
     for j in range(a.joints):
         crossing |= (state[DTHETA, j] + h * rates[DTHETA, j]) * w.direction[j] <= 0.0
@@ -382,6 +393,8 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
             ahead = state[DTHETA, j] + h * rates[DTHETA, j]
             before = w.direction[j]
             if w.slope[j] < 0.0:
+                # The direction at which this joint would just stop, limited to what friction can
+                # hold.
                 w.direction[j] = min(1.0, max(-1.0, before - ahead / (h * w.slope[j])))
             else:
                 # Without dry friction nothing can hold this joint.
@@ -445,6 +458,7 @@ def begin_stages(a, w, s, t, state, memory, load):
     """
     memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
     load[:] = 0.0
+    # What the links need at this acceleration is what the drive trains transmit.
     at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero, a.temperature)
     _react(a, a.bounds[0], a.bounds[2], at, memory, load)
 

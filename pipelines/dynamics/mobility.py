@@ -42,6 +42,7 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
             for i in range(joints):
                 for j in range(joints):
                     if pushed < 0:
+                        # Less the acceleration without torque, in which gravity and springs act.
                         mass[k, i, j], mobility[k, i, j] = w.mass[i, j], -rates[DTHETA, i]
                     elif pushed == j:
                         mobility[k, i, j] += rates[DTHETA, i]
@@ -53,6 +54,7 @@ def _poses(joints: int) -> NDArray:
     more_poses = 500
     poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else more_poses, joints))
     if joints < 3:
+        # One joint has the same mass at each of them.
         poses[:, -1] = KNEE_ANGLES
     else:
         poses[:, 1:] = np.pi * (
@@ -100,6 +102,7 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     # accurate only below.
     stable_reach = 1.5
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
+    # The fastest rate of the loop is gain times mobility, 1/s.
     needed = feedback_gain * mobility * period / stable_reach
     if not needed <= MOST_STEPS:
         raise InputError(

@@ -82,6 +82,7 @@ def make_drives(
         kd=np.asarray(kd, float),
         limit=np.asarray(limit, float),
         rad_per_count=np.divide(2 * np.pi, counts, out=np.zeros_like(counts), where=counts > 0),
+        # A first-order low-pass, exact for an input that is constant over each period.
         speed_share=float(1.0 - np.exp(-2 * np.pi * speed_cutoff_hz * period)),
         periods=periods,
         step_s=period / SUBSTEPS,
@@ -148,6 +149,7 @@ def read_encoders(a, angle):
     angle : (J,) array
         rad; changed in place.
     """
+    # All terms, most of which have a kernel that changes nothing.
     for i in range(a.bounds[4]):
         reading_at(a.readings[i])(angle, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
 
@@ -198,6 +200,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     torque[:] = 0.0
     counted = np.zeros(j_count)
     period = d.step_s * SUBSTEPS
+    # A sample's time is the middle of the window over which its torque is a mean.
     middle = d.periods * SUBSTEPS // 2
     done = 0
     for c in range(d.periods):
@@ -207,6 +210,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             counted[j] = whole_counts(counted[j], d.rad_per_count[j])
             loop.speed[j] += d.speed_share * ((counted[j] - loop.angle[j]) / period - loop.speed[j])
             loop.angle[j] = counted[j]
+            # Linear between set-points, or each of them would be a step of torque.
             wanted = begin[j] + (reference[j] - begin[j]) * c / d.periods
             rate = (reference[j] - begin[j]) / (period * d.periods)
             command = d.kp[j] * (wanted - counted[j]) + d.kd[j] * (rate - loop.speed[j])
@@ -224,10 +228,12 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             now = t + done * d.step_s
             step(a, w, s, now, d.step_s, loop.state, loop.memory, loop.load, loop.torque)
             if done == middle:
+                # The first stage is the acceleration at this step's begin, the sample's middle.
                 _copy(s.rates[0, DQ], truth[2])
             done += 1
         for j in range(j_count):
             torque[j] += loop.torque[j] / d.periods
+    # The sensor acts on the mean, once per sample, as along a recorded motion.
     _read_torque(a, t + middle * d.step_s, torque, loop.sensed)
     _copy(reference, loop.reference)
 

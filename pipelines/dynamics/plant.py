@@ -80,6 +80,7 @@ def _lightest(assembly: Assembly) -> float:
     try:
         return float(np.linalg.eigvalsh(masses(assembly)[0]).min())
     except ZeroDivisionError:
+        # Compiled code divides by the determinant, which is zero without mass.
         return 0.0
 
 

@@ -150,11 +150,13 @@ def _control(c, seen, net, state, wanted, weights, torque, network, weight_rates
     sharpness = 1.0 / (c.width * c.width)
     for j in range(torque.shape[0]):
         q, dq, ddq = wanted[0, j], wanted[1, j], wanted[2, j]
+        # A reading's error is held until the next sample, while the angle moves in each stage.
         e = q - state[THETA, j] - seen.angle_error[j]
         de = dq - state[DTHETA, j] - seen.speed_error[j]
         r = de + c.error_gain * e
         network[j] = 0.0
         # |x - c|² expanded, because a centre has equal coordinates in all five directions.
+        # Over five inputs: |x|² - 2 node sum(x) + 5 node².
         sum_of_inputs = e + de + q + dq + ddq
         sum_of_squares = e * e + de * de + q * q + dq * dq + ddq * ddq
         for i in range(c.nodes.shape[0]):
@@ -163,6 +165,7 @@ def _control(c, seen, net, state, wanted, weights, torque, network, weight_rates
             network[j] += weights[j, i] * net.activation[i]
         demand = network[j] + c.feedback_gain * r + c.robust_gain * np.sign(r)
         torque[j] = min(c.limit, max(-c.limit, demand))
+        # The limit makes an error that no weight can reduce, on which the weights would wind up.
         rate = c.adaptation_gain * r if torque[j] == demand else 0.0
         for i in range(c.nodes.shape[0]):
             weight_rates[j, i] = rate * net.activation[i]
@@ -191,11 +194,13 @@ def _step(loop, t, h, wanted, disturbance, torque, network):
     drive = loop.drive
     _control(c, seen, net, state, wanted[0], weights, torque, network, net.rates[0])
     for j in range(a.joints):
+        # The disturbance acts against the drives (paper, eq. 13).
         drive[0, j] = torque[j] - disturbance[0, j]
     find_direction(a, w, t, h, state, memory, load, drive[0], s.rates[0])
     smooth = _keeps_going(w.direction, state)
     begin_stages(a, w, s, t, state, memory, load)
     for i in range(1, 4):
+        # Stages 1 and 2 are in the middle of the step, stage 3 at its end.
         half_steps = 2 if i == 3 else 1
         reach = 0.5 * h * half_steps
         reach_stage(s, i, reach, state, memory)
@@ -205,6 +210,7 @@ def _step(loop, t, h, wanted, disturbance, torque, network):
         now = wanted[half_steps]
         _control(c, seen, net, s.state, now, net.stage, drive[0], drive[3], net.rates[i])
         for j in range(a.joints):
+            # A torque that reaches or leaves its limit has a kink, as at a joint's reversal.
             smooth &= (abs(drive[0, j]) == c.limit) == (abs(torque[j]) == c.limit)
             drive[0, j] -= disturbance[half_steps, j]
         accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive[0], s.rates[i])
@@ -234,6 +240,7 @@ def _within(wanted, disturbance, begin, length, kept):
     """Write references and disturbance of a part of a step, interpolated by parabolas."""
     for i in range(3):
         x = begin + 0.5 * i * length
+        # Lagrange's polynomials for the begin, the middle and the end of the whole step.
         first, middle, last = (1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)
         for j in range(wanted.shape[2]):
             kept.disturbance[i, j] = (
@@ -250,16 +257,19 @@ def _advance(loop, kept, t, h, wanted, disturbance, torque, network):
     """Advance like ``_step``, but halve a part in which something switches, down to ``PARTS``."""
     done, size = 0, PARTS
     while done < PARTS:
+        # A step in which something switches is taken back and divided.
         _copy(loop, kept)
         begin, length = t + done * h / PARTS, size * h / PARTS
         if size == PARTS:
             smooth = _step(loop, begin, length, wanted, disturbance, torque, network)
         else:
             _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
+            # The first try wrote torque and network output at the step's begin already.
             unused = loop.drive[1], loop.drive[2]
             smooth = _step(loop, begin, length, kept.wanted, kept.disturbance, unused[0], unused[1])
         if smooth or size == 1:
             done += size
+            # Parts grow again where a part of twice the size may begin.
             while size < PARTS and done % (2 * size) == 0:
                 size *= 2
         else:
@@ -301,6 +311,7 @@ def _run(loop, kept, encoder, reference, disturbance, period, substeps, out):
         ends = k == last
         for j in range(loop.a.joints):
             out[k, 0, j], out[k, 1, j] = state[THETA, j], state[DTHETA, j]
+            # NaN ends the simulation as well.
             ends |= not abs(state[THETA, j]) < TURN
         torque, network = out[k, 2], out[k, 3]
         at = 2 * k * substeps
@@ -312,6 +323,7 @@ def _run(loop, kept, encoder, reference, disturbance, period, substeps, out):
             now = slice(at + 2 * i, at + 2 * i + 3)
             begin = k * period + i * h
             if i > 0:
+                # Results hold the torque at a sample's begin; later steps write to scratch.
                 torque, network = drive[1], drive[2]
             _advance(loop, kept, begin, h, reference[now], disturbance[now], torque, network)
     return k + 1

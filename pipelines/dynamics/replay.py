@@ -91,6 +91,7 @@ def replay(
     a = assemble(model, motion.geometry, motion.joints)
     motor = model.sensed(motion)
     link = model.behind_motors(motor)
+    # Rows of a state (Q, DQ, THETA, DTHETA): links behind compliant joints move differently.
     states = np.ascontiguousarray(np.stack([link.q, link.dq, motor.q, motor.dq], axis=1))
     load = np.ascontiguousarray(motor.transmitted[0])
     temperature = known_temperature(motion)
@@ -100,13 +101,16 @@ def replay(
         recorded = (x[stretch] for x in (motion.time, states, load, temperature, memory))
         _remember(a, w, s, *recorded)
     torque = np.ascontiguousarray(model.delivered(motor))
+    # Steps in half a sample, because the torque changes half way between samples.
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * longest_step_s)))
     out = np.empty((len(first), length + 1, 2, a.joints))
     for k, window in zip(first, out, strict=True):
+        # A motor hardly warms within a window.
         a.temperature[:] = temperature[k]
         start = states[k].copy(), memory[k].copy(), load[k].copy()
         _window(a, w, s, motion.time[k:], torque[k:], parts, *start, window)
     samples = first[:, np.newaxis] + np.arange(length + 1)
+    # Errors are those of the motors' angles, after the encoders' own errors were removed.
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
 
 
@@ -144,6 +148,7 @@ def _recall(a, w, s, time, states, load, k, share, memory):
             s.state[row, j] = states[k, row, j] + share * (
                 states[k + 1, row, j] - states[k, row, j]
             )
+        # The recorded motion is given, so that no joint has to be held by friction.
         w.direction[j] = np.sign(s.state[DTHETA, j])
     t = time[k] + share * (time[k + 1] - time[k])
     memory_rates(a, w, t, s.state, memory, w.direction, w.passed, s.memory_rates[0])

@@ -57,6 +57,7 @@ class ClosedLoop:
         """The joint that ran away, and when, in words; empty if none did."""
         if len(self.time) == self.asked:
             return ""
+        # The first joint whose last angle is not within a turn; NaN is not, either.
         joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))].name
         return f"the simulated {joint} ran past one full turn at t = {self.time[-1]:.3f} s"
 
@@ -105,6 +106,7 @@ def track(
     period, joints = settings.step_s, len(plant.joints)
     substeps = substeps_for(plant.assembly, feedback_gain, period)
     n = round(settings.duration_s / period) + 1
+    # A Runge-Kutta step reads its inputs at begin, middle and end.
     half_steps = np.arange(2 * (n - 1) * substeps + 1) * (0.5 * period / substeps)
     disturbance = settings.disturbance_nm * np.sin(settings.disturbance_rad_s * half_steps)
     wanted = np.stack(reference.at(half_steps), axis=1)
@@ -139,6 +141,7 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
     return Encoder(
         noise=np.zeros((0, joints)) if ideal else noise * draw.standard_normal((samples, joints)),
         rad_per_count=2.0 * np.pi / counts if counts else 0.0,
+        # A first-order low-pass of the differences, as in the drives' loop.
         speed_share=float(1.0 - np.exp(-2.0 * np.pi * settings.speed_cutoff_hz * settings.step_s)),
     )
 

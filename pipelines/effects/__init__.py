@@ -38,6 +38,7 @@ from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.effects.viscous_asymmetry import ViscousAsymmetry
 from pipelines.effects.voluntary_torque import VoluntaryTorque
 
+# The baseline comes first, as the pages of docs/effects say.
 EFFECTS: tuple[type[Effect], ...] = (
     RigidBody,
     Friction,

@@ -110,6 +110,7 @@ class Backlash(Effect):
         values = self.completed(shape)
         if motion.link_swing is not None and values[1] < max(self.shape[1].forms):
             return link_behind_motor(motion, motion.link_swing, self, values, STRIKING_RATIO)
+        # A smooth sign: near zero torque, noise would throw the link from side to side.
         j, q = self.column(motion), motion.q.copy()
         q[:, j] -= (
             0.5

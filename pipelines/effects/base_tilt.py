@@ -49,11 +49,13 @@ class BaseTilt(Effect):
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
         """Return ``[None]`` if the first joint is revolute, and nothing otherwise."""
+        # A slide has no angle that a tilt could shift.
         return super().possible(machine) if machine.joints[0].kind == "revolute" else []
 
     @reading
     def reading(angle, values, joint):
         """Measure the hip's angle from the base."""
+        # States count from the vertical, as gravity does; the encoder counts from the base.
         angle[0] -= values[0]
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:

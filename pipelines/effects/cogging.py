@@ -78,11 +78,13 @@ class Cogging(Effect):
             object.__setattr__(self, "linear", linear)
             object.__setattr__(self, "shape", tuple(_cycles(number) for number in numbers))
             object.__setattr__(self, "reported", reported)
+        # Last, because it scales the parameters of all lines to the machine.
         super().__post_init__()
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):
         """Add A sin(n q) + B cos(n q) of each line at the joint."""
+        # Sine and cosine of every line come first, then the cycles of every line.
         lines = len(values) // 3
         for i in range(lines):
             angle = values[2 * lines + i] * at.q[joint]

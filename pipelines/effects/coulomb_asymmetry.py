@@ -27,6 +27,7 @@ class CoulombAsymmetry(Effect):
         "move the empty joint slowly both ways through the same range: the mean torque less gravity"
         " is the asymmetry"
     )
+    # While a joint moves, it is a constant torque, which is part of a lift's X2.
     absorbed_as = "constant"
     ties: ClassVar = {
         "torque_offset": Tie(

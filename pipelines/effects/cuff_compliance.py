@@ -103,6 +103,7 @@ class CuffCompliance(Effect):
             return behind_spring(
                 motion, motion.limb_swing, direction, self, (stiffness, held, hardening)
             )
+        # Torque along the twist over stiffness; hardening and the limb's mass are neglected.
         q, dq, ddq = (
             state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness
             for state, torque in zip((motion.q, motion.dq, motion.ddq), motion.on_limb, strict=True)
@@ -119,6 +120,7 @@ class CuffCompliance(Effect):
         direction = np.zeros_like(motion.q)
         direction[:, j] = 1.0
         below = motion.geometry.shank_cuff_distance_m
+        # The shank's cuff keeps its place across the shank: L1 cos q2 + d_s (1 + dq2) = 0.
         if shank_held and j == 0 and below is not None:
             direction[:, 1] = -1.0 - motion.geometry.thigh_length_m * np.cos(motion.q[:, 1]) / below
         return direction

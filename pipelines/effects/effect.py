@@ -176,6 +176,7 @@ class Parameter:
             In half ranges, of logarithms for a parameter that varies by factors.
         """
         ends = np.array([*self.typical, value])
+        # A value may be zero, which has no logarithm.
         low, high, at = np.log(np.maximum(ends, np.finfo(float).tiny)) if self.by_factors else ends
         return float((2.0 * at - low - high) / (high - low))
 
@@ -321,6 +322,7 @@ class Effect(ABC):
         """Fill in the family and the laws that the class does not define."""
         super().__init_subclass__(**options)
         side = getattr(cls, "side", None)
+        # Without a side there is no default. An installed effect that lacks one is refused later.
         if side is None:
             return
         if not hasattr(cls, "family"):
@@ -330,11 +332,13 @@ class Effect(ABC):
 
     def __post_init__(self) -> None:
         """Adapt units and equations to the machine, and mark parameters that differ by run."""
+        # Effects are frozen, so that what depends on the machine is set past the dataclass.
         if self.each_run:
             for role in ("linear", "shape"):
                 object.__setattr__(
                     self, role, tuple(replace(p, per_run=True) for p in getattr(type(self), role))
                 )
+        # Ranges, units and equations of the classes are those of the leg.
         if self.on == THE_LEG:
             return
         if self.joint:
@@ -343,6 +347,7 @@ class Effect(ABC):
                 scaled = declared and tuple(p.at(self.on, self.joint) for p in declared)
                 object.__setattr__(self, role, scaled)
         if self.mechanism_equation:
+            # None for a mechanism without such an equation, on which the effect is not possible.
             reaction = self.on.mechanism.reactions.get(self.mechanism_equation)
             object.__setattr__(self, "reaction", reaction)
 
@@ -443,6 +448,7 @@ class Effect(ABC):
         """Return whether every run has its motor's temperature, and the temperatures vary."""
         # Least change of a motor's temperature, °C, from which a dependence on it can be fitted.
         least_warming_c = 1.0
+        # Over all runs together: each may be steady, one cold and another warm.
         read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
         ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
         # Missing temperatures are NaN, and the comparison is then false.
@@ -576,8 +582,10 @@ class Effect(ABC):
         columns = np.zeros((*motion.q.shape, len(self.linear)))
         if not self.linear or not self.explains(motion):
             return columns
+        # Amplitudes are zero here, and one at a time is set to 1.
         values = self.completed(np.append(np.zeros(len(self.linear)), shape))
         if self.torque_reading is not None:
+            # A sensor's answer to no torque, per unit of each amplitude: an offset, a drift.
             for i, unit in enumerate(np.eye(len(values))[: len(self.linear)]):
                 columns[:, :, i : i + 1] = self._read(
                     columns[:, :, i : i + 1], motion, values + unit
@@ -587,6 +595,7 @@ class Effect(ABC):
         return columns
 
     def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
+        # Only few equations read the load; for all others its smoothing would be wasted.
         load = motion.transmitted[0] if self.reads_load else np.zeros_like(motion.q)
         of_motion = motion.time, motion.q, motion.dq, motion.ddq, load, motion.motor_temperature
         arrays = [np.ascontiguousarray(array) for array in of_motion]
@@ -596,6 +605,7 @@ class Effect(ABC):
                 address(self.reaction), values, joint, *arrays, geometry, np.zeros(2 * joints), out
             )
             return
+        # After a gap the memory is unknown, and settles again.
         for stretch in motion.segments():
             columns_along_with_memory(
                 address(self.reaction),
@@ -663,6 +673,7 @@ class Effect(ABC):
         (n, J, p) array
             Reported torques.
         """
+        # Without a shape, a sensor only adds its own columns, and passes all others on.
         if self.torque_reading is None or not self.shape or not self.explains(motion):
             return columns
         return self._read(
@@ -675,6 +686,7 @@ class Effect(ABC):
         time, temperature = (
             np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature)
         )
+        # A sensor's memory does not reach across a gap.
         for stretch in motion.segments():
             read_along(
                 address(self.torque_reading),
@@ -684,6 +696,7 @@ class Effect(ABC):
                 temperature[stretch],
                 torque[stretch],
                 np.zeros(len(motion.joints)),
+                # A memory for each torque, because the columns pass the sensor independently.
                 np.zeros((torque.shape[2], self.reading_states)),
                 out[stretch],
             )
@@ -706,6 +719,7 @@ class Effect(ABC):
         (n, J) array
             N·m.
         """
+        # Right for a sensor that adds to the torque. One with a gain or a memory overrides this.
         return torque - self.torque(motion, values) if self.torque_reading is not None else torque
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:

@@ -101,12 +101,14 @@ class EncoderEccentricity(Effect):
             true -= (true + error - q[:, j]) / (1.0 + slope)
         _, slope, curvature = _errors(true, values)
         q[:, j] = true
+        # With q_m = q + e(q), dq_m = (1 + e') dq. Then ddq_m = (1 + e') ddq + e'' dq².
         dq[:, j] /= 1.0 + slope
         ddq[:, j] = (ddq[:, j] - curvature * dq[:, j] ** 2) / (1.0 + slope)
         return motion.with_state(q, dq, ddq)
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Return sine and cosine once per turn, and the same with those twice per turn."""
+        # Small amplitudes, for which the correction is nearly linear.
         units = 0.01 * np.eye(4)
         every = tuple(tuple(unit.tolist()) for unit in units)
         return every[:2], every

@@ -68,6 +68,7 @@ class EndStop(Effect):
     def reaction(at, state, values, geometry, joint, out):
         """Add s k w (depth / w)^p beyond the contact."""
         way = 1.0 if values[2] >= 0.0 else -1.0
+        # A depth is positive in the direction that the stop blocks.
         depth = way * (at.q[joint] - values[1])
         if depth > 0.0:
             out[joint] += way * values[0] * DEPTH * (depth / DEPTH) ** values[3]

@@ -44,6 +44,7 @@ class ForceSensorZero(Effect):
         out = np.zeros_like(columns)
         geometry, knee = motion.geometry, motion.q[:, 1]
         thigh, shank = geometry.thigh_cuff_distance_m or 0.0, geometry.shank_cuff_distance_m or 0.0
+        # The levers of `leg.cuff_torque`. A force along the thigh passes the hip's axis: no torque.
         out[:, 0, 0] = geometry.thigh_length_m * np.sin(knee)
         out[:, 0, 1] = shank + geometry.thigh_length_m * np.cos(knee)
         out[:, 1, 1] = shank

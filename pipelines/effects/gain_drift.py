@@ -57,6 +57,7 @@ class GainDrift(Effect):
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
         """Multiply the torque by the present gain."""
+        # Both forms begin with the slope 1, so that ``rate`` means the same.
         since = t
         if values[1] > 0.0:
             since = values[1] * (1.0 - exp(-(t / values[1])))
@@ -69,6 +70,7 @@ class GainDrift(Effect):
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Return a drift with time in each form, and one with temperature if it was measured."""
+        # The gain is linear in its rates: any small ones give the direction.
         with_time = tuple(((0.001, form, 0.0),) for form in self.shape[1].forms)
         with_temperature = (((0.0, 0.0, 0.002),),) if self.temperature_varies(motions) else ()
         return (*with_time, *with_temperature)
@@ -90,6 +92,7 @@ class GainDrift(Effect):
         (n, J) array
             True torque, N·m.
         """
+        # The reading of a unit torque is the gain. Other joints keep their torque.
         true, unit = torque.copy(), np.zeros((*torque.shape, 1))
         unit[:, self.column(motion)] = 1.0
         true /= np.where(unit, self._read(unit, motion, values), 1.0)[:, :, 0]

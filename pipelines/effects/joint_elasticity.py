@@ -82,6 +82,7 @@ class JointElasticity(Effect):
             return link_behind_motor(
                 motion, motion.link_swing, self, self.completed(shape), swing_ratio
             )
+        # Torque over stiffness; hardening and the link's mass are neglected.
         j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):

@@ -91,6 +91,7 @@ def _kernel_at(signature):
 
         def lower(context, builder, signature, arguments):
             function = cgutils.create_struct_proxy(kind)(context, builder)
+            # Compiled code calls a first-class function by this address.
             function.jit_addr = builder.inttoptr(
                 arguments[0], context.get_value_type(types.voidptr)
             )
@@ -182,6 +183,7 @@ def columns_along(
     direction, torque = scratch[:joints], scratch[joints:]
     for k in range(q.shape[0]):
         for j in range(joints):
+            # Wrong only where a joint sticks, and there fits leave the samples out.
             direction[j] = np.sign(dq[k, j])
         at = Instant(time[k], q[k], dq[k], ddq[k], direction, load[k], temperature[k])
         _unit_columns(kernel, at, scratch[:0], values, geometry, joint, torque, out[k])
@@ -329,6 +331,7 @@ def _twist_at_rest(kernel, values, torque, stiffness):
     # Largest twist, rad, with which a swinging load begins at rest.
     widest_twist = 1.0
     low, high = -widest_twist, widest_twist
+    # Bisection, because a spring with play has no slope within it. 40 halvings reach 1e-11 rad.
     for _ in range(40):
         middle = 0.5 * (low + high)
         if kernel(middle, 0.0, values) + stiffness * middle < torque:
@@ -382,10 +385,13 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
             mass = max(least, inertia[n - 1] + share * (inertia[n] - inertia[n - 1]))
             drag = damping[n - 1] + share * (damping[n] - damping[n - 1])
             slope = stiffness[n - 1] + share * (stiffness[n] - stiffness[n - 1])
+            # The spring's tangent at the step's begin.
             passed = kernel(twist, rate, values)
             per_twist = (kernel(twist + nudge, rate, values) - passed) / nudge
             per_rate = (kernel(twist, rate + nudge, values) - passed) / nudge
             drag += 2.0 * ratio * np.sqrt(max(0.0, per_twist) * mass)
+            # Midpoint rule: twist and rate are taken half a step ahead, where change is unknown.
+            # Solved for the change of the rate.
             push = (
                 load - drag * rate - slope * twist - passed - 0.5 * s * (slope + per_twist) * rate
             )

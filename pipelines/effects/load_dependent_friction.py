@@ -49,6 +49,7 @@ class LoadDependentFriction(Effect):
     def __post_init__(self) -> None:
         """Hold the excess at zero on a machine of one joint, where the rigid body absorbs it."""
         super().__post_init__()
+        # There mu k T is a share of the rigid body's torque, as a gain would be.
         if len(self.on.names) == 1:
             (excess,) = self.shape
             object.__setattr__(self, "shape", (replace(excess, forms=(0.0,)),))
@@ -56,5 +57,6 @@ class LoadDependentFriction(Effect):
     @reaction
     def reaction(at, state, values, geometry, joint, out):
         """Add mu (abs(load) sgn v + k load) at the joint."""
+        # abs(T) sgn(T) is T.
         load = at.load[joint]
         out[joint] += values[0] * (abs(load) * at.direction[joint] + values[1] * load)

@@ -54,6 +54,8 @@ class MassOffAxis(Effect):
             "mass_moment", "kg·m", "mass times distance forward of the axis", "Y", (-0.6, 0.6)
         ),
     )
+    # A mass across the shank changes the coupling of both links, and so the mass matrix.
     inertial = True
     parity = Parity.EVEN
+    # The leg's equation. For other machines, the base class replaces it.
     reaction = staticmethod(LEG.reactions[mechanism_equation])

@@ -28,6 +28,7 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
     group = "exoid.effects"
     taken = {effect.name: effect.__module__ for effect in known}
     effects = []
+    # Sorted, because the order of installed packages differs between computers.
     for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
         effect = _loaded(entry)
         if effect.name in taken:
@@ -44,6 +45,7 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
 def _loaded(entry: EntryPoint) -> type[Effect]:
     try:
         effect = entry.load()
+    # The code of another package may raise anything when it is imported.
     except Exception as error:
         raise _broken(
             entry, f"loading it failed: {type(error).__name__}: {error}", "correct it"

@@ -57,6 +57,7 @@ class ParallelSpring(Effect):
             "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
         ),
     }
+    # The preload is linear as well; a rest angle is not, because k multiplies it.
     linear = (
         Parameter("stiffness", "N·m/rad", "torque per angle", "k", (2.0, 40.0)),
         Parameter("preload", "N·m", "stiffness times rest angle", "b", (-30.0, 30.0)),
@@ -94,6 +95,7 @@ class ParallelSpring(Effect):
             stiffness, rest = self.reported
             of_this = {
                 "linear": (stiffness,),
+                # A single form holds the rest angle: no search varies it.
                 "shape": (replace(rest, default=0.0, forms=(0.0,)),),
                 "reported": None,
                 "reaction": self.about_rest,

@@ -50,6 +50,7 @@ class PassiveJointTorque(Effect):
             "w",
             (-0.4, 0.4),
             default=0.25,
+            # A usual width, a hard stop and a linear spring, at either end of the range.
             forms=(0.25, -0.25, 0.1, -0.1, 5.0, -5.0),
             between_forms=False,
         ),
@@ -61,4 +62,5 @@ class PassiveJointTorque(Effect):
         """Add k w (exp((q - q0) / w) - 1) beyond the onset."""
         beyond = (at.q[joint] - values[1]) / values[2]
         if beyond > 0.0:
+            # With the largest width the exponent is small, and exp(x) - 1 would lose digits.
             out[joint] += values[0] * values[2] * expm1(beyond)

@@ -49,6 +49,7 @@ class PayloadChange(Effect):
         """Use a mass at a prismatic joint, where no distance matters."""
         super().__post_init__()
         if self.joint and self.on != THE_LEG and self.on.joint(self.joint).kind == "prismatic":
+            # The torque of a mass on a slide is m (ddq + g), wherever it lies.
             moment, time = self.linear[0], self.shape[0]
             object.__setattr__(self, "linear", (replace(moment, meaning="added mass", symbol="m"),))
             object.__setattr__(self, "shape", (time,))

@@ -52,6 +52,7 @@ class PreslidingHysteresis(Effect):
     def derivative(at, state, values, geometry, joint, out):
         """Write dz/dt = v / travel (1 - z sgn v)^i."""
         v, z = at.dq[joint], state[0]
+        # A step may carry z beyond 1, and the power of a negative number is not real.
         remaining = max(0.0, 1.0 - z) if v > 0.0 else max(0.0, 1.0 + z)
         # A power costs ten times as much as the rest.
         out[0] = v / values[1] * (remaining if values[2] == 1.0 else remaining ** values[2])

@@ -136,6 +136,7 @@ def _row(parameter: Parameter) -> str:
 
 def pages() -> dict[str, str]:
     """Return the pages of exoid's own effects by file name, and their index."""
+    # Committed pages must not depend on the packages that are installed.
     ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (

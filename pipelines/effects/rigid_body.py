@@ -57,4 +57,5 @@ class RigidBody(Effect):
         """Return the mechanism's regressor, (n, J, p), in one pass."""
         if not self.explains(motion):
             return np.zeros((*motion.q.shape, len(self.linear)))
+        # The kernel of the reaction would take one pass for each parameter.
         return self.on.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)

@@ -44,5 +44,6 @@ class RotorCoupling(Effect):
     @reaction
     def reaction(at, state, values, geometry, joint, out):
         """Add c ddq of the other joint at each."""
+        # Alike at both joints, because a mass matrix is symmetric.
         out[0] += values[0] * at.ddq[1]
         out[1] += values[0] * at.ddq[0]

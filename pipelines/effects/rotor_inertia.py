@@ -27,9 +27,11 @@ class RotorInertia(Effect):
     confirm = (
         "look up the rotor's inertia and the gear ratio: J is the inertia times the ratio squared"
     )
+    # On a single joint, the rotor's inertia is part of X1.
     absorbed_as = "inertia"
     element = Element.ARMATURE
     joints = ("knee",)
+    # Its column at the hip, ddq1 in the hip's row, is that of X1.
     absorbed: ClassVar = {"hip": "X1"}
     linear = (
         Parameter("inertia", "kg·m²", "rotor inertia reflected to the joint", "J", (0.03, 1.0)),

@@ -60,6 +60,7 @@ class Spasticity(Effect):
     def reaction(at, state, values, geometry, joint, out):
         """Add gain (v - v0) beyond the threshold."""
         excess = at.dq[joint] - values[1]
+        # Faster than the threshold, and in its direction.
         if excess * values[1] > 0.0:
             out[joint] += values[0] * excess
 

@@ -69,10 +69,12 @@ def behind_spring(
     # Least inertia of any load of an exoskeleton, kg·m².
     least_inertia = 0.02
     torque, inertia, *slopes = load.on_coordinate(direction)
+    # The rotor follows the motor, and its torque does not pass the spring.
     torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
     along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]
     least = least_inertia * effect.scale.of("kg·m²")
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
+    # Joints that no twist turns need no filter.
     joints = np.flatnonzero(direction.any(axis=0))
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
@@ -86,11 +88,13 @@ def behind_spring(
             *parts,
             twist[stretch],
         )
+        # A stretch too short for the filter keeps the motion before the spring.
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
         turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]
         # The twist needs the filter of the measured motion, or the two would not be simultaneous.
         turned = low_pass(turned, motion.sample_rate_hz, motion.cutoff_hz)
+        # A twist is the angle of the motor less that of the link.
         moved[0][stretch, joints] -= turned
         for order in (1, 2):
             moved[order][stretch, joints] -= derivative(turned, motion.sample_rate_hz, order)

@@ -36,16 +36,19 @@ class TimeDelay(Effect):
     @torque_reading
     def torque_reading(t, torque, values, joint, state, temperature):
         """Return the delayed torque, linear between samples; at first that of the first sample."""
+        # Memory: the number of samples so far, then a ring of times and torques.
         newest = int(state[0])
         state[0] += 1.0
         slot = 1 + 2 * (newest % SLOTS)
         state[slot], state[slot + 1] = t, torque[joint]
         then = t - values[0]
         k = newest
+        # Backwards to the last sample that is old enough.
         while k > max(0, newest - SLOTS + 1) and state[1 + 2 * (k % SLOTS)] > then:
             k -= 1
         before, after = 1 + 2 * (k % SLOTS), 1 + 2 * (min(k + 1, newest) % SLOTS)
         torque[joint] = state[before + 1]
+        # Without a delay the newest sample is the reading, and no later one exists.
         if state[before] < then and after != before:
             share = (then - state[before]) / (state[after] - state[before])
             torque[joint] += share * (state[after + 1] - state[before + 1])

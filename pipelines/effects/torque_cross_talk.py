@@ -28,6 +28,7 @@ class TorqueCrossTalk(Effect):
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
         """Return the joints of a machine with two joints of one kind; empty for other machines."""
+        # Between a torque and a force, the share would have a unit.
         kinds = [joint.kind for joint in machine.joints]
         two_alike = len(kinds) == 2 and kinds[0] == kinds[1]
         return super().possible(machine) if two_alike else []

@@ -46,6 +46,7 @@ class TorqueDrift(Effect):
         """Set the level to zero if the mechanism's parameters absorb a constant torque."""
         super().__post_init__()
         if TorqueOffset.absorbed_as in self.on.mechanism.absorbs:
+            # As a shape with a single form, the level is held at zero by every fit.
             rate, level = self.linear
             object.__setattr__(self, "linear", (rate,))
             object.__setattr__(self, "shape", (replace(level, per_run=False, forms=(0.0,)),))

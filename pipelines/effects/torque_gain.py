@@ -30,6 +30,7 @@ class TorqueGain(Effect):
         " between the rows"
     )
     confirm = "hang a known weight on the joint and compare the change of torque with the weight's"
+    # On a single joint, it scales all parameters alike.
     absorbed_as = "gain"
     element = Element.TORQUE_GAIN
     ties: ClassVar = {
@@ -40,6 +41,7 @@ class TorqueGain(Effect):
             " the person",
         ),
     }
+    # Not linear: it multiplies the torques of all other effects.
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
 
     @torque_reading

@@ -27,6 +27,7 @@ class TorqueOffset(Effect):
         "switch the drive off and read its torque: it should be zero; a sensor that is tared at"
         " each start reads zero then under any load: remove the load first"
     )
+    # A lift's X2 contains every constant force.
     absorbed_as = "constant"
     element = Element.TORQUE_OFFSET
     may_differ = "a torque sensor that is tared at every start"

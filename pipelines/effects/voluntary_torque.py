@@ -33,6 +33,7 @@ class VoluntaryTorque(Effect):
         " the wearer"
     )
     acts_in = ("with_human",)
+    # Sine and cosine are linear, amplitude and phase are not.
     linear = (
         Parameter("sine", "N·m", "amplitude of the sine", "A", (-10.0, 10.0), per_run=True),
         Parameter("cosine", "N·m", "amplitude of the cosine", "B", (-10.0, 10.0), per_run=True),
@@ -72,6 +73,7 @@ class VoluntaryTorque(Effect):
     def physical(self, values: NDArray) -> NDArray:
         """Return amplitude, frequency and phase of the rhythm's sine, and the bias, (4,)."""
         sine, cosine, bias, frequency = values
+        # With A sin x + B cos x = a sin(x + phi), tan(phi) = B / A.
         return np.array([np.hypot(sine, cosine), frequency, np.arctan2(cosine, sine), bias])
 
     def values_from(self, physical: NDArray) -> NDArray:

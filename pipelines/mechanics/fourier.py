@@ -62,6 +62,7 @@ class FourierTrajectory:
             Quantity, joint, least and greatest; rad, rad/s and rad/s².
         """
         ranges = np.array([list(map(_range, amplitude)) for amplitude in self._amplitudes])
+        # Velocity and acceleration of a periodic motion have no mean.
         ranges[0] += self.theta0[:, np.newaxis]
         return ranges
 
@@ -88,6 +89,7 @@ def _range(amplitude: NDArray) -> tuple[float, float]:
     n = len(amplitude)
     slope = 1j * np.arange(1, n + 1) * amplitude
     roots = np.roots(np.concatenate([slope[::-1], [0.0], slope.conj()]))
+    # A joint at rest has no roots, and then 0 is the only point.
     x = np.append(np.angle(roots), 0.0)
     values = (np.exp(1j * np.outer(x, np.arange(1, n + 1))) @ amplitude).real
     return float(values.min()), float(values.max())

@@ -25,6 +25,7 @@ def gait() -> FourierTrajectory:
     FourierTrajectory
         Of hip and knee, rad and s.
     """
+    # From cos(x + p) = cos p cos x - sin p sin x.
     return FourierTrajectory(
         theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA
     )

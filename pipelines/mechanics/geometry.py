@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 class Geometry:
     """Lengths and gravity that are measured, not identified; SI units."""
 
+    # The defaults are the paper's. A recording's geometry has priority, then that of exoid.toml.
     thigh_length_m: float = 0.38952
     """First to second joint axis; unused for a machine of one joint."""
     gravity_m_s2: float = 9.8

@@ -35,6 +35,7 @@ class Instant(NamedTuple):
     temperature: np.ndarray
 
 
+# Explicit signatures need this type before any kernel is called.
 INSTANT = types.NamedTuple([float64, *(vector,) * 6], Instant)
 
 REACTION = void(INSTANT, vector, vector, vector, int64, vector)

@@ -67,6 +67,7 @@ class FilteredRecording:
         """
         rate_hz, order = self.metadata["sample_rate_hz"], self.metadata["filter"]["order"]
         margin = reach(rate_hz, self.cutoff.hz, order) + SPLINE_REACH
+        # Windows shorter than their margins would mostly filter rows that are dropped.
         for window in windows(self.recording.pieces(), max(WINDOW, margin), margin):
             table = window.kept(self._filtered(window))
             yield table if columns is None else table.select(list(columns))
@@ -88,6 +89,7 @@ class FilteredRecording:
             q[here], dq[here], ddq[here] = grid.filtered(
                 time[here], angle[here], self.cutoff.hz, self.metadata["filter"]["order"]
             )
+            # Rows near an end of the stretch are invalid, because the filter lacks one side there.
             begin = int(self.stretches.start[s]) + edge_rows - window.first
             end = int(self.stretches.stop[s]) - edge_rows - window.first
             valid[max(0, begin) : max(0, end)] = True
@@ -189,6 +191,7 @@ def _refuse_stretches_that_are_all_edge(
 ) -> None:
     rows = edge(rate_hz, cutoff.hz)
     longest = int(stretches.samples[stretches.longest])
+    # Both edges are invalid, so that not one valid sample would remain.
     if longest <= 2 * rows or longest < shortest(rate_hz, cutoff.hz):
         raise InputError(
             f"no stretch without a gap lasts the {2 * rows / rate_hz:.2f} s that a {cutoff.hz:.1f}"
@@ -211,6 +214,7 @@ def _on_grid(recording: Rows, stretches: Stretches, rate_hz: float) -> Iterator[
         here = _rows_of(s, stretches, window)
         first, last = max(here.start, window.core.start), min(here.stop, window.core.stop)
         if first < last:
+            # Half-open intervals, so that a grid point at a window's border is counted once.
             ends = window.first + last == stretches.stop[s]
             yield grid.between(time[here], angle[here], time[first], np.inf if ends else time[last])
 
@@ -280,6 +284,7 @@ class _Grid:
         grid, uniform = self._sampled(time, angle)
         smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
         states = [smooth, *(derivative(smooth, self._rate_hz, order) for order in (1, 2))]
+        # Torque is known at the samples' own times only, so the motion is needed there, too.
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
@@ -306,6 +311,7 @@ class _Grid:
         """Return uniform times and the angles there; the samples themselves if they are uniform."""
         if self._uniform:
             return time, angle
+        # Counted from the stretch's begin, so that all windows use the same grid.
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))
         last = int((time[-1] - self._origin_s) * self._rate_hz)
         grid = self._origin_s + np.arange(first, last + 1) / self._rate_hz

@@ -81,6 +81,7 @@ def margins(trajectory: Trajectory, bounds: JointBounds) -> list[Margin]:
     list of Margin
         Six margins, in rad, rad/s and rad/s².
     """
+    # Last axis: lower and upper bound, then least and greatest value, as in the fields of Margin.
     numbers = np.concatenate([bounds_array(bounds), trajectory.extrema()], axis=2).tolist()
     return [
         Margin(joint.name, quantity, joint.unit(quantity), *numbers[i][j])

@@ -75,15 +75,18 @@ class LoadColumns:
         (4, n, p) array
             Torque, inertia, damping and stiffness per unit of each parameter.
         """
+        # Arrays are not hashable. Equal directions have equal bytes.
         key = direction.tobytes()
         if key not in self._projected:
             step = STEP * direction
+            # Torque is linear in acceleration, so that a whole unit gives the exact slope there.
             torques = (
                 self.torque,
                 self._torque(self.q, self.dq, self.ddq + direction) - self.torque,
                 (self._torque(self.q, self.dq + step, self.ddq) - self.torque) / STEP,
                 (self._torque(self.q + step, self.dq, self.ddq) - self.torque) / STEP,
             )
+            # Virtual work: the torque on a coordinate is the joints' torque along its direction.
             self._projected[key] = np.array(
                 [np.einsum("nj,njp->np", direction, torque) for torque in torques]
             )

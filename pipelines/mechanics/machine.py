@@ -27,6 +27,7 @@ def _collected() -> tuple[Mechanism, ...]:
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
     values = [value for module in modules for value in vars(module).values()]
+    # A file that imports another file's mechanism would list it twice.
     all_mechanisms = dict.fromkeys(value for value in values if isinstance(value, Mechanism))
     for one, other in combinations(all_mechanisms, 2):
         gravity = (one.has_gravity, other.has_gravity)
@@ -93,6 +94,7 @@ class Machine:
         float
             s.
         """
+        # Travel over speed is a joint's time scale. The slowest joint needs the longest recording.
         slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
         return seconds * min(1.0, slowest)
 

@@ -81,6 +81,7 @@ class Mechanism:
         (n, J, p) array
             Torque in N·m (N at a prismatic joint) per unit of each parameter.
         """
+        # Compiled regressors accept only contiguous arrays of doubles.
         q, dq, ddq = (np.ascontiguousarray(state, dtype=float) for state in (q, dq, ddq))
         return self.along(q, dq, ddq, geometry.array())
 
@@ -102,6 +103,7 @@ class Mechanism:
         geometry : Geometry
             Lengths.
         """
+        # Without gravity a lift at rest still needs its constant force X2, which is subtracted.
         still, weightless = np.zeros(len(self.kinds)), replace(geometry, gravity_m_s2=0.0)
         at_rest = self._torque(q, still, still, X, weightless)
         return np.column_stack(
@@ -128,6 +130,7 @@ class Mechanism:
         at_rest = self._torque(q, still, still, X, weightless)
 
         def quadratic(velocity):
+            # The polarisation needs a pure quadratic form, without any torque at rest.
             return self._torque(q, velocity, still, X, weightless) - at_rest
 
         units = np.eye(len(still))
@@ -169,6 +172,7 @@ class Mechanism:
         """
         forms = self.inertia_forms(geometry)
         inertias, axes = np.linalg.eigh(np.tensordot(np.asarray(X, dtype=float), forms, 1))
+        # The derivative of a simple eigenvalue with unit eigenvector v is v' B_i v.
         slope = np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0])
         return float(inertias[0]), float(inertias[-1]), slope
 

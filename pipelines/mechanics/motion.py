@@ -117,6 +117,7 @@ class Motion:
         slice
             Into the n samples.
         """
+        # The prepended number differs from the first one, so that row 0 begins a stretch.
         starts = np.flatnonzero(np.diff(self.segment, prepend=self.segment[0] - 1))
         for start, stop in zip(starts, [*starts[1:], len(self)], strict=True):
             yield slice(int(start), int(stop))
@@ -149,6 +150,7 @@ class Motion:
         for column in read.T:
             known = np.isfinite(column)
             if known.any() and not known.all():
+                # Before the first reading and after the last one, the nearest one holds.
                 column[:] = np.interp(self.time, self.time[known], column[known])
         return read
 
@@ -156,6 +158,7 @@ class Motion:
     def on_segments(self) -> NDArray | None:
         """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N, or None."""
         forces = self.held_forces
+        # The order of CUFFS is segment, then side; the sum is over front and back.
         return None if forces is None else forces.reshape(-1, 2, 2, 3).sum(axis=2)
 
     def cuff_torque(self, q: NDArray) -> NDArray | None:
@@ -195,8 +198,10 @@ class Motion:
         if self.limb_load is not None:
             return self._smoothed(self.limb_load)
         torque = self.cuff_torque(self.q)
+        # Without cuff forces, the machine's links are the best estimate of the wearer's limb.
         if torque is None:
             return self.transmitted
+        # Samples without forces take the links' torque, or the filter would spread their NaN.
         return self._smoothed(np.where(np.isfinite(torque), torque, self.transmitted[0]))
 
     @cached_property
@@ -232,6 +237,7 @@ class Motion:
 
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Smooth and differentiate; the derivatives of the raw torque are noise."""
+        # A stretch too short for the filter keeps its torque, with rates of zero.
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
             if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):

@@ -26,6 +26,7 @@ def refuse_several_machines(motions: Sequence[Run]) -> None:
                 f"{other.file} has joints {_named(other)}, {first.file} has {_named(first)}; give"
                 " runs of one machine"
             )
+        # The regressor contains only these. Cuff distances may differ, as each run uses its own.
         for key in ("thigh_length_m", "gravity_m_s2"):
             ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
             if ours != theirs:

@@ -17,4 +17,5 @@ def smooth_share(progress: NDArray) -> NDArray:
     (n,) array
     """
     s = np.clip(progress, 0.0, 1.0)
+    # Both derivatives are zero at the ends, so that the scaled motion has no jump of acceleration.
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))

@@ -173,6 +173,7 @@ def _motion_rows(path: Path, settings: FilterSettings) -> Rows:
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:
+    # A copy would count one run's noise twice, or let a fit see its validation run.
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():

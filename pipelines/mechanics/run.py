@@ -153,11 +153,15 @@ class StoredRun:
         Piece
             Of at most ``WINDOW`` rows and the margins.
         """
+        # First row of the segment in which the next window begins. A filter over blocks counts them
+        # from there, so that windows do not shift the blocks.
         begun = 0
         for window in windows(self.rows.pieces(self._columns), WINDOW, margin):
             motion = self._motion(window.rows)
+            # np.diff is not zero at a segment's last row, and the next segment begins a row later.
             changes = window.first + 1 + np.flatnonzero(np.diff(motion.segment))
             yield Piece(motion, window.core, window.first - begun)
+            # The next window begins a margin before the end of this core.
             following = changes[changes <= window.first + window.core.stop - margin]
             begun = int(following[-1]) if len(following) else begun
 

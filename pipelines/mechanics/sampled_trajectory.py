@@ -67,9 +67,11 @@ class SampledTrajectory:
     @cached_property
     def _splines(self) -> tuple[PPoly, PPoly, PPoly]:
         time, (q, dq, ddq) = self.time - self.time[0], (self.q, self.dq, self.ddq)
+        # A table of one period ends a sample before it repeats; its first row closes the period.
         if self.period_s and time[-1] < self.period_s - 1e-9:
             time = np.append(time, self.period_s)
             q, dq, ddq = (np.vstack([x, x[:1]]) for x in (q, dq, ddq))
+        # Each quantity has the next one's samples as slopes; those of the acceleration are unknown.
         return (
             CubicHermiteSpline(time, q, dq),
             CubicHermiteSpline(time, dq, ddq),
@@ -81,5 +83,6 @@ def _range(spline: PPoly, joint: int) -> tuple[float, float]:
     """Return the least and the greatest value of one joint's piecewise cubic."""
     of_joint = PPoly(spline.c[:, :, joint], spline.x)
     turns = of_joint.derivative().roots(discontinuity=False, extrapolate=False)
+    # A constant piece has its extrema everywhere, which scipy reports as NaN.
     values = of_joint(np.concatenate([of_joint.x, turns[np.isfinite(turns)]]))
     return float(values.min()), float(values.max())

@@ -33,6 +33,7 @@ def on_one_scale(runs: Sequence[Measured]) -> list[Measured]:
         refuse_several_machines(runs)
     if not runs or runs[0].machine.is_exoskeleton or all(run.scales for run in runs):
         return list(runs)
+    # All runs share the scales. Otherwise one effect would have another range in each run.
     scales = _scales(runs)
     return [replace(cast(Any, run), scales=scales) for run in runs]
 

@@ -35,6 +35,7 @@ def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
         if stretch.stop - stretch.start < shortest(rate, cutoff_hz):
             near[stretch] = True
             continue
+        # At both ends the filter lacks samples on one side.
         near[stretch.start : stretch.start + reach] = True
         near[max(stretch.start, stretch.stop - reach) : stretch.stop] = True
         inner = slice(stretch.start + reach, max(stretch.start + reach, stretch.stop - reach))

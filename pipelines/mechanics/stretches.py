@@ -52,6 +52,7 @@ class Stretches:
         range
             Into the s stretches.
         """
+        # A stretch that ends at the first row, or begins at the last, does not overlap.
         return range(
             int(np.searchsorted(self.stop, first, "right")),
             int(np.searchsorted(self.start, last, "left")),
@@ -83,14 +84,18 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
     origins: list[float] = []
     strayed: list[float] = []
     steps: list[float] = []
+    # The infinite first step makes the first sample begin a stretch.
     row, start, origin, stray, before = 0, 0, np.nan, 0.0, -np.inf
     for time in times:
         step = np.diff(time, prepend=before)
+        # A median does not notice gaps and lost samples, which are few.
         steps += [float(np.median(step[np.isfinite(step)]))] if np.isfinite(step).any() else []
         begins = np.flatnonzero(step > max(gap / rate_hz, bridged_s))
         # The first entry continues the stretch of the piece before, even without rows here.
         start_of, origin_of = np.append(start, row + begins), np.append(origin, time[begins])
+        # Stretch of each sample; 0 is the one that an earlier piece began.
         number = np.searchsorted(begins, np.arange(len(time)), "right")
+        # Each stretch has its own grid, so that the length of a gap does not matter.
         grid = origin_of[number] + (row + np.arange(len(time)) - start_of[number]) / rate_hz
         away = np.append(stray, np.zeros(len(begins)))
         np.maximum.at(away, number, np.abs(time - grid))
@@ -111,6 +116,7 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
 
 def _refuse_another_rate(steps: list[float], rate_hz: float) -> None:
     step = float(np.median(steps)) if steps else 1.0 / rate_hz
+    # Within a factor of two it may be jitter; beyond it, a rate or a unit of time is wrong.
     if not 0.5 < 1.0 / (step * rate_hz) < 2.0:
         raise InputError(
             f"metadata sample_rate_hz is {rate_hz:g}, but time_s advances by {step:g} s "

@@ -88,6 +88,7 @@ def _from_toml(path: Path) -> FourierTrajectory:
     file = load_toml(path, CoefficientFile)
     to_rad = np.pi / 180.0 if file.unit == "deg" else 1.0
     return FourierTrajectory(
+        # The published a and b are in degrees, but the mean angles are in radians.
         theta0=np.array(file.theta0_rad),
         a=to_rad * np.array(file.a),
         b=to_rad * np.array(file.b),
@@ -146,6 +147,7 @@ def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
             f" {trajectory.theta0.size} mean angles, expected one for each of the"
             f" {joints} joints"
         )
+    # Only coefficients are used, so that an edit of the samples alone would have no effect.
     stated = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
     angles = table.stacked("angle")
     row, joint = np.unravel_index(np.argmax(np.abs(angles - stated)), angles.shape)

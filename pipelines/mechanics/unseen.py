@@ -35,5 +35,6 @@ def _shared_rows(one: Run, other: Run) -> int:
     first, second = (run.metadata.get("imported", {}) for run in (one, other))
     if not set(first.get("sha256", ())) & set(second.get("sha256", ())):
         return 0
+    # Rows are given by the first and the last one, both included.
     begin, end = max(first["rows"][0], second["rows"][0]), min(first["rows"][1], second["rows"][1])
     return int(max(0, end - begin + 1))

@@ -33,6 +33,7 @@ def baseline(
     cuffs : bool
         Whether cuff forces are fitted; their sensors then have zeros.
     """
+    # Without such data, both bodies would have the same columns.
     wearer = [RigidBody(run="with_human", on=machine)] * (len(kinds) == 2 or cuffs)
     friction = (Friction(joint=joint, on=machine) for joint in machine.names)
     zeros = [ForceSensorZero(on=machine)] * cuffs

@@ -137,6 +137,7 @@ class Model:
         Motions
             Three motions of n samples.
         """
+        # From the encoders towards the wearer, because each correction needs the one before.
         motor = self.sensed(motion)
         link = self.behind_motors(motor)
         return Motions(motor, link, self._behind_cuffs(link))
@@ -147,6 +148,7 @@ class Model:
 
     def behind_motors(self, motor: Motion) -> Motion:
         """Return the motion of the machine's links for a motion of its motors."""
+        # STRUCTURE has the tilt of the base, which turns links and not motors.
         return self._corrected(motor, lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
 
     def _behind_cuffs(self, link: Motion) -> Motion:
@@ -156,6 +158,7 @@ class Model:
     def _corrected(self, motion: Motion, chosen: Callable[[Effect], bool]) -> Motion:
         for term in self.terms:
             if chosen(term.effect) and term.effect.explains(motion):
+                # Each correction continues from the one before, in the order of the terms.
                 motion = term.effect.corrected(motion, term.shape)
         return motion
 
@@ -191,6 +194,7 @@ class Model:
         out = np.zeros((n, 2 * joints if cuffs else joints, len(self.linear_parameters)))
         drives = out[:, :joints]
         terms = zip(self.terms, self._columns, strict=True)
+        # The sort is stable: torque sensors come last, and keep their order in the model.
         for term, own in sorted(terms, key=lambda one: one[0].effect.side is Side.SENSOR):
             effect, shape = term.effect, term.shape
             if not effect.explains(motion):
@@ -201,6 +205,7 @@ class Model:
             if measured is not drives:
                 drives[:] = measured
             drives[:, :, own] = columns = _known_columns(effect, at, shape)
+            # The cuffs lie between links and limb, so that only the limb's effects reach them.
             in_cuffs = effect.cuff_columns(at, columns) if cuffs else None
             if in_cuffs is not None:
                 out[:, joints:, own] = in_cuffs
@@ -273,6 +278,7 @@ def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     # A diagnosis fits the same motion a thousand times.
     if effect not in motion.columns_known:
         motion.columns_known[effect] = columns = effect.columns(motion, shape)
+        # Many fits share the array, and none of them may change it.
         columns.flags.writeable = False
     return motion.columns_known[effect]
 
@@ -298,6 +304,7 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     InputError
         If values are missing, or belong to no parameter of the effect.
     """
+    # The number of a ripple's lines follows from the names in the file.
     effect = effect.with_parts_named(values)
     known = {parameter.name: parameter for parameter in effect.parameters}
     missing = [
@@ -316,4 +323,5 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     physical = np.array(
         [values.get(name, parameter.default) for name, parameter in known.items()], dtype=float
     )
+    # Files may hold other parameters than a fit, such as amplitude and phase.
     return Term(effect, effect.values_from(physical))

@@ -59,6 +59,7 @@ class TermColumns:
     @cached_property
     def columns(self) -> tuple[tuple[int, int | None], ...]:
         """Parameter number and run of each column; the run is None if all runs share the column."""
+        # Each run appends its own columns, after those that all runs share.
         shared = [(k, None) for k, own in enumerate(self.per_run) if not own]
         own = [(k, run) for run in self.runs for k, own in enumerate(self.per_run) if own]
         return (*shared, *own)
@@ -109,6 +110,7 @@ class TermColumns:
             Values of the term's parameters in that run.
         """
         places = self.places(run)
+        # A place of -1 reads the last value, which is not used.
         return np.where(places < 0, otherwise, values[places])
 
     def expand(self, columns: NDArray, run: int) -> NDArray:
@@ -202,6 +204,7 @@ class ParameterLayout:
     @property
     def bodies(self) -> NDArray:
         """Columns of each rigid body, (bodies, parameters); the machine's body is first."""
+        # Bodies are the same in all runs, so that all their columns are shared.
         return np.array([t.places(None) for t in self.terms if isinstance(t.effect, RigidBody)])
 
     def bodies_in(self, kind: str) -> NDArray:
@@ -217,6 +220,7 @@ class ParameterLayout:
         (bodies, parameters) int array
             One body alone, two with a person.
         """
+        # The wearer's body adds to the machine's, which moves in every run.
         return self.bodies if kind == "with_human" else self.bodies[:1]
 
     def column_of(self, effect: str, joint: str | None, parameter: str) -> int:
@@ -325,6 +329,7 @@ def _spread(columns: NDArray, places: NDArray, width: int) -> NDArray:
 
     ``places`` (k,) are their places; those at -1 are dropped.
     """
+    # Without columns of single runs nothing moves, and a large array need not be copied.
     if np.array_equal(places, np.arange(width)):
         return columns
     there = places >= 0

@@ -43,6 +43,7 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
             (RigidBody(run="with_human", on=machine), bodies["human"]),
         ]
     else:
+        # ``human`` names a body and is no kind of run.
         parts = [(RigidBody(run=run if run in RUNS else None, on=machine), bodies[run])]
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
 
@@ -57,18 +58,21 @@ def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Te
     """
     rest = frame[frame["effect"] != RigidBody.name]
     twice = rest[["effect", "joint", "run", "name"]].duplicated()
+    # Values become a dictionary later, in which the last of two would count silently.
     if twice.any():
         row = rest[twice].iloc[0]
         raise InputError(
             f"the parameters table: row {row.name} repeats {row['name']} of {row['effect']},"
             " expected every value once; delete one of the two rows"
         )
+    # Effects of the whole machine have no joint, and ``dropna`` would drop them.
     others = rest.groupby(["effect", "joint", "run"], sort=False, dropna=False)
     return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
 
 
 def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     """Return the effect that some rows of a parameters table describe."""
+    # A missing joint or run may be None or NaN; only a text is a name.
     first = rows.iloc[0]
     joint, run = (first[key] if isinstance(first[key], str) else None for key in ("joint", "run"))
     of = effect_named(str(first["effect"]))
@@ -147,5 +151,6 @@ def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
         f" {row['ci95_high']:.3g}) has mass above the axis where the angle is zero, which is to be"
         " hanging straight down: unless the link is overbalanced or stands up, the zero is half a"
         " turn off, a sign is wrong, or a spring is taken for gravity"
+        # The whole interval has to be negative, as noise may change the sign of a small moment.
         for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")
     ]

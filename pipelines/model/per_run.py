@@ -27,6 +27,7 @@ def with_own_values(
     recording : Path, optional
         File of the run; None for a control loop.
     """
+    # A motion has the hash of the recording that it was filtered from.
     this = recording_behind(recording) if recording else None
     terms = [(own_term(term, table, this), guess(term, table, this, recording)) for term in model]
     return Model(tuple(term for term, _ in terms if term)), tuple(
@@ -55,6 +56,7 @@ def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
     values = _stated(term, table, sha256)
     if values is None:
         return term
+    # A value of None marks a term that this run does not have.
     return None if None in values.values() else _with(term, values)
 
 

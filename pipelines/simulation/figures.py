@@ -146,6 +146,7 @@ def _error(frame: pd.DataFrame, joints: tuple[Joint, ...], settled_after_s: floa
         axis.axhspan(-worst, worst, color=GREY, alpha=0.15, lw=0, label=label)
         axis.axhline(0, color="black", lw=0.6)
         axis.plot(frame["time_s"], error, color=BLUE, lw=1.0, label="error")
+        # The first error, from rest to the reference, is far larger and may leave the axes.
         axis.set_ylim(-4 * worst, 4 * worst)
         unit = f"m{joint.unit('angle')}"
         axis.set_ylabel(f"{joint.name} error, {unit}")
@@ -160,6 +161,7 @@ def _torque(frame: pd.DataFrame, joints: tuple[Joint, ...], limit_nm: float) -> 
         axis.plot(frame["time_s"], torque, color=ORANGE, lw=1.0, label="torque")
         network = frame[joint.column("network")]
         axis.plot(frame["time_s"], network, color=BLUE, lw=1.0, label="the network's share")
+        # A distant limit would flatten the curves.
         if torque.abs().max() > 0.7 * limit_nm:
             for bound, label in ((-limit_nm, None), (limit_nm, "limit")):
                 axis.axhline(bound, color=GREY, lw=0.9, ls=":", label=label)
@@ -206,4 +208,5 @@ def _torques(torques: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> 
     torques.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
     errors.set_ylabel(f"error, {joint.unit('torque')}")
     spread = float(np.nanstd(measured - simulated))
+    # Single spikes must not set the scale.
     errors.set_ylim(-6 * spread, 6 * spread)

@@ -69,8 +69,10 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
         period = 1.0 / motion.sample_rate_hz
         loop = _loop_as_recorded(plant, motion, segment.start, period)
         reference = np.ascontiguousarray(motion.reference[segment])
+        # The loop measures in the middle of a period, which is to be the time of a sample.
         begin = motion.time[segment.start] - 0.5 * period
         followed = follow(plant.assembly, drives, loop, reference, begin, temperature[segment])
+        # The fourth result of `follow`, the true motion, is dropped.
         for whole, part in zip(simulated, followed, strict=False):
             whole[segment] = part
     angle, velocity, torque = simulated
@@ -86,7 +88,9 @@ def _drives(motion: Motion) -> Drives:
         kp=np.array([c["kp_nm_rad"] for c in of_joints], dtype=float),
         kd=np.array([c["kd_nm_s_rad"] for c in of_joints], dtype=float),
         limit=np.array([c.get("limit_nm") or no_limit_nm for c in of_joints]),
+        # Metadata do not hold the encoders' resolution.
         counts_per_turn=np.zeros(len(of_joints)),
+        # All joints share one loop, at the rate of the fastest drive.
         rate_hz=max(c.get("rate_hz") or motion.sample_rate_hz for c in of_joints),
         sample_rate_hz=motion.sample_rate_hz,
     )
@@ -97,8 +101,10 @@ def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> Lo
     motor = plant.model.sensed(motion)
     link = plant.model.behind_motors(motor)
     state = np.stack([link.q[k], link.dq[k], motor.q[k], motor.dq[k]])
+    # Both angles half a period earlier, at their recorded speeds.
     state[::2] -= 0.5 * period * state[1::2]
     at_rest = loop_at_rest(plant.assembly, link.q[k])
+    # The drives control what the encoders read, and not the motors' true angles.
     counted = state[2].copy()
     read_encoders(plant.assembly, counted)
     assert motion.reference is not None
@@ -108,6 +114,7 @@ def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> Lo
         angle=counted,
         speed=motor.dq[k].copy(),
         torque=plant.model.delivered(motion)[k].copy(),
+        # Extrapolated to the sample before, from which the drives go to the first set-point.
         reference=2.0 * motion.reference[k] - ahead,
     )
 

@@ -78,6 +78,7 @@ def _sentence(
 
 def _discriminator(fault: dict[str, Any]) -> str:
     """Return the key that determines the kind of a table."""
+    # pydantic quotes the key.
     return fault["ctx"]["discriminator"].strip("'")
 
 

@@ -39,5 +39,6 @@ def _likeness(word: str, name: str) -> float:
     def ratio(part: str) -> float:
         return difflib.SequenceMatcher(None, word.lower(), part.lower()).ratio()
 
+    # A part counts less than a whole name. Parts of one or two letters match by chance.
     parts = [name[: len(word)], *name.split("_")]
     return max([ratio(name), *(0.8 * ratio(part) for part in parts if len(part) > 2)])

@@ -55,6 +55,7 @@ class Judge:
     def all(self, steps: Sequence[Step]) -> list[Judged]:
         """Return every step with its state."""
         judged = [self.judge(step) for step in steps]
+        # A missing result that is an input of a finished step is not due: that step did without it.
         used = {file for one in judged if one.done for file in one.step.inputs}
         return [_left_out(one) if one.step.target in used else one for one in judged]
 
@@ -75,6 +76,7 @@ class Judge:
             return
         others = [step.target.with_name(name) for name in metadata.get("beside", [])]
         yield from self._lacking([*step.other_outputs, *others])
+        # Names without folders, so that a copied experiment is still up to date.
         inputs = {(entry["name"], entry["sha256"]) for entry in metadata.get("inputs", [])}
         yield from self._other_inputs(step, inputs)
         yield from _other_settings(metadata.get("config", {}), step.settings)
@@ -126,6 +128,7 @@ def _left_out(judged: Judged) -> Judged:
 
 def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:
     """Yield the settings that have changed; those that the file does not hold are skipped."""
+    # A setting that a newer version adds does not make older results stale.
     for key in sorted(then.keys() & now.keys()):
         old, new = then[key], now[key]
         if isinstance(old, Mapping) and isinstance(new, Mapping):

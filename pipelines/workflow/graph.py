@@ -107,6 +107,7 @@ def graph(
         return Step(stage, target, tuple(inputs), counted, words, run, other_outputs=others)
 
     steps = list(recorded)
+    # Nothing is designed if each run has an excitation of its own, or was imported.
     if any(trajectory in one.inputs for one in recorded):
         steps.insert(0, step("design", trajectory, (), ("design", "mechanism"), "design"))
     for name, recording in recordings.items():
@@ -118,6 +119,7 @@ def graph(
         step("identify", parameters, motions.values(), counted, *words, other_outputs=identified)
     )
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
+        # It filters the recordings itself, so that [filter] counts as well.
         verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
         words = ("diagnose", *_words(recordings))
         steps.append(
@@ -134,6 +136,7 @@ def graph(
         for name in (run.name for run in validate):
             target, inputs = folder / f"replay-{name}.parquet", [model, recordings[name]]
             words = (*called, "--replay", recordings[name].as_posix())
+            # A replay filters its recording, too, but reads no setting of the adaptive loop.
             yield step(replay, target, inputs, ("filter", "mechanism"), *words, run=name)
 
     # An imported recording may lack what a model needs to be simulated.
@@ -191,6 +194,7 @@ def sealed_file(rig: Path) -> Path | None:
 def needed_for(wanted: Sequence[Step], steps: Sequence[Step]) -> list[Step]:
     """Return the wanted steps and all that make their inputs, in the order of the graph."""
     files = {file for step in wanted for file in (step.target, *step.inputs)}
+    # Backwards, so that one pass also collects what makes the inputs of inputs.
     for step in reversed(steps):
         if not files.isdisjoint(step.makes):
             files.update(step.inputs)

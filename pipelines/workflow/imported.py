@@ -61,6 +61,7 @@ def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, Import
         ]
         experiment = experiment.model_copy(update={"run": tuple(runs)})
     names = frozenset(run.name for run in experiment.run if run.name in imported)
+    # True without imported runs, because `exoid acquire` supports hip and knee only.
     of_a_leg = all(joints_of(imported[name]) == HIP_AND_KNEE for name in names)
     return experiment, ImportedRuns(names, of_a_leg, damaged)
 

@@ -46,6 +46,7 @@ def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, 
     """
     shank_gravity = gravity * sin_leg
     # Tuples, because an array for every integration step would cost more than the equations.
+    # Columns X1 to X4. X3 couples the links; X4 is a pure gravity term.
     hip = (
         ddq[0],
         ddq[1],
@@ -54,6 +55,8 @@ def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, 
         + shank_gravity,
         gravity * sin_hip,
     )
+    # Without X1 and X4, because the thigh's own inertia and weight load only the hip. The shank has
+    # a centrifugal term in dq1², because the thigh carries the knee around the hip.
     knee = (
         0.0,
         ddq[0] + ddq[1],
@@ -119,6 +122,8 @@ def _mass_off_axis(at, state, values, geometry, joint, out):
     hip, knee = regressor_rows(
         cos(q[0]), cos(leg), cos(q[1]), -sin(q[1]), at.dq, at.ddq, geometry[0], geometry[1]
     )
+    # X4 belongs to the thigh (joint 0), X3 to the shank (joint 1). The other columns, whose angles
+    # do not shift, are not used.
     column = 3 - joint
     out[0] += values[0] * hip[column]
     out[1] += values[0] * knee[column]
@@ -129,6 +134,8 @@ def _payload_change(at, state, values, geometry, joint, out):
     """Add the contribution of a point mass to X1..X4 from its time on."""
     if at.t < values[1]:
         return
+    # A mass m at r on the thigh adds m r² to X1 and m r to X4. On the shank it adds to X1..X4
+    # m (L1² + r²), m r², m r and m L1. The amplitude is p = m r.
     moment, r, length = values[0], values[2], geometry[0]
     hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
     if joint == 0:
@@ -160,6 +167,7 @@ def potential_energy(q, X, geometry: Geometry) -> float:
         J, zero with both joint axes level.
     """
     q1, q2 = q
+    # Angles count from hanging down, so that mass below the hip's axis has negative energy.
     return -geometry.gravity_m_s2 * float(X[3] * cos(q1) + X[2] * cos(q1 + q2))
 
 
@@ -172,6 +180,7 @@ def _broken(X: NDArray, geometry: Geometry) -> list[str]:
     broken = []
     if X2 <= 0:
         broken.append(f"X2 = {X2:.4g} kg·m² is not positive: every shank has inertia")
+    # det M = X2 (X1 - X2) - (L1 X3 cos q2)² is least at cos q2 = ±1.
     if X2 * (X1 - X2) <= (geometry.thigh_length_m * X3) ** 2:
         broken.append(
             f"X2 (X1 - X2) = {X2 * (X1 - X2):.4g} is not above (L1 X3)² ="
@@ -267,5 +276,6 @@ def cuff_torque(thigh, shank, q, geometry: Geometry) -> NDArray:
     if d_thigh is None or d_shank is None:
         raise ValueError("cuff distances are not set: the geometry has no cuffs")
     knee = d_shank * shank[:, 1]
+    # Component of the shank's force across the thigh, which acts on the hip by the lever L1.
     along = shank[:, 1] * np.cos(q[:, 1]) + shank[:, 0] * np.sin(q[:, 1])
     return np.column_stack([d_thigh * thigh[:, 1] + knee + geometry.thigh_length_m * along, knee])

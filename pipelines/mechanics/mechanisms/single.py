@@ -122,6 +122,7 @@ PENDULUM = Mechanism(
         "payload": _payload_change,
     },
     broken=_broken_inertia,
+    # Only X1 is constrained. X2 may have any sign, because a link may be overbalanced.
     inertia_forms=lambda geometry: np.array([[[1.0]], [[0.0]]]),
     absorbs=_ABSORBED,
 )
@@ -132,6 +133,7 @@ TURNTABLE = replace(
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
+    # Without gravity, the torque of one joint depends on its acceleration alone.
     bends_at=(),
     reactions={"rigid_bodies": _inertia},
     inertia_forms=lambda geometry: np.array([[[1.0]]]),
