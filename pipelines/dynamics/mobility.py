@@ -17,10 +17,9 @@ from pipelines.dynamics.forward import (
 )
 from pipelines.errors import InputError
 
-KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
-"""Knee angles at which a leg's mass matrix is evaluated, rad. It is even in the knee angle, and
-depends on no other."""
-
+KNEE_ANGLES = np.linspace(-np.pi, np.pi, 121)
+"""Knee angles at which a leg's mass matrix is evaluated, rad. It depends on no other angle, and is
+even in this one only while the shank's mass is on its axis."""
 
 MOST_STEPS = 200
 """Most integration steps per sample. At the default gain and rate, more correspond to an inertia

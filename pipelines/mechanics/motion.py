@@ -240,7 +240,7 @@ class Motion:
         # A stretch too short for the filter keeps its torque, with rates of zero.
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
-            if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
+            if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self._load_cutoff_hz):
                 continue
             smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, self._load_cutoff_hz)
             rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)

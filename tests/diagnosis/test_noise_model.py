@@ -1,9 +1,12 @@
 """The noise is read off above what wanders, and extended downwards by its spectrum."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.noise_model import NoiseModel, _spectrum_of
 
 RATE_HZ = 40.0
@@ -90,3 +93,24 @@ def test_samples_that_are_not_usable_change_nothing_but_the_spread():
     whole, *_ = _spectrum_of([noise], RATE_HZ, (1.5, 6.0))
     holed, *_ = _spectrum_of([gaps], RATE_HZ, (1.5, 6.0))
     assert holed == pytest.approx(whole, rel=0.25)
+
+
+@pytest.mark.parametrize("period_s", [5.0, 5.01, 5.3])
+def test_a_motion_that_repeats_without_noise_has_none_beside_a_gap_either(period_s):
+    """Where a period is no whole number of blocks, the later one is interpolated: not across a gap,
+    and not from a block that is not usable."""
+    time = np.arange(0.0, 20.0, 0.025)
+    time = time[(time < 7.0) | (time > 9.0)]
+    usable = np.ones((len(time), 1), bool)
+    usable[(time > 14.0) & (time < 14.1)] = False
+    residual = np.where(usable, 2.0 * np.sin(2.0 * np.pi * time / period_s)[:, np.newaxis], 50.0)
+    run = SimpleNamespace(
+        time=time,
+        usable=usable,
+        block=SimpleNamespace(decimation=5),
+        motion=SimpleNamespace(sample_rate_hz=200.0, period_s=period_s),
+    )
+    differences = scatter(run, residual)
+    assert np.isfinite(differences).sum() > 300
+    # Linear interpolation between two blocks is a little off.
+    assert np.nanmax(np.abs(differences)) < 2.0 * (2.0 * np.pi / period_s * 0.025) ** 2

@@ -63,12 +63,12 @@ def law_rows(
         chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
-    parts += [*_hums(prepared, joints), *_coarse_steps(prepared, joints)]
+    parts += [*_hums(prepared), *_coarse_steps(prepared, joints)]
     rows = [regression.project(regression.rows(columns)) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
 
-def _hums(prepared: PreparedRuns, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
+def _hums(prepared: PreparedRuns) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the columns of each joint's tones; every run has its own phases."""
     for j, lines in enumerate(prepared.lines):
         tones = np.array([line.cycles for line in lines.of_kind(Kind.TIME)])

@@ -1,7 +1,7 @@
 """Search a cause's shapes coarsely: a grid, screened at block rate in the decision band."""
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,6 @@ OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2
 """Least distance between two maxima along an oscillating parameter, in grid steps."""
-
-Fit = Callable[[Candidate], CandidateFit | None]
 
 
 def screened(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joint_units import unit_at
 from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, TURNS, Candidate
 from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
@@ -32,8 +33,8 @@ MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
 ROUNDING = 1e-5
 """Relative length below which a projected column is rounding error."""
-STIFFNESS = "N·m/rad"
-"""Unit of a shape whose effect falls as it grows."""
+STIFFNESS = {unit_at(kind, "N·m/rad") for kind in ("revolute", "prismatic")}
+"""Units of a shape whose effect falls as it grows."""
 BODY_REFITS = 2
 """Number of times that the rigid bodies of a simulated transmission are fitted again."""
 ONSETS, SWEEPS = 40, 3
@@ -251,7 +252,7 @@ class ShapeRefinement:
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         if parameter.by_factors:
             # The twist of a spring is proportional to its compliance, so the stiffness is divided.
-            value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
+            value = now / amplitude if parameter.unit in STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
         ahead = self.fit(
@@ -271,7 +272,7 @@ class ShapeRefinement:
         """Return the change of the prediction by each free shape, per unit of change, (N, d)."""
         slopes = np.zeros((len(self._measured), len(units)))
         for d, (i, unit) in enumerate(units):
-            step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
+            step = DIFFERENCE * unit_of_change(fitted.candidate, i, unit)
             moved = self._rows(fitted.candidate.moved(i, step), self._others)
             if moved is not None and moved.shape == fitted.columns.shape:
                 # Amplitudes are held: this is the slope of the prediction, per unit of change.
@@ -362,7 +363,7 @@ def log_searched(candidate: Candidate) -> float:
     return float(count)
 
 
-def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
+def unit_of_change(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
     """Return the unit of change as a difference.
 
     Parameters

@@ -82,12 +82,14 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     # Blocks are compared as they are where the period is a whole number of them.
     whole = round(shift)
     if abs(shift - whole) > 0.1:
-        # The period is no whole number of blocks: interpolate the later one.
+        # The period is no whole number of blocks: interpolate between the two blocks around it.
         later = np.column_stack(
             [np.interp(run.time + period, run.time, r, right=np.nan) for r in residual.T]
         )
-        ahead = np.clip(np.searchsorted(run.time, run.time + period), 0, len(run.time) - 1)
-        usable = run.usable & run.usable[ahead]
+        ahead = np.clip(np.searchsorted(run.time, run.time + period), 1, len(run.time) - 1)
+        # Across a gap there is nothing to interpolate.
+        joined = run.time[ahead] - run.time[ahead - 1] < 1.5 * width
+        usable = run.usable & run.usable[ahead] & run.usable[ahead - 1] & joined[:, np.newaxis]
         # Interpolation halves the later noise's variance on average, to two thirds.
         return np.where(usable, (later - residual) / np.sqrt(1 + 2 / 3), np.nan)
     ahead = np.searchsorted(run.time, run.time + period - 0.25 * width)
