@@ -63,6 +63,7 @@ def diagnose(
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
     judged = judged_fit(selected, prepared, before)
+    # An error above the noise may mean that the training runs alone show too little.
     if not data.spoilt and judged.after.leaves_more_than_noise:
         judged = _by_all_runs(data, prepared, judged, report)
     return _diagnosis(data, prepared, judged)
@@ -86,6 +87,7 @@ def _by_all_runs(
     by_all = judged_fit(searched, prepared, judged.before)
     now = by_all.selected
     if now.answer.named and by_all.predicts_better_than(judged):
+        # The causes of the training runs again are no news: their error called for this search.
         others = now.names_all and now.answer.variants != first.answer.variants
         if others or not first.shows_something:
             return by_all
@@ -106,6 +108,7 @@ def _diagnosis(data: TrainingData, prepared: PreparedRuns, judged: JudgedFit) ->
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
     parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
     drift = simulation_error(before.fit, validate, baseline)
+    # Without named causes both models are the same.
     after_drift = drift if after is before else simulation_error(after.fit, validate, baseline)
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)

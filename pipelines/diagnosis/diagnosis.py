@@ -85,6 +85,7 @@ class Diagnosis:
             return "unknown_cause"
         if not self.named:
             return "unknown_cause" if self.selected.shows_something else "nothing_missing"
+        # A finding that ends above a cause says that more is missing than what is named.
         more = any(one.level != "cause" for one in self.selected.findings)
         more |= self.selected.shows_unlisted
         return "partly_explained" if more or any(self.left_over) else "explained"
@@ -104,6 +105,7 @@ class Diagnosis:
         )
         remaining = np.maximum(after - floor, 0.0)
         was = self.before.above(self.floor)
+        # A joint that was at the floor has no systematic power; its quotient is discarded below.
         shares = remaining / np.where(was, before - floor, 1.0)
         return [float(share) if there else None for share, there in zip(shares, was, strict=True)]
 
@@ -127,6 +129,7 @@ class Diagnosis:
     @property
     def is_mostly_unexplained(self) -> bool:
         """Whether most of some joint's mean square error remains and is above the noise floor."""
+        # From twice the floor's power on, the systematic part exceeds the noise.
         return bool(np.any(self.after.errors.rms**2 > 2.0 * self.floor_rms**2))
 
     @property
@@ -146,6 +149,8 @@ class Diagnosis:
     def effect_of(self, label: str) -> Effect:
         """Return the effect of a label in the library, at its most probable shape."""
         assert self.selected.library is not None and self.selected.posterior is not None
+        # Sets are in the order of their probability, so
+        # the first with the label has the best shape.
         sets = (i for chosen in self.selected.posterior.sets for i in chosen)
         elements = self.selected.posterior.elements
         place = next(elements[i].place for i in sets if elements[i].label == label)
@@ -179,6 +184,7 @@ class Diagnosis:
         zeros = [isinstance(column.effect, ForceSensorZero) for column in columns]
         names = [c.name for c, zero in zip(columns, zeros, strict=True) if not zero]
         normal = profiled(self.uncertainty.normal, np.flatnonzero(zeros))
+        # A column that is zero in all runs has no direction.
         seen = np.flatnonzero(np.diag(normal) > 0.0)
         return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
 
@@ -194,6 +200,7 @@ class Diagnosis:
         table, geometry = self.parameters.reset_index(drop=True), self.train[0].motion.geometry
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
             own = rows.index.to_numpy()
+            # Delta method: ``slope`` carries the parameters' covariance to the least inertia.
             least, _, slope = self.baseline.machine.mechanism.least_inertia(rows["value"], geometry)
             if least < -np.sqrt(slope @ self.covariance[np.ix_(own, own)] @ slope):
                 return True

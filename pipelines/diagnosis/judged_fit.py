@@ -31,6 +31,7 @@ def baseline_alone(data: TrainingData, prepared: PreparedRuns) -> ValidationResu
     prepared : PreparedRuns
         The training runs.
     """
+    # Loads follow from values of the training runs, so that validation runs stay unseen.
     loaded = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
     return ValidationResult.of(_refinement(prepared)(()), loaded, data.baseline)
 
@@ -73,6 +74,7 @@ def judged_fit(selected: Selection, prepared: PreparedRuns, before: ValidationRe
     refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
     while True:
+        # A charge may change probabilities only, and then the fits stand.
         if selected.candidates != fitted:
             fitted = selected.candidates
             after, without = _fitted(selected, refine, prepared, before)
@@ -88,6 +90,7 @@ def judged_fit(selected: Selection, prepared: PreparedRuns, before: ValidationRe
             selected = selected.judged(shortfalls)
         else:
             break
+    # Last, because the share that a cause removes depends on the others that stay.
     selected = selected.with_look_alikes(_removed(after, without))
     if selected.candidates != fitted:
         after, without = _fitted(selected, refine, prepared, before)
@@ -126,6 +129,7 @@ def _shortfalls(
         for variant, rival in rivals.items():
             fitted = ValidationResult.of(refine((*rest, rival)), before.runs, prepared.baseline)
             likelihoods[variant] = log_likelihoods(fitted, noise)
+        # Twice a log likelihood ratio is the explained square in units of the noise.
         explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
         weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
         scores = {
@@ -133,6 +137,7 @@ def _shortfalls(
         }
         for variant, score in scores.items():
             shortfall = score - max(scores.values())
+            # A variant may be a tie of two causes; its better comparison counts.
             shortfalls[variant] = max(shortfalls.get(variant, -np.inf), shortfall)
     return shortfalls
 
@@ -146,6 +151,7 @@ def _fitted(
         return before, {}
     baseline = prepared.baseline
     after = ValidationResult.of(refine(candidates), before.runs, baseline)
+    # One cause less one is the baseline, which is fitted already.
     if len(candidates) == 1:
         return after, {candidates[0].label: before}
     without = without_each(after.fit, prepared.runs, before.runs, baseline, prepared.weights)

@@ -67,6 +67,7 @@ def meanings() -> dict[str, str]:
 
 def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
     """Yield each statement with the string below it, empty without one."""
+    # The added statement gives the last one a successor.
     for statement, below in pairwise([*body, ast.Pass()]):
         meaning = below.value if isinstance(below, ast.Expr) else None
         yield (
@@ -111,6 +112,7 @@ def _assigned(statement: ast.stmt) -> list[str]:
 
 def _is_number(value: Any) -> bool:
     values = value if isinstance(value, tuple) else (value,)
+    # In Python a bool is an int, and no number here.
     return bool(values) and all(
         isinstance(v, int | float) and not isinstance(v, bool) for v in values
     )

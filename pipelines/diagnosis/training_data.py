@@ -66,10 +66,12 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     valid = [downsampled(motion) for motion in excluding(motions, faults) if motion.valid.any()]
     _refuse_missing_purpose(valid)
     runs = [observe(motion) for motion in valid]
+    # Training runs alone decide, as no fit may depend on validation runs.
     noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
     if noisy:
         runs = [observe(motion, CUTOFF_HZ) for motion in valid]
     train, validate = (_of(runs, purpose) for purpose in WHY)
+    # A spoilt session gets a verdict on its faults instead of an error about its noise.
     if not any(fault.spoils for fault in faults):
         _refuse_unknown_noise(validate, faults)
     baseline = baseline_of(train, effects)
@@ -107,6 +109,7 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
 def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> None:
     """Raise InputError where too little of the validation runs is usable to estimate the noise."""
     joints = validate[0].motion.joints
+    # The torque stands for the residual here: only whether blocks suffice matters.
     floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
     for j, joint in enumerate(joints):
         if not np.isfinite(floor[j]):

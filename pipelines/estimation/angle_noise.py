@@ -38,6 +38,7 @@ def is_loud(runs: Sequence[Run]) -> bool:
     """
     effects = baseline(runs[0].machine, kinds_of(runs))
     model, layout = Model.of(effects), ParameterLayout.of(effects)
+    # Noise of the angles enters through the acceleration, which only the bodies' columns hold.
     body = layout.bodies.ravel()
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):
@@ -54,6 +55,7 @@ def _beginning(run: Run) -> Iterator[Piece]:
     # with time.
     looked_s = 600.0
     rate, seen = run.sample_rate_hz, 0
+    # The margin covers the low-pass, the padding of reversals, and a block that ends outside.
     for piece in run.pieces(edge(rate, CUTOFF_HZ) + padding(run) + block_average(run).decimation):
         yield piece
         seen += piece.core.stop - piece.core.start
@@ -68,12 +70,15 @@ def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
     """
     fast = regress(piece, model)
     slow = regress(piece._replace(motion=below(piece.motion, CUTOFF_HZ)), model)
+    # The slow motion is invalid near gaps, where the low-pass lacks one side.
     usable = fast.usable & slow.valid[:, np.newaxis]
     extra = (fast.regressor - slow.regressor)[..., body]
     rows = (
+        # The unfiltered torque serves both parts: the products with fast columns use its fast part.
         np.concatenate([slow.regressor, extra, fast.torque[..., np.newaxis]], axis=2)
         * usable[..., np.newaxis]
     )
+    # Products add up over pieces, so that a long run needs no more memory.
     return np.einsum("mji,mjk->jik", rows, rows)
 
 
@@ -87,14 +92,19 @@ def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
     loud = 1.0
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]
+    # Joints count by the inverse power of their torque, as their noise is not known yet.
     # A joint whose torque is always zero has no weight here; the fit itself refuses it.
     weights = np.divide(1.0, torque, out=np.zeros_like(torque), where=torque > 0.0)
     normal, right = np.einsum("j,jik->ik", weights, slow), weights @ gram[:, :p, -1]
+    # Units differ by orders of magnitude, so columns are scaled before the solve.
     size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     values = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=None)[0] / size
     inertial = values[body]
+    # Power of the torque that the fast part requires, and its product with the measured residual.
+    # The second equals the first if the fast part is motion, and is zero if it is noise.
     power = np.einsum("i,jik,k->j", inertial, fast, inertial)
     measured = (gram[:, p:-1, -1] - gram[:, p:-1, :p] @ values) @ inertial
+    # The residual's square from products alone: |b|² - 2 b'A v + v'A'A v.
     residual = (
         torque - 2.0 * gram[:, :p, -1] @ values + np.einsum("i,jik,k->j", values, slow, values)
     )

@@ -35,6 +35,7 @@ def profiled(gram: NDArray, others: NDArray) -> NDArray:
     (p - k, p - k) array
     """
     kept = np.setdiff1d(np.arange(len(gram)), others)
+    # The other parameters may be collinear among themselves, hence the pseudoinverse.
     across = gram[np.ix_(kept, others)]
     return np.asarray(
         gram[np.ix_(kept, kept)] - across @ np.linalg.pinv(gram[np.ix_(others, others)]) @ across.T
@@ -54,13 +55,16 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     # Condition indices at which Belsley calls a dependence weak, and strong.
     weak, strong = 10.0, 30.0
     eigenvalues, vectors = np.linalg.eigh(_scaled_gram(gram))
+    # Rounding can make the least eigenvalue negative, which has no condition index.
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
     index = np.sqrt(eigenvalues[-1] / eigenvalues)
+    # Parameter i has this part of its variance from direction k, in units of the noise.
     variance = vectors**2 / eigenvalues
     shares = variance / variance.sum(axis=1, keepdims=True)
     sentences = []
     for k in np.flatnonzero(index > weak):
         involved = [name for name, share in zip(names, shares[:, k], strict=True) if share > SHARE]
+        # A dependence harms only where it involves two parameters or more (Belsley's rule).
         if len(involved) > 1:
             how = "hardly separates" if index[k] > strong else "separates only weakly"
             sentences.append(
@@ -86,6 +90,7 @@ def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
         Those with at least 0.3 of the largest weight, that one first.
     """
     _, vectors = np.linalg.eigh(scaled)
+    # Eigenvalues rise, so the first vector is the combination that the data determine least.
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
 

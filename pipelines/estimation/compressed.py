@@ -71,11 +71,13 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
     triangles: list[NDArray] = []
     count: NDArray | int = 0
     for r in regressions:
+        # With the torque as last column the triangle also holds the residual of every fit.
         rows = np.concatenate([r.regressor, r.torque[:, :, np.newaxis]], axis=2)
         triangles = triangles or [np.zeros((0, rows.shape[2]))] * rows.shape[1]
         for j, triangle in enumerate(triangles):
             # The old triangle with new rows has the same R as all rows together (Demmel et al.,
             # 2012).
+            # scipy fills the rows below the triangle with zeros; they are cut off.
             triangles[j] = qr(np.concatenate([triangle, rows[r.usable[:, j], j]]), mode="r")[0][
                 : rows.shape[2]
             ]
@@ -138,4 +140,5 @@ def residual_rms(rows: Compressed, values: NDArray) -> NDArray:
         Parameters.
     """
     residual = rows.torque - rows.regressor @ values
+    # Compression keeps the sum of squares, so the mean is over the number of original rows.
     return np.sqrt(np.sum(residual**2, axis=1) / np.maximum(rows.count, 1))

@@ -82,6 +82,7 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
 
     def influences() -> Iterator[tuple[Hashable, NDArray]]:
         for (name, ours), (_, theirs) in zip(one.scores(), other.scores(), strict=True):
+            # Each block's influence on the difference: noise that both fits share cancels.
             yield name, ours @ one.sensitivity.T - theirs @ other.sensitivity.T
 
     difference = one.values - other.values
@@ -95,6 +96,7 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     )
     k = int(informed.sum())
     # With an estimated covariance the statistic is Hotelling's T², which this turns into F.
+    # A very long lag leaves fewer degrees of freedom than combinations; F needs at least one.
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
     return DurbinWuHausman(

@@ -115,5 +115,6 @@ def carry_of(problem: Problem, sensitivity: NDArray, slope: NDArray) -> NDArray:
         Zero for the fitted columns.
     """
     carry = np.zeros_like(slope)
+    # The scores still sum to zero when a held value moves: the implicit function theorem.
     carry[:, problem.of_held] = -sensitivity @ slope[:, problem.of_held]
     return carry

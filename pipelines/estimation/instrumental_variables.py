@@ -59,9 +59,11 @@ class InstrumentalVariables(Estimator):
         measured = [r for _, r in problem.regressions()]
         values, weights = start.values, start.weights
         for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+            # A model that cannot exist cannot be simulated, but the nearest that can.
             rows = _rows(problem, measured, nearest(problem, values, start.normal))
             solution = _solved(problem, rows, weights)
             weights = _weights(problem, rows, solution.values)
+            # In standard errors of independent blocks, because units differ between parameters.
             change = np.abs(solution.values - values) / np.sqrt(
                 np.diag(solution.sensitivity @ solution.normal @ solution.sensitivity.T)
             )
@@ -94,8 +96,11 @@ class _Rows:
 def _rows(problem: Problem, measured: Sequence[Regression], values: NDArray) -> list[_Rows]:
     training, every, rows = problem.training, problem.completed(values), []
     for (_, run), r in zip(problem.runs, measured, strict=True):
+        # The loop follows the set-points, so it has the excitation and not the noise.
         moved = closed_loop(training.model_of(run, every), run.whole())
+        # Loads are computed again: those of the measured motion hold the noise of its angles.
         (simulated,) = training.regressions(training.loaded(moved))
+        # The simulated joint reverses at other instants than the measured one, so both are masked.
         rows.append(_Rows(r, simulated.regressor, r.usable & simulated.usable))
     return rows
 
@@ -104,12 +109,15 @@ def _solved(problem: Problem, rows: Sequence[_Rows], weights: NDArray) -> Fit:
     k, p = len(problem.fitted), len(problem.held)
     slope, normal, right = np.zeros((k, p)), np.zeros((k, k)), np.zeros(k)
     for r in rows:
+        # The equations are Z'W (tau - X theta) = 0. ``slope`` is Z'WX, and Z'WZ shows which
+        # parameters the instruments separate.
         Z = r.instruments[:, :, problem.fitted]
         W = r.usable * weights
         slope += np.einsum("mj,mjk,mjp->kp", W, Z, r.measured.regressor, optimize=True)
         normal += np.einsum("mj,mjk,mjl->kl", W, Z, Z, optimize=True)
         right += np.einsum("mj,mjk,mj->k", W, Z, r.measured.torque, optimize=True)
     inverse(normal, problem.names)  # Raises if the instruments do not separate the parameters.
+    # ``inverse`` is for symmetric matrices, and Z'WX is not symmetric.
     sensitivity = np.linalg.inv(slope[:, problem.fitted])
     held = problem.of_held
     values = sensitivity @ (right - slope[:, held] @ problem.held[held])
@@ -137,6 +145,7 @@ def _scores(problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: N
 
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:
         for (number, _), r in zip(problem.runs, rows, strict=True):
+            # Rows near reversals count zero and are kept, so that a lag stays a time.
             pull = np.where(r.usable, residual_of(r.measured, every), 0.0) * weights
             scores = np.einsum("mj,mjk->mk", pull, r.instruments[:, :, problem.fitted])
             for segment, part in by_segment(r.measured.segment, scores):

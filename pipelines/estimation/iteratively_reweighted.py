@@ -88,12 +88,16 @@ class IterativelyReweighted(Estimator):
             ``rejected_share`` by joint.
         """
         start = WeightedLeastSquares().fit(problem)
+        # The root of the inverse weights is the rms residual of each joint: a first scale.
         scale = _sums(problem, start.values, start.weights**-0.5, Huber).scale
+        # Huber's loss is convex, so its fit does not depend on the start; the bisquare's does.
         first = _iterated(problem, start.values, scale, Huber)
         second = _iterated(problem, first.values, first.scale, Bisquare)
         values, scale, settled = second.values, first.scale, first.settled and second.settled
         sums = _sums(problem, values, scale, Bisquare)
         free = np.ix_(problem.fitted, problem.fitted)
+        # A score's derivative has the loss's slope, which is less than the weight of a large
+        # residual. With weights instead, intervals come out too narrow.
         sensitivity = inverse(sums.slope[free], problem.names)
         joints = problem.runs[0][1].joints
         shares = dict(zip(joints, sums.rejected.tolist(), strict=True))
@@ -148,6 +152,7 @@ def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> 
         values = sensitivity @ (
             sums.right[free] - sums.normal[np.ix_(free, held)] @ problem.held[held]
         )
+        # The bisquare keeps the robust scale of the first stage, as in Yohai's MM-estimate.
         if loss is Huber:
             scale = sums.scale
         if np.all(np.abs(values - before) < settled * np.sqrt(np.diag(sensitivity))):
@@ -161,6 +166,7 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
     every, p = problem.completed(values), len(problem.held)
     normal, slope, right = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     sizes: list[list[NDArray]] = [[] for _ in scale]
+    # Weights of single rows need all rows again in each pass: compressed rows do not suffice.
     for _, r in problem.regressions():
         residual = residual_of(r, every)
         u = residual / scale
@@ -169,6 +175,7 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         normal += np.einsum("mj,mjp,mjq->pq", weights, r.regressor, r.regressor, optimize=True)
         slope += np.einsum("mj,mjp,mjq->pq", slopes, r.regressor, r.regressor, optimize=True)
         right += np.einsum("mj,mjp,mj->p", weights, r.regressor, r.torque, optimize=True)
+        # A median needs all residuals at once, so sizes are kept and sums are not enough.
         for j, size in enumerate(sizes):
             size.append(np.abs(residual[r.usable[:, j], j]))
     residuals = [np.concatenate(size) for size in sizes]

@@ -45,11 +45,13 @@ class WeightedLeastSquares(Estimator):
             ``about`` holds ``joint_weights_1_nm2``: J inverse variances, 1/(N·m)².
         """
         rows = problem.rows
+        # Held parameters act through their torque alone: friction, in the step of the wearer.
         free = rows.with_held(problem.of_held, problem.held[problem.of_held]).select(problem.fitted)
         weights = self._weights(free, problem.names)
         normal, right = normal_equations(free, weights)
         sensitivity = inverse(normal, problem.names)
         values = sensitivity @ right
+        # The carry needs the scores' derivative by held columns too.
         slope = normal_equations(rows, weights)[0][problem.fitted]
         return Fit(
             values,
@@ -62,6 +64,7 @@ class WeightedLeastSquares(Estimator):
         )
 
     def _weights(self, rows: Compressed, names: list[str]) -> NDArray:
+        # Feasible generalised least squares, which begins with equal weights.
         weights = np.ones(len(rows.count))
         for _ in range(self.passes):
             normal, right = normal_equations(rows, weights)
@@ -100,6 +103,7 @@ def _scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
 
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:
         for number, r in problem.regressions():
+            # Rows near reversals count zero and are kept, so that a lag stays a time.
             residual = np.where(r.usable, residual_of(r, every), 0.0)
             scores = np.einsum("mj,mjk,j->mk", residual, r.regressor[:, :, problem.fitted], weights)
             for segment, rows in by_segment(r.segment, scores):

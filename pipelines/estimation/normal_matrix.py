@@ -37,8 +37,10 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
             f"the motion does not excite {', '.join(silent)}: their columns are zero at every"
             " usable sample. Move every joint in both directions, faster than it sticks"
         )
+    # Parameters have different units, so only unit columns have a meaningful condition number.
     scaled = gram / np.outer(size, size)
     eigenvalues = np.linalg.eigvalsh(scaled)
+    # The normal matrix has the square of the regressor's condition number, hence the root.
     if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > singular:
         mixed = worst_direction(scaled, names)
         raise NotIdentifiable(

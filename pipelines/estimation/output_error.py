@@ -58,6 +58,7 @@ class OutputError(Estimator):
         # Step of each value: a standard error if it is fitted, a fiftieth of itself if it is held.
         size = np.abs(problem.held) / 50.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
+        # A search can only start from a model that can be simulated.
         values = nearest(problem, start.values, start.normal)
         simulations = 0
         for _ in range(PASSES):
@@ -75,6 +76,7 @@ def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
     """Return the simulation's angle error, (windows, samples, J) for each run."""
     model_of = problem.training.model_of
     return [
+        # Windows follow each other without overlap, so that each sample counts once.
         replay(model_of(run, every), run.whole(), WINDOW_S, WINDOW_S).error
         for _, run in problem.runs
     ]
@@ -87,8 +89,10 @@ def _slopes(
     at = _errors(problem, every)
     slopes = [np.zeros((*error.shape, len(columns))) for error in at]
     for place, column in enumerate(columns):
+        # A held value of zero has no scale for a step, and keeps a slope of zero.
         if size[column] > 0.0:
             moved = every.copy()
+            # Forward differences cost one simulation a column, central ones two.
             moved[column] += STEP * size[column]
             for slope, now, ahead in zip(slopes, at, _errors(problem, moved), strict=True):
                 slope[..., place] = (ahead - now) / (STEP * size[column])
@@ -122,7 +126,9 @@ def _searched(
     rests = 0.01
     # Angle error within a window, rad (m), above which no such machine can exist.
     ran_away = 10.0
+    # Steps are in standard errors of the start: a trust region needs comparable units.
     unit, root = size[problem.fitted], np.sqrt(weights)
+    # A simulation that fails returns nothing, so the number of its residuals is counted before.
     outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
 
     def completed(step: NDArray) -> NDArray:
@@ -148,6 +154,7 @@ def _searched(
         k = len(problem.fitted)
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
+    # The gradient grows with the number of residuals, so it is no test of convergence.
     solution = least_squares(
         residual, np.zeros(len(unit)), jacobian, method="trf", xtol=rests, ftol=settled, gtol=None
     )
@@ -161,7 +168,9 @@ def _searched(
 def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> Fit:
     every = problem.completed(values)
     errors = _errors(problem, every)
+    # All columns, held ones too, because the carry needs their slopes.
     slopes = _slopes(problem, every, range(len(every)), size)
+    # Gauss-Newton: second derivatives are neglected, as the residual is small.
     slope = sum(
         np.einsum("j,wnjk,wnjp->kp", weights, s[..., problem.fitted], s, optimize=True)
         for s in slopes
@@ -194,6 +203,7 @@ def _window_scores(
     - G H⁻¹)⁻¹ times as large, where G is its part of the normal matrix (CR3 of Bell and McCaffrey,
     2002, Survey Methodology 28(2)).
     """
+    # The error is measured less simulated, and ``slopes`` are its derivatives: hence the sign.
     scores = -np.einsum("j,wnjk,wnj->wk", weights, slopes, errors, optimize=True)
     parts = np.einsum("j,wnjk,wnjl->wkl", weights, slopes, slopes, optimize=True)
     return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[

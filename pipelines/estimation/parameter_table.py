@@ -48,6 +48,7 @@ def rows_of(
         Parameters of a cause that is present. The interval of one that is never negative, such as a
         play or a stiffness, ends at zero.
     """
+    # Chain rule from fitted to physical values.
     of_rows = effect.jacobian(values)[:, : len(slopes)] @ slopes
     rows = zip(effect.parameters, effect.physical(values), of_rows, strict=True)
     return [
@@ -107,6 +108,7 @@ def interval(value: NDArray, half: NDArray, one_way: NDArray) -> NDArray:
         Lower and upper end, in the unit of the value.
     """
     low = value - half
+    # An interval contains its value, even one below zero that should be positive.
     return np.stack(
         [np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1
     )

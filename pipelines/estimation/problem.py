@@ -94,6 +94,7 @@ class Training:
         Term or None
             None if the term is absent in the run.
         """
+        # A per-run shape, such as an onset, is the run's own; amplitudes come from the columns.
         own = self._terms_of(run)[term]
         if own is None:
             return None
@@ -132,6 +133,7 @@ class Training:
             By kind of run: two arrays (k,) of body values, as `Run.loaded` takes them.
         """
         training = replace(self, bodies=bodies)
+        # Two steps, because ``loaded`` reads the bodies that were set.
         return replace(training, runs=tuple(training.loaded(run) for run in self.runs))
 
     def regressions(self, run: Run) -> Iterator[Regression]:
@@ -150,10 +152,13 @@ class Training:
         """
         number = self._number_of(run)
         present = [i for i, term in enumerate(self._terms_of(run)) if term is not None]
+        # Columns do not depend on the amplitudes, so these are zero.
         model = self.model_of(run, np.zeros(self.layout.size))
         for r in regressions(run, model, self.cutoff_hz):
+            # A per-run parameter has a column for each run, with zeros in the rows of all others.
             r = replace(r, regressor=self.layout.expand(r.regressor, number, present))
             yield (
+                # A sample is valid at all joints or none; only reversals are each joint's own.
                 replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
                 if self.reversals
                 else r
@@ -196,6 +201,7 @@ class Problem:
     @property
     def names(self) -> list[str]:
         """Names of the fitted parameters in messages."""
+        # A per-run parameter has a column for each run, so its name needs the run's file.
         runs, columns = self.training.runs, self.training.layout.columns
         return [
             column.name if column.run is None else f"{column.name} of {runs[column.run].file}"

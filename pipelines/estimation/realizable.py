@@ -98,7 +98,9 @@ def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
     bounds = np.concatenate([bound for _, bound in blocks])
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    # Clarabel reads the upper triangle. The free fit is the minimum: no linear term.
     quadratic = csc_matrix(np.triu(normal * np.outer(size, size)))
+    # Clarabel's form is A x + s = b with s in the cone, so A is the negative slope.
     solution = clarabel.DefaultSolver(
         quadratic, np.zeros(len(values)), csc_matrix(-rows), bounds, list(cones), settings
     ).solve()
@@ -120,6 +122,8 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
     """
     every = problem.completed(values)
     for form in _inertia_forms(problem):
+        # Semidefinite if and only if the least eigenvalue is at least this share of the trace. The
+        # bound stays linear in the parameters, as the program requires.
         leading = form - MARGIN * np.trace(form, axis1=1, axis2=2)[
             :, np.newaxis, np.newaxis
         ] * np.eye(form.shape[1])
@@ -143,6 +147,7 @@ def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
     forms = run.machine.mechanism.inertia_forms(run.geometry)
     layout, fitted = problem.training.layout, set(problem.fitted)
     for places in layout.bodies:
+        # A body that is held cannot be moved back, so it is no constraint.
         if fitted & set(places):
             form = np.zeros((layout.size, *forms.shape[1:]))
             form[places] = forms

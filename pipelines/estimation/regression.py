@@ -102,6 +102,7 @@ def block_average(motion: Run) -> BlockAverage:
         )
     if "decimation" in chosen:
         return BlockAverage(int(chosen["decimation"]))
+    # Blocks of 25 ms lose half the power at 17.7 Hz, well above a leg's motion.
     return BlockAverage.lasting(0.025, motion.sample_rate_hz)
 
 
@@ -143,6 +144,7 @@ def away_from_reversals(motion: Motion) -> NDArray:
         False within ``REVERSAL_PADDING_S`` of a speed below the joint's ``reversal_speeds``.
     """
     slow = np.abs(motion.dq) < reversal_speeds(motion.machine)
+    # A joint that stuck starts with a transient that no column describes, hence the padding.
     return ~np.column_stack([dilate(column, padding(motion)) for column in slow.T])
 
 
@@ -184,6 +186,7 @@ def turns(motion: Motion) -> NDArray:
         False at the first sample.
     """
     turned = np.zeros(motion.dq.shape, dtype=bool)
+    # A difference of bools is true where neighbours differ.
     turned[1:] = np.diff(motion.dq > 0, axis=0)
     return turned
 
@@ -206,6 +209,7 @@ def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Itera
         Block means of one piece.
     """
     reach = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
+    # A block may end beyond the core, and the mask and the low-pass look beyond it as well.
     for piece in run.pieces(block_average(run).decimation + padding(run) + reach):
         yield regress(piece, model, cutoff_hz)
 
@@ -235,6 +239,7 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
     starts = starts[(starts >= core.start) & (starts < core.stop)]
     regressor, torque, trusted = model.regressor(motion), motion.torque, motion.valid
     if cutoff_hz:
+        # A single NaN would spread over its whole stretch in the recursive filter.
         regressor, torque = (
             filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque)
         )

@@ -49,7 +49,9 @@ class Summary:
                 [piece[joint.column(quantity)].to_numpy() for joint in self._joints]
             )[valid]
 
+        # A well-chosen cut-off removes noise only, so the difference measures the encoder.
         self._noise.add(stacked("angle_measured") - stacked("angle"))
+        # Not every drive reports a velocity of its own.
         if {joint.column("velocity_measured") for joint in self._joints} <= set(piece.column_names):
             self._velocity.add(stacked("velocity_measured") - stacked("velocity"))
 
@@ -77,6 +79,7 @@ class _MeanSquare:
         self._total = np.zeros(columns)
 
     def add(self, x: NDArray) -> None:
+        # Missing readings are NaN and must not count as zero; one drive may miss what another has.
         self.count += np.sum(~np.isnan(x), axis=0)
         self._total += np.nansum(x**2, axis=0)
 

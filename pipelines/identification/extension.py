@@ -66,10 +66,12 @@ class Extension:
             else:
                 more.append(term)
         added = sum(len(term.shape) for term in more)
+        # Chosen effects are the same in every run, so each run's own terms get them unchanged.
         own = {file: (*own, *more) for file, own in self.own.items()}
         return replace(
             self,
             terms=(*self.terms, *more),
+            # Shapes of the added effects are defaults and no estimates, so they count as exact.
             shape_covariance=np.pad(self.covariance, (0, added)),
             own=own,
             remarks=tuple(remarks),
@@ -99,6 +101,7 @@ def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
     """
     for effect in (term.effect for term in terms if term.effect.needs_temperature):
         for run in (run for run in runs if effect.acts(run.run)):
+            # A column is in all of a file or in none, so one piece decides.
             first = next(iter(run.pieces(0))).motion
             if effect.explains(first):
                 continue
@@ -138,6 +141,7 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
         others = terms_next_to_bodies(table.frame, runs[0].machine)
     causes = [one for one in others if one[0].effect.name not in BASELINE]
     absent = [term for term, _ in causes if not any(term.effect.acts(kind) for kind in kinds)]
+    # Compared by identity, because terms hold arrays, which have no truth value when compared.
     acting = [(term, rows) for term, rows in causes if all(term is not one for one in absent)]
     remarks = [
         f"{term.effect.label} is left out: it acts in none of these training runs"
@@ -145,6 +149,7 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     ]
     terms = tuple(term for term, _ in acting)
     own, hashes = {}, {}
+    # A run may have another name than in the diagnosis, so the hash of its recording identifies it.
     if any(term.effect.per_run for term in terms):
         for run, path in zip(runs, recordings, strict=True):
             sha256 = recording_behind(path)
@@ -168,6 +173,7 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
             f"{table.path}: is of a {mechanism} with the joints {', '.join(of_table)}, the runs are"
             f" of a {run.machine.mechanism.name} with {', '.join(of_runs)}; {remedy}"
         )
+    # Inertial parameters contain the lengths: with another thigh they describe another leg.
     geometry = table.metadata.get("geometry") or {}
     for name, length in run.machine.metadata(run.geometry).items():
         if not np.isclose(geometry.get(name, length), length):
@@ -199,10 +205,13 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
     stated = table.metadata.get("covariance")
     error = table.frame["std_error"].to_numpy(float)
     whole = np.diag(error**2) if stated is None else np.array(stated, dtype=float)
+    # NaN marks a held value whose error is unknown; it counts as exact.
     covariance = np.nan_to_num(whole)
     maps = [np.zeros((0, len(covariance)))]
     for term, rows in terms:
         effect, place = term.effect, dict(zip(rows["name"], rows.index, strict=True))
+        # The table has physical values; the pseudoinverse
+        # leads back to fitted ones, whose shapes are last.
         back = np.linalg.pinv(effect.jacobian(term.values))[len(effect.linear) :]
         onto = np.zeros((len(back), len(covariance)))
         for i, parameter in enumerate(effect.parameters):
@@ -216,6 +225,7 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
 def _critical(table: Table) -> float:
     """Return the half-width of the table's intervals in standard errors."""
     frame = table.frame
+    # The upper half only: the lower one may end at zero.
     widths = (frame["ci95_high"] - frame["value"]) / frame["std_error"]
     width = widths.replace([np.inf, 0.0], np.nan).median()
     return float(width) if np.isfinite(width) else 1.96

@@ -38,14 +38,17 @@ class _RunData:
 
     def add(self, frame: pd.DataFrame, columns: Sequence[str]) -> None:
         scored = frame[frame["scored"]]
+        # The RMSE in a title is that of all rows, not of the rows that are drawn.
         self.scored += len(scored)
         for name in columns:
             self.squares[name] = self.squares.get(name, 0.0) + float(np.sum(scored[name] ** 2))
+        # The first row of a piece completes the step that the piece before began.
         chosen = frame.iloc[-self.passed % self.every :: self.every]
         if len(self.frame):
             chosen = pd.concat([self.frame, chosen], ignore_index=True)
         self.frame = chosen
         self.passed += len(frame)
+        # Every second row is dropped, so that those that stay are evenly spaced.
         while len(self.frame) > MOST:
             self.frame = self.frame.iloc[::2].reset_index(drop=True)
             self.every *= 2
@@ -137,6 +140,7 @@ def _residual_over(
 ) -> None:
     residual, scored = frame[joint.column("residual")].to_numpy(), frame["scored"].to_numpy()
     if not dots:
+        # NaN breaks the line near reversals, where sticking joints would set the scale.
         axis.plot(x, np.where(scored, residual, np.nan), color=RESIDUAL, lw=0.7)
         return
     left_out, label = ~scored, "near a reversal"

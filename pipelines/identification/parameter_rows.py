@@ -28,11 +28,13 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
     """
     terms = list(_sloped(training, values))
     bodies = [one for one in terms if isinstance(one[0].effect, RigidBody)]
+    # The layout has the machine's body first.
     machine, *wearer = bodies
     yield from _of_body([machine], "exo_alone", "friction")
     for term, slope in terms:
         if isinstance(term.effect, Friction):
             yield from rows_of(term.effect, term.values, slope, "friction")
+    # Machine and wearer move together, so the parameters of both bodies add up.
     if wearer:
         yield from _of_body(bodies, "with_human", "inertia")
         yield from _of_body(wearer, "human", "inertia")
@@ -45,10 +47,12 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
 def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray]]:
     """Yield each term with the first training run's values, and their slopes (v, p + s)."""
     layout = training.layout
+    # Each fitted column, then each shape, has a slope of one along itself.
     units = np.eye(layout.shapes(len(layout.terms) - 1).stop)
     for number, term in enumerate(training.model):
         columns = layout.terms[number]
         slopes = np.zeros((len(term.linear), len(units)))
+        # A term that acts in no training run keeps the values it came with, without slope.
         if columns.runs:
             first = columns.runs[0]
             slopes = units[columns.places(first)]

@@ -144,6 +144,7 @@ def identify(
     loud = is_loud(runs.of("train"))
     refuse_unread(extension.terms, [*runs.of("train"), *runs.of("validate")])
     training, has_converged = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
+    # Torques that depend on load need it in validation runs too, from the fitted bodies.
     judged = [training.loaded(run) for run in runs.of("validate")]
     steps = {
         kind: Step(one.problem, estimated(one.fit))
@@ -153,8 +154,10 @@ def identify(
     table_rows = list(rows(training, values))
     covariance = _covariance(table_rows, steps, extension, training)
     error = np.sqrt(np.diag(covariance))
+    # A held value has an error of zero here because its error is unknown, not because it is exact.
     known_error = np.where(error > 0.0, error, np.nan)
     table = table_of(table_rows, known_error, _critical(table_rows, steps, extension))
+    # One fit of all columns is the check: friction that changes with a wearer shows there.
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
@@ -200,6 +203,7 @@ def _training(
     train = tuple(run.whole() for run in train)
     training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
     bodies = extension.bodies
+    # Loads need bodies before the first fit; those of the plain model start the iteration.
     if not set(_body_keys(training)) <= set(bodies):
         alone = Training(train, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
@@ -228,6 +232,7 @@ def _with_consistent_loads(
     for _ in range(ROUNDS):
         now = dict(zip(kinds, np.split(values, sizes), strict=True))
         training = training.with_bodies(
+            # All bodies are behind the drives, but inside the cuffs is the wearer's limb alone.
             {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
         )
         fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
@@ -235,9 +240,12 @@ def _with_consistent_loads(
         if np.all(np.abs(step) < tolerance * np.abs(values)):
             return training, True
         growth = 0.0
+        # If the map has slope g, a step of length l leaves 1 - l (1 - g) of the residual. The ratio
+        # of two residuals gives g, and 1 / (1 - g) is the length to the fixed point.
         if last_step is not None:
             ratio = float(step @ last_step / (last_step @ last_step))
             growth = ratio / last_length + 1.0 - 1.0 / last_length
+        # Two steps determine the slope roughly, so the length stays between a quarter and two.
         last_length = 1.0 / (1.0 - np.clip(growth, -3.0, 0.5))
         last_step = step
         values = values + last_length * step
@@ -270,6 +278,7 @@ class Step(Generic[FitT]):
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
     """Fit the parameters of the empty exoskeleton, then, with these fixed, the human's."""
     empty = training.layout.acting_in("exo_alone")
+    # The wearer's columns are zero in runs without one, so that any values of them serve step 1.
     values = np.zeros(len(empty))
     steps = {}
     for kind in training.kinds:
@@ -330,7 +339,9 @@ def _sensitivity(
         return np.zeros(training.layout.size)
     now = abs(training.model.terms[term].shape[shape])
     # An uncertain backlash or stiffness must stay positive.
+    # The step is a part of the error, over which the fit must be linear for the interval to hold.
     step = min(STEP * error, 0.5 * now or np.inf)
+    # Two fits for each shape cost too much with a method that simulates, so all use least squares.
     ahead, behind = (
         _values(_in_steps(training.reshaped(term, shape, moved, files), WeightedLeastSquares()))
         for moved in (step, -step)
@@ -353,12 +364,14 @@ def _covariance(
     p, h = to_shapes.shape
     of_linear = np.zeros((p, p))
     for step in steps.values():
+        # Fitted values move with those that are held, whose covariance is carried on to them.
         onto = np.eye(p)[step.problem.fitted]
         carried = np.eye(p) + onto.T @ step.fit.carry
         of_linear = carried @ of_linear @ carried.T + onto.T @ step.fit.covariance @ onto
     through = np.vstack([to_shapes, np.eye(h)])
     covariance = through @ of_shapes @ through.T
     covariance[:p, :p] += of_linear
+    # Rows know the shapes of the first run only; those of other runs are last, and end here.
     size = len(rows[0].slope)
     slopes = np.array([row.slope for row in rows])
     return slopes @ covariance[:size, :size] @ slopes.T
@@ -380,6 +393,7 @@ def _critical(
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
+    # Friction that is negative within its interval may be noise.
     driving = table[(table["effect"] == Friction.name) & (table["ci95_high"] < 0.0)]
     return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
         f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']}"

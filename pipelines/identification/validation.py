@@ -110,6 +110,7 @@ class _Sums:
     def of(cls, r: Regression, residual: NDArray) -> "_Sums":
         squares = residual**2
         return cls(
+            # All joints count on the same blocks, so that their errors are comparable.
             residual=squares[r.scored].sum(axis=0),
             torque=np.sum(r.torque[r.scored] ** 2, axis=0),
             scored=int(r.scored.sum()),

@@ -32,6 +32,7 @@ def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArra
     sums = np.array(
         [np.bincount(number[inside], weights, BINS) for weights in (None, x[inside], y[inside])]
     )
+    # A mean of few values is mostly noise, so sparse bins are joined.
     enough = max(FEWEST, inside.sum() / (2 * BINS))
     joined: list[NDArray] = [np.zeros(3)]
     for bin_sums in sums.T:
@@ -43,4 +44,5 @@ def binned_mean(x: NDArray, y: NDArray, low: float, high: float) -> tuple[NDArra
         if joined:
             joined[-1] = joined[-1] + rest
     count, of_x, of_y = np.array(joined).reshape(-1, 3).T
+    # The mean of x and not a bin's middle: values may crowd at one end of a joined bin.
     return of_x / count, of_y / count

@@ -73,8 +73,10 @@ class BlockAverage:
         (blocks,) array
             Indices of samples.
         """
+        # The prepended number differs from the first, so that sample 0 begins a segment.
         first = np.flatnonzero(np.diff(segment, prepend=segment[0] - 1))
         last = np.append(first[1:], len(segment))
+        # Blocks continue those of the piece before, as if the run were in one piece.
         first[0] = -before % self.decimation
         width = self.decimation
         return np.concatenate(
@@ -98,6 +100,7 @@ class BlockAverage:
         """
         if self.decimation == 1:
             return x[starts]
+        # A loop needs memory for one array of means; to gather all samples at once takes far more.
         total = np.zeros((len(starts), *x.shape[1:]))
         for offset in range(self.decimation):
             total += np.take(x, starts + offset, axis=0)

@@ -9,6 +9,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from pipelines.signals.welch import Welch
 
+# Length of a window, s; a shorter recording is one window as a whole.
 WINDOW_S = 10.0
 HIGHEST_HZ = 12.5
 """Highest cut-off, within the limits of ``HIGHEST_SHARE``. Above it is only the motion of joints
@@ -61,12 +62,16 @@ def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
     clear = 3.0
     nyquist = rate_hz / 2
     band = (frequency >= noise_band[0] * nyquist) & (frequency <= noise_band[1] * nyquist)
+    # The median ignores single lines within the noise band, such as a hum.
     floor = float(np.median(density[band]))
+    # Smooth first: single bins of a spectrum of few windows scatter by much of their own size.
     above = uniform_filter1d(density, max(1, len(frequency) // 100), mode="nearest") > clear * floor
     # A periodic motion has gaps between its lines: it ends where a wide band holds only noise.
     ahead = max(1, int(quiet_hz / frequency[1]))
+    # The negative origin shifts the window, so that it looks ahead of each frequency.
     quiet = ~maximum_filter1d(above, ahead, origin=-(ahead // 2), mode="nearest")
     meets = frequency[np.argmax(quiet)] if quiet.any() else nyquist
+    # Without this difference the noise of the whole band would count as motion.
     power = np.cumsum(np.maximum(density - floor, 0.0))
     motion = frequency[np.searchsorted(power, slow_share * power[-1])] if power[-1] > 0 else 0.0
     return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
@@ -104,6 +109,7 @@ def choose_cutoff(
     noisiest = int(np.argmin([s.meets_floor_hz for s in spectra]))
     meets = spectra[noisiest].meets_floor_hz
     fastest = int(np.argmax([s.motion_hz for s in spectra]))
+    # Both passes together halve the amplitude at the cut-off; at half of it they take 0.4 %.
     needed = min(2.0 * spectra[fastest].motion_hz, highest)
     reason = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
     chosen = before_noise * meets
@@ -114,6 +120,7 @@ def choose_cutoff(
     if chosen > highest:
         return Cutoff(highest, f"{reason}; above {highest:g} Hz there are only reversals")
     return Cutoff(
+        # The filter needs one period of its cut-off at least; a very short recording then has two.
         max(chosen, 2.0 * rate_hz / samples),
         f"{reason}; in acceleration, noise exceeds the signal below that",
     )

@@ -49,8 +49,11 @@ def between_readings(x: NDArray, longest: int) -> NDArray:
     if len(read) in (0, 1, len(x)):
         return x
     every = np.arange(len(x))
+    # Akima's curve is local: a jump of one reading does not ring through all others, as in a
+    # spline. Before the first reading and after the last it is NaN.
     interpolated: NDArray = Akima1DInterpolator(read, x[read])(every)
     later = np.searchsorted(read, every).clip(1, len(read) - 1)
     interpolated[read[later] - read[later - 1] > longest] = np.nan
+    # A reading is valid itself, even where the interval before it was too long to fill.
     interpolated[read] = x[read]
     return interpolated

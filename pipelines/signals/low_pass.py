@@ -35,13 +35,16 @@ def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
     from scipy.signal import butter
 
     _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
+    # A pole of radius r fades as r to the power of samples; the largest radius fades last.
     fading = int(np.ceil(np.log(negligible) / np.log(np.max(np.abs(poles)))))
+    # The margin also holds the filter's padding, and the stencil of the derivative.
     return (
         max(fading, shortest(rate_hz, cutoff_hz), _padding(rate_hz, cutoff_hz)) + DERIVATIVE_STENCIL
     )
 
 
 def _padding(rate_hz: float, cutoff_hz: float) -> int:
+    # In three periods of the cut-off, transients at the ends fade to less than a thousandth.
     return int(3 * rate_hz / cutoff_hz)
 
 
@@ -83,6 +86,7 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     from scipy.signal import sosfiltfilt
 
     sections = _sections(order, cutoff_hz, rate_hz)
+    # scipy refuses a padding that is as long as the data.
     padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
     return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
 
@@ -93,6 +97,7 @@ def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
     """Return the filter's second-order sections, (order / 2, 6)."""
     from scipy.signal import butter
 
+    # Second-order sections stay accurate where the cut-off is a small part of the sample rate.
     return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
 
 
@@ -102,6 +107,7 @@ def _differences(order: int) -> NDArray:
     from scipy.signal import savgol_coeffs
 
     size = DERIVATIVE_STENCIL
+    # A polynomial of degree 4 through five samples is exact; row i is its derivative at sample i.
     return np.array(
         [savgol_coeffs(size, size - 1, deriv=order, pos=i, use="dot") for i in range(size)]
     )
@@ -129,6 +135,8 @@ def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
     """
     weights = _differences(order) * rate_hz**order
     half = DERIVATIVE_STENCIL // 2
+    # The first and last two samples are wrong here: their stencil reaches beyond the data.
+    # One-sided differences replace them below.
     out = correlate1d(x, weights[half], axis=0, mode="nearest")
     # The order of summation is independent of the shape of x, so that results are reproducible
     # column by column.

@@ -25,6 +25,7 @@ class Welch:
     def __init__(self, rate_hz: float, length: int) -> None:
         self._rate_hz = rate_hz
         self._length = length
+        # The same hop as of scipy's welch, so that windows of all pieces lie on one grid.
         self._hop = length - length // 2
         self._rest: NDArray | None = None
         self._total: NDArray | float = 0.0
@@ -41,6 +42,7 @@ class Welch:
         """
         x = x if self._rest is None else np.concatenate([self._rest, x])
         windows = max(0, (len(x) - self._length) // self._hop + 1)
+        # Whole windows only: the rest waits for the next piece.
         if windows:
             whole = x[: (windows - 1) * self._hop + self._length]
             _, density = welch(
@@ -48,9 +50,11 @@ class Welch:
                 self._rate_hz,
                 window="blackmanharris",
                 nperseg=self._length,
+                # A drift over the window would leak into all frequencies.
                 detrend="linear",
                 axis=0,
             )
+            # scipy returns the mean over windows, so pieces count by their number of windows.
             self._total = self._total + windows * density
             self._windows += windows
         self._rest = x[windows * self._hop :]

@@ -45,14 +45,18 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     faults = _hopeless(motions, faults)
     rightly_wired = []
     for motion in excluding(motions, faults):
+        # A run that is left out whole has nothing to compare.
         if not motion.valid.any():
             continue
         faults += sampling_faults(motion)
         wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
+        # One wrong channel makes later checks fail as well, so only the first kind is reported.
         wrong = wrong or [*sign_faults(motion)]
         run = averages(motion)
         if run is not None and not wrong:
             wrong = [*wiring_faults(run), *cuff_faults(run)]
+            # Exchanged channels look like wrong units, so
+            # only correctly wired runs are compared in scale.
             rightly_wired += [] if wrong else [run]
         faults += wrong
     faults += torque_unit_faults(rightly_wired)
@@ -69,6 +73,7 @@ def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]
     sound = excluding(motions, faults)
     hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
     reported: list[Fault] = []
+    # A fault without samples spoils the session; a run that others replace is masked as a whole.
     for fault in faults:
         run = hopeless.get(fault.file)
         if run is None:
@@ -107,4 +112,5 @@ def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion
         if fault.samples is not None:
             bad[fault.file] = bad.get(fault.file, False) | fault.samples
     valid = [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]
+    # A cuff that is silent would testify that the wearer weighs nothing.
     return [replace(m, forces=None) if has_silent_cuffs(m) else m for m in valid]

@@ -70,6 +70,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     if motion.measured_angle is None:
         return
     same: NDArray = np.zeros(motion.torque.shape, dtype=bool)
+    # Both must repeat: at low speed, a coarse encoder or a rounded torque repeats alone.
     same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
     for j, torque in enumerate(motion.torque.T):
         # A torque that is constant for longer is stuck, whatever the angle does.
@@ -77,11 +78,13 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         same[:, j] &= ~mask_of(stuck, len(torque)) & (not _is_in_steps(torque, stuck))
     step, change = motion.dq / motion.sample_rate_hz, np.diff(motion.measured_angle, axis=0)
     count = np.array([_count_of(angle) for angle in motion.measured_angle.T])
+    # Scatter of single steps about the filtered speed; the median ignores the repeated ones.
     noise = median_abs_deviation(change - step[1:], axis=0, scale="normal")
     sure = same & (np.abs(step) > COUNTS * count + NOISES * noise)
     stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
     if not stale:
         return
+    # Drives that repeat in the same samples share a cause, such as one reader for all.
     together = len(stale) > 1 and bool(
         (same[:, stale].all(axis=1) == same[:, stale].any(axis=1)).mean() > 0.999
     )
@@ -134,6 +137,7 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
     lasting = still[:, 1] - still[:, 0]
     # Friction holds a joint too, but the joint then starts from where it stopped.
     stuck = still[
+        # Other standstills show how long friction usually holds this joint.
         [_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]
     ]
     if len(stuck):
@@ -156,19 +160,24 @@ def _impossible(
     start, stop = stretch
     # Steps across a gap are larger, but not faster.
     steps = np.abs(np.diff(angle)) / np.maximum(np.diff(motion.time) * motion.sample_rate_hz, 1.0)
+    # First test: the angle jumps into or out of the standstill, faster than the joint ever moves.
     outside = np.delete(steps, np.arange(max(start - 1, 0), min(stop, len(steps))))
+    # Not the maximum, which a single glitch would set.
     usual = np.quantile(outside, 0.999) if len(outside) else 0.0
     edges = steps[[k for k in (start - 1, stop - 1) if 0 <= k < len(steps)]]
     if usual > 0 and (edges > JUMP * usual).any():
         return True
     seconds = (stop - start) / motion.sample_rate_hz
+    # Second test: the set-point went further than friction can hold a joint against its drive.
     if motion.reference is not None and np.isfinite(motion.reference[start:stop, joint]).all():
         return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > _held(
             motion, joint
         )
+    # Third test, without a set-point: others moved, and no other standstill lasted nearly as long.
     rest = [j for j in range(motion.q.shape[1]) if j != joint]
     moved = max((np.ptp(motion.q[start:stop, j]) / _held(motion, j) for j in rest), default=0.0)
     longest = others.max(initial=0) / motion.sample_rate_hz
+    # A joint may rest before the motion begins.
     return 0 < start and seconds > max(ALONE_S, ALONE * longest) and moved > 1.0
 
 
@@ -187,6 +196,7 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
     flat = constant_stretches(torque, FLAT_TOP)
     at_top = (torque[flat[:, 0]] == torque.max()) | (torque[flat[:, 0]] == torque.min())
     lasts = flat[:, 1] - flat[:, 0] >= STUCK_TORQUE_S * motion.sample_rate_hz
+    # Torque may be constant at rest. A tenth of the joint's range in a second counts as motion.
     moving = np.array(
         [np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat],
         bool,
@@ -195,6 +205,7 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
         at_top = np.zeros_like(at_top)
         lasts &= _outlasts(flat)
     tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
+    # A saturated torque comes back to its limit, while a stuck one is flat once.
     if len(tops) > 1 and mask_of(tops, len(torque)).sum() >= SATURATED:
         yield _saturated(motion, joint, tops)
     elif len(tops) and (lasts & moving & at_top).any():
@@ -246,6 +257,7 @@ def has_silent_cuffs(motion: Motion) -> bool:
     """Return whether the cuff forces of a person's run were recorded, and none ever changes."""
     if motion.held_forces is None or motion.run != "with_human":
         return False
+    # Cuffs may be read less often than the drives, so samples between readings are unknown.
     channels = motion.held_forces.reshape(len(motion.held_forces), -1).T
     known = [x[np.isfinite(x)] for x in channels]
     return not any(len(x) and np.ptp(x) > 0.0 for x in known)
@@ -270,6 +282,7 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
             if not len(still):
                 continue
             samples = mask_of(still, len(motion))
+            # A channel that is dead all along has no good sample, so no mask helps.
             dead = samples.all()
             yield Fault(
                 motion.file,

@@ -67,6 +67,7 @@ def constant_stretches(x: NDArray, least: int) -> NDArray:
         First sample, and one past the last.
     """
     intervals = stretches(x[1:] == x[:-1])
+    # A run of n equal steps joins n + 1 samples.
     intervals[:, 1] += 1
     return intervals[intervals[:, 1] - intervals[:, 0] >= least]
 

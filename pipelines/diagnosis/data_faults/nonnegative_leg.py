@@ -79,12 +79,14 @@ class Averages:
             N·m per unit.
         """
         order, sign = reading
+        # X1 - X2 and X4 make no torque at the knee.
         body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
         friction = (
             np.column_stack([self.direction[:, order[joint]], self.dq[:, order[joint]]])
             * sign[joint]
         )
         one = np.ones((len(body), 1))
+        # Multiples are never negative, so a free offset needs a column of either sign.
         return np.hstack([body, friction, one, -one])
 
 
@@ -131,14 +133,17 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
     (p,) array
         The multiples.
     """
+    # Once free columns are projected out, only columns of known sign remain to be fitted.
     if free is not None:
         basis = np.linalg.qr(free)[0]
         columns, torque = columns - basis @ (basis.T @ columns), torque - basis @ (basis.T @ torque)
     # A root of the Gram matrix has the columns' inner products in a hundredth of their rows.
     everything = np.column_stack([columns, torque])
+    # Unit columns keep the eigenvalues comparable, whatever the units.
     scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
     power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
     root = np.sqrt(np.maximum(power, 0.0))[:, np.newaxis] * direction.T
+    # The torque has unit length as well, so the squared misfit is a share of its power.
     multiples, misfit = nnls(root[:, :-1], root[:, -1])
     return misfit**2, multiples * scale[-1] / scale[:-1]
 
@@ -158,6 +163,7 @@ def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
     measured = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
     wide = [np.broadcast_to(unit, (len(measured), 2, 3)) for unit in ZEROS]
     zeros = np.stack([cuff_torque(unit[:, 0], unit[:, 1], run.q, g) for unit in wide], -1)
+    # Both joints count alike, though the hip's torque is larger.
     weight = 1.0 / np.maximum(measured.std(axis=0), 1e-12)
     stacked = [
         np.concatenate([x[:, j] * weight[j] for j in range(2)])

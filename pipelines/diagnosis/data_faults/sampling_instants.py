@@ -38,8 +38,11 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
     trusted = _undisturbed(motion)
     if trusted.sum() < LEAST:
         return
+    # Third differences remove the smooth motion and keep the jumps.
     rough = np.diff(motion.measured_angle[:, :2], 3, axis=0)[trusted]
     speeds = np.prod(motion.dq[2:-1, :2][trusted], axis=1)
+    # Instants with variance v make both differences correlate by SPREAD v times both speeds. So the
+    # regression of the one product on the other gives v.
     alike = np.prod(rough, axis=1) * speeds
     sums = alike[: len(alike) // BLOCK * BLOCK].reshape(-1, BLOCK).sum(axis=1)
     variance = max(float(alike.sum()), 0.0) / (SPREAD * max(float(speeds @ speeds), 1e-12))

@@ -64,6 +64,7 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
         )
         * usable
     )
+    # Each row maps values to a result: the inertia, and the mean power that friction takes.
     information = np.zeros((2, columns.shape[1]))
     information[0, 0] = 1.0
     friction = model.layout.terms[1].slice
@@ -71,6 +72,7 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
     scale = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-12)
     columns, information = columns / scale, information / scale
     torque = run.measured[:, :1] * usable
+    # Over a small travel gravity, spring and constant are nearly one column.
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
     values = inverse @ (columns.T @ torque[:, 0])
     scores = (torque - (columns @ values)[:, np.newaxis]) * columns

@@ -35,7 +35,9 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
     missing = _missing_samples(motion, late)
     yield from _missing(motion, missing)
     yield from _counter(motion)
+    # Without the samples that are missing, even stamps lie on a grid of the nominal rate.
     on_grid = late - np.concatenate([[0.0], np.cumsum(missing)])
+    # The difference of two independent deviations has twice their variance.
     jitter = float(np.std(np.diff(on_grid))) / np.sqrt(2.0)
     if jitter > JITTER:
         yield _irregular(motion, on_grid, jitter)
@@ -56,6 +58,7 @@ def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """
     if motion.sequence is not None:
         return np.maximum(_counted(motion.sequence) - 1, 0)
+    # The negative origin makes the window look ahead.
     ahead = minimum_filter1d(late, HORIZON, origin=-(HORIZON // 2), mode="nearest")
     return np.maximum(np.rint(np.diff(ahead)), 0.0).astype(np.int64)
 
@@ -120,6 +123,7 @@ def _counter(motion: Motion) -> Iterator[Fault]:
     ):
         if bad.any():
             first = motion.time[1:][np.argmax(bad)]
+            # No mask: nothing shows which rows are right.
             yield Fault(
                 motion.file,
                 "sequence",
@@ -184,6 +188,7 @@ class _Comparison:
         tiny = np.finfo(float).tiny
         scale = max(float(np.sum(stray**2)), tiny)
         return cls(
+            # Slope of the angles' roughness along that of samples taken at the stamps.
             followed=float(np.sum(rough * stray)) / scale,
             error=float(np.sqrt(len(sums)) * np.std(sums)) / scale,
             share=float(np.max(np.std(stray, axis=0) / np.maximum(np.std(rough, axis=0), tiny))),
@@ -211,6 +216,7 @@ def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
     """Report a clock that does not advance by one nominal period a sample."""
     if len(motion) < HORIZON:
         return
+    # The median ignores spans with a late stamp.
     drift = float(np.median(on_grid[HORIZON:] - on_grid[:-HORIZON])) / HORIZON
     # A rate that changes within the run differs in median and mean: that is no wrong clock.
     overall = float(on_grid[-1] - on_grid[0]) / (len(motion) - 1)

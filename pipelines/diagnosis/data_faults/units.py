@@ -36,6 +36,7 @@ LAW_HOLDS = 0.8
 """Share of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
 """Largest angle of a leg's joint from its zero; a pendulum may turn over."""
+# How many of each unit are one N·m.
 TORQUE_UNITS = {
     "N·mm": 1e3,
     "N·cm": 1e2,
@@ -61,6 +62,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
         factor = _times_set_point(motion, j)
         channel = column(motion, j, "angle")
         if factor and _is_a_unit(factor):
+            # There are 57.3 degrees in a radian; a drive that lags changes the ratio a little.
             unit = "degrees" if 40 < factor < 80 else "another unit"
             yield Fault(
                 motion.file,
@@ -99,6 +101,7 @@ def _times_set_point(motion: Motion, joint: int) -> float | None:
     if known.sum() < 2 or np.ptp(asked) == 0.0 or np.ptp(went) == 0.0:
         return None
     times = float(np.ptp(went) / np.ptp(asked))
+    # A unit scales the mean as it scales the travel; a lost zero does not.
     follows = np.corrcoef(went, asked)[0, 1] > FOLLOWS and abs(
         went.mean() - times * asked.mean()
     ) < np.ptp(went)
@@ -111,6 +114,7 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
     for run in runs:
         wrong = _against_the_drives(run)
         if wrong is None:
+            # A position loop is the better witness: it does not depend on what the joints carry.
             wrong = _against_the_other_joint(run)
             without_witness += [] if wrong else [run]
         for j, (factor, witness) in wrong.items():
@@ -149,6 +153,7 @@ def _drive_law(motion: Motion, joint: int) -> float | None:
     good = motion.valid & np.isfinite(speed)
     if not good.any():
         return None
+    # The loop may damp the joint's speed or that of the error, so both speeds are columns.
     columns = np.column_stack([reference - angle, speed, motion.dq[:, joint]])[good]
     torque = motion.torque[good, joint]
     multiples = np.linalg.lstsq(columns.T @ columns, columns.T @ torque)[0]
@@ -169,11 +174,13 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
         return {}
     by_knee, by_hip = moment / typical, scale * moment / typical
     if 1 / WRONG_BETWEEN_JOINTS < scale < WRONG_BETWEEN_JOINTS:
+        # Both joints agree, so only an impossible leg shows that both are in another unit.
         if 1 / IMPOSSIBLE < by_knee < IMPOSSIBLE:
             return {}
         return {j: (by_knee, "the weight of a leg") for j in range(2)}
     first, second = run.motion.joints
     link = "shank" if of_a_leg else "link"
+    # The joint that makes the shank less plausible is the one in another unit.
     if abs(np.log(by_knee)) > abs(np.log(by_hip)):
         return {1: (1 / scale, f"{the(first)}, which carries the same {link}")}
     return {0: (scale, f"{the(second)}, which carries the same {link}")}
@@ -198,8 +205,10 @@ def shank(run: Averages) -> tuple[float, float]:
     """
     at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
     at_hip, torque = run.joint_columns(0), run.torque[:, 0]
+    # X2 and X3 belong to the shank alone, so the knee's values predict its torque at the hip.
     same_shank, others = at_hip[:, 1:3] @ at_knee[:2], at_hip[:, [0, 3, 4, 5, 6, 7]]
     times = float(fit(np.column_stack([same_shank, others]), torque)[1][0])
+    # If the hip's own columns explain what this very shank leaves, its multiple counts as one.
     if times < 1.0:
         rest = torque - same_shank
         residual = fit(others, rest)[0] * float(rest @ rest)
@@ -228,6 +237,7 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
 def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
     """Return the run's torque as a multiple of the prediction by another run's parameters."""
     predicted = run.joint_columns(joint) @ multiples
+    # A reversed torque has no factor; a tiny one keeps its reciprocal finite.
     return max(float(predicted @ run.torque[:, joint] / max(predicted @ predicted, 1e-12)), 1e-6)
 
 

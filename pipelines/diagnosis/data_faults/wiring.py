@@ -70,6 +70,7 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
         return
     q, reference = motion.q[motion.valid], motion.reference[motion.valid]
     joints = q.shape[1]
+    # A constant angle has no correlation.
     if (np.ptp(q, axis=0) == 0).any() or (np.ptp(reference, axis=0) == 0).any():
         return
     alike = np.corrcoef(q, reference, rowvar=False)[:joints, joints:]
@@ -82,8 +83,10 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
         elif (
             best != j
             and alike[j, best] > FOLLOWS
+            # Set-points of both joints may be alike, and then each angle follows both.
             and own < FOLLOWS / 2
             and alike[best, j] > FOLLOWS
+            # A pair is reported once.
             and j < best
         ):
             yield _exchanged(
@@ -96,6 +99,7 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
 
 def wiring_faults(run: Averages) -> Iterator[Fault]:
     """Yield channels that fit a leg only when exchanged or reversed."""
+    # Joints are fitted apart, so that 24 fits serve all combinations.
     misfits: dict[tuple[Reading, int, int, float], float] = {}
     for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
         columns = run.joint_columns(joint, reading)
@@ -126,6 +130,7 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
     """Yield force sensors that carry a limb only when exchanged or reversed."""
+    # Without a wearer, the cuffs carry no limb whose weight could show their signs.
     if run.cuffs is None or run.motion.run != "with_human" or not np.isfinite(run.cuffs).all():
         return
     readings: dict[str, NDArray] = {

@@ -75,6 +75,7 @@ def _since_reversal(run: Run, j: int) -> NDArray:
     forward = run.state[1][:, j] > 0
     turned = np.flatnonzero(np.diff(forward, prepend=forward[0]))
     last = np.searchsorted(turned, np.arange(len(forward)), side="right") - 1
+    # Before the first reversal the time since one is unknown, and counts as long.
     since = np.where(
         last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, LONGEST_S
     )
@@ -189,6 +190,7 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
             Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s))
             for v, s in shares.items()
         ]
+        # A hum may lie above the cut-off that noisy angles require, so tones get that torque back.
         fast = [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)]
         frequency, share, in_step = _free_or_in_step(runs, fast, j)
         kind = (
@@ -262,9 +264,11 @@ def variable_share(
         y = pooled(some, [r[:, j] for r in of_kind], j)
         if not len(y):
             continue
+        # A constant is no dependence, and each kind of run may have its own.
         y = y - y.mean()
         total += float(y @ y)
         if not knows(variable, some, j):
+            # A kind of run without the variable counts as not predicted.
             error += float(y @ y)
             continue
         curve = Curve.along([variable], some, j)
@@ -299,6 +303,7 @@ def parts_of_period(run: Run) -> NDArray:
         Fold of each block.
     """
     length = (run.motion.period_s or PARTS) / PARTS
+    # Rounding must not put a block at a border into the part before it.
     return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
 
 
@@ -350,10 +355,12 @@ def _free_or_in_step(
     runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> tuple[float, float, bool]:
     """Return frequency and share of ``tone``, and whether it is in step with the motion."""
+    # A tone that is no harmonic of the motion lies in what does not repeat between periods.
     free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
         return (*free, False)
     above = max(above_the_motion_hz(run) for run in runs)
+    # Below this frequency a law of the motion has lines that look like a tone in step.
     in_step = _tone_in(_repeated, above, runs, residuals, j)
     return (*in_step, True) if in_step[1] > max(MOST, free[1]) else (*free, False)
 
@@ -372,6 +379,7 @@ def _tone_in(
     """
     total = error = 0.0
     tones = []
+    # The frequency is sought without the judged fold too, or noise alone predicts something.
     for held in range(FOLDS):
         rest = [run.usable[:, j] & (run.fold != held) for run in runs]
         frequency = _strongest(
@@ -384,9 +392,11 @@ def _tone_in(
             judged = run.usable[:, j] & (run.fold == held)
             if not learnt.any():
                 continue
+            # Runs share the frequency only: the phase of a hum differs at each start.
             angle = 2 * np.pi * frequency * run.time
             A = np.column_stack([np.sin(angle), np.cos(angle), np.ones(len(angle))])
             values = np.linalg.lstsq(A[learnt], residual[learnt, j], rcond=None)[0]
+            # The comparison is with a constant from the same folds, which needs no tone.
             mean = residual[learnt, j].mean()
             total += float(np.sum((residual[judged, j] - mean) ** 2))
             error += float(np.sum((residual[judged, j] - A[judged] @ values) ** 2))
@@ -400,6 +410,7 @@ def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
         return kept
     width = run.block.decimation / run.motion.sample_rate_hz
     place = np.round(run.time % run.motion.period_s / width).astype(int)
+    # Rows that are not learnt are zero and do not count in the mean of their phase.
     mean = np.bincount(place, kept) / np.maximum(np.bincount(place, learnt), 1)
     return np.where(learnt, kept - mean[place], 0.0)
 
@@ -412,6 +423,7 @@ def _repeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
 def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) -> float:
     """Return the frequency of the highest peak of the summed spectra above a limit, Hz."""
     width = runs[0].block.decimation / runs[0].motion.sample_rate_hz
+    # Blocks keep their place in time, so that gaps are zeros and shift no phase.
     places = [np.round((run.time - run.time[0]) / width).astype(int) for run in runs]
     length = PADDING * (max(int(p[-1]) for p in places) + 1)
     power = np.zeros(length // 2 + 1)

@@ -70,9 +70,13 @@ class Curve:
             if x is None:
                 part = np.zeros((len(run.time), len(knots) - DEGREE - 1))
             else:
+                # Beyond the outer knots the curve stays
+                # constant; a cubic continued there runs away.
                 clipped = np.clip(x, knots[0], knots[-1])
                 part = BSpline.design_matrix(clipped, knots, DEGREE).toarray()
+            # Products of each row's splines: a surface has a coefficient for every pair.
             design = (design[:, :, np.newaxis] * part[:, np.newaxis, :]).reshape(len(run.time), -1)
+        # Each direction has coefficients of its own, because friction jumps between them.
         if any(variable.by_direction for variable in self.variables):
             forward = run.state[1][:, self.joint, np.newaxis] > 0
             design = np.hstack([design * forward, design * ~forward])
@@ -84,6 +88,7 @@ def _knots(x: NDArray, inner: int) -> NDArray:
     places = np.unique(np.quantile(x, np.linspace(0, 1, inner + 2)))
     if len(places) < 2:
         places = np.array([places[0] - 0.5, places[0] + 0.5])
+    # Repeated end knots let the curve take any value at both ends.
     return np.concatenate([[places[0]] * DEGREE, places, [places[-1]] * DEGREE])
 
 
@@ -127,12 +132,15 @@ class Products:
         (r,) array
             Squared errors, (N·m)².
         """
+        # A fold without rows has no error to count.
         there = np.flatnonzero(self.square)
         columns, right = self.columns[there], self.right[there]
+        # The other folds are the total less the own one, so that no row is multiplied twice.
         others = self.columns.sum(axis=0) - columns
         shrunk = others + _shrinkage(others, ridges[:, np.newaxis])
         rest = np.broadcast_to(self.right.sum(axis=0) - right, (len(ridges), *right.shape))
         c = np.linalg.solve(shrunk, rest[..., np.newaxis])[..., 0]
+        # From products alone: |y - A c|² = |y|² - (2 c'A'y - c'A'A c).
         explained = 2.0 * np.sum(c * right, axis=-1) - np.einsum(
             "rfi,fij,rfj->rf", c, columns, c, optimize=True
         )
@@ -141,6 +149,8 @@ class Products:
 
 def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
     """Return the diagonal matrices that ridges (r, 1) or () add to matrices (..., k, k)."""
+    # Relative to the columns' mean square, a penalty has no unit.
+    # The least number added keeps a design of zeros solvable.
     size = ridges * np.trace(A, axis1=-2, axis2=-1) / A.shape[-1] + np.finfo(float).tiny
     return np.asarray(size)[..., np.newaxis, np.newaxis] * np.eye(A.shape[-1])
 
@@ -163,6 +173,7 @@ def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) ->
     list of Products
         One for each partition.
     """
+    # Rows that share the fold of every partition form a cell; products of cells add up to folds.
     cell = np.ravel_multi_index(tuple(partitions), (FOLDS,) * len(partitions))
     order = np.argsort(cell, kind="stable")
     cells, starts = np.unique(cell[order], return_index=True)
@@ -192,6 +203,7 @@ def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
     tuple of float
         Squared error, and the ridge that minimises it.
     """
+    # A curve must predict other periods and other parts of a period, so the worse of both counts.
     worst = np.max([p.held_out(np.array(RIDGES)) for p in products], axis=0)
     best = int(np.argmin(worst))
     return float(worst[best]), RIDGES[best]

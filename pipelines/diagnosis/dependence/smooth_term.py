@@ -112,6 +112,7 @@ def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surf
     surface = _best(runs, residuals, j)
     if surface is not None or len({run.motion.run for run in runs}) == 1:
         return surface
+    # No law serves both kinds of run: it may still act in the kind with most of the error.
     of_kind: dict[str, list[int]] = {}
     for i, run in enumerate(runs):
         of_kind.setdefault(run.motion.run, []).append(i)
@@ -126,6 +127,7 @@ def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surf
 
 
 def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
+    # Time and phase are left out: another run, of another motion, must obey the law.
     known = [v for v in VARIABLES if v.lasting and all(v.of(run, j) is not None for run in runs)]
     one = max((_surface([v], runs, residuals, j) for v in known), key=lambda s: s.share)
     two = max(
@@ -145,9 +147,11 @@ def _surface(
     )
     y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
     partitions = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
+    # A law of the machine must predict the runs with a wearer from those without.
     if len(kinds) > 1:
         partitions.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
     products = fold_products(design, y, [pooled(runs, folds, j) for folds in partitions])
     error, ridge = held_out_error(products)
+    # All folds of a partition together are all rows, so any partition gives the same values.
     values, share = products[0].fitted(ridge), 1.0 - error / float(y @ y)
     return Surface(runs[0].motion.joints[j], tuple(kinds), curve, values, share)

@@ -169,9 +169,11 @@ class DetectionProblem:
         # A weight above one corrects noise that is overestimated from recordings; here it is given.
         weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
         counts = np.repeat(weights, drives)
+        # Correlated blocks count as fewer: the likelihood is scaled by their independent share.
         root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
         independent = float(np.max(share * plain.count))
         values = solve(plain, root**2)
+        # Torques that depend on load take it from the fitted bodies, as in a diagnosis.
         loaded = tuple(with_load(run, baseline, values) for run in runs)
         torque = np.concatenate(
             [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
@@ -180,6 +182,7 @@ class DetectionProblem:
         problem = cls(
             loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms
         )
+        # The basis is made of weighted rows, which the problem itself provides.
         return replace(problem, basis=np.linalg.qr(problem.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
@@ -260,6 +263,7 @@ class DetectionProblem:
             N·m.
         """
         j = self.joint(effect)
+        # Runs in which the effect does not act would lower its rms.
         acting = [
             (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
         ]
@@ -329,6 +333,7 @@ def detectability(
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         of_shapes = list(_results_of(effect, problem, power))
+        # Where no shape is plausible, all count: every cause is reported.
         results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
     chosen = [_usual(own) for own in results.values()]
     unexplained = _unexplained(chosen, list(results.values()))
@@ -371,6 +376,7 @@ def detectability_of_recorded(
     runs = [observe(m) for m in motions if m.purpose == "train"] or [observe(m) for m in motions]
     baseline = baseline_of(runs, known_effects(known, runs[0].motion.machine))
     active = np.any([run.usable.any(axis=0) for run in runs], axis=0).astype(float)
+    # Fit twice: outputs weigh alike first, then by their residuals.
     plain = fit((), runs, baseline, active)
     plain = fit((), runs, baseline, plain.weights)
     return detectability(
@@ -399,6 +405,7 @@ def needed_noncentrality(columns: int, price: float, power: float) -> float:
         Probability that it does.
     """
     price = 2.0 * price
+    # The power rises with the noncentrality, so there is one root.
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))
 
 
@@ -439,6 +446,7 @@ def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
         return values
     j = runs[0].motion.joint_index(effect.joint)
     speeds = np.concatenate([run.state[1][:, j] for run in runs])
+    # A ripple of n cycles a turn has n |dq| / 2 pi Hz at the speed dq.
     fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
     return values[values <= max(fastest, values[0])]
 
@@ -450,6 +458,7 @@ def _spread(values: NDArray) -> NDArray:
 def _in_run(effect: Effect, shape: Sequence[float], run: Run) -> tuple[float, ...]:
     begin, end = run.time[0], run.time[-1]
     return tuple(
+        # An onset is a share of the run here; the effect needs a time.
         float(begin + v * (end - begin) if p.per_run else v)
         for p, v in zip(effect.shape, shape, strict=True)
     )
@@ -466,6 +475,7 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
     growth, by = _growth(effect, remainder, direction, span.shape[1], problem, power)
     size, unit = float(np.sqrt(growth)), problem.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
+    # A range of both signs includes zero, so there is no least size.
     if effect.linear[0].typical[0] < 0:
         least = 0.0
     torque = problem.torque_rms[problem.joint(effect)]
@@ -529,11 +539,13 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
     """Find the size of an effect that transforms the motion or a reading, by steps."""
     effect, start = candidate.effect, np.array(candidate.shapes[0])
     zero = np.array(
+        # Forms are members of a family and no sizes, so they stay; other shapes shrink to neutral.
         [v if p.forms else p.neutral for v, p in zip(start, effect.shape, strict=False)]
     )
     reach = float(np.linalg.norm(start - zero))
 
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
+        # Sizes span decades, so the search is over their logarithm.
         shape = zero + (start - zero) / reach * np.exp(x)
         column = _bend(replace(candidate, shapes=(tuple(shape),) * len(problem.runs)), problem)
         remainder = problem.remainder(column)[:, 0]
@@ -546,12 +558,15 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
     for _ in range(STEPS):
         if not (np.isfinite(now[0]) and np.isfinite(before[0])) or abs(np.log(now[0])) < 0.02:
             break
+        # Secant steps: for a small effect, growth over size is a line of slope -2 in logarithms.
         slope = (np.log(now[0]) - np.log(before[0])) / (x1 - x0)
         if abs(slope) < 0.1:
             break
+        # The effect is not proportional to its size, so a step is at most a factor of e².
         x0, x1 = x1, x1 - float(np.clip(np.log(now[0]) / slope, -2.0, 2.0))
         before, now = now, at(x1)
     growth, by, remainder, column, value = now
+    # A growth of one means that this very size is just named.
     seen = np.isfinite(growth) and abs(np.log(growth)) < 0.2
     return DetectionResult(
         (),
@@ -594,6 +609,7 @@ def _growth(
     by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
     # A good rig has a little of the effect: its amplitude is uncertain by that much.
     share = problem.share(effect, column)
+    # As against noise, the amplitude must exceed its background by the root of twice the price.
     by_background = (
         2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
     )
@@ -618,6 +634,7 @@ def _detectable(
 
     ``unexplained`` is the share of it that each cause does not explain.
     """
+    # The most similar causes come first.
     others = sorted(zip(unexplained, (other.label for other in results), strict=True))
     alike = [
         (share, label) for share, label in others if label != effect.label and _alike(result, share)
@@ -652,16 +669,19 @@ def _unexplained(
     """
     every = [other for others in results for other in others]
     directions = np.array([result.remainder for result in chosen])
+    # A rival that explains the effect by its level alone is an offset, and no tie.
     by_level = 1.0 - _explained(directions, [other.level for other in every])
     shares = np.maximum(1.0 - _explained(directions, [other.span for other in every]), 0.0)
     for row, result, level in zip(shares, chosen, by_level, strict=True):
         row[_alike(result, level)] = 1.0
     first = np.cumsum([0, *(len(others) for others in results[:-1])])
+    # Of each rival the shape counts that explains most.
     return np.minimum.reduceat(shares, first, axis=1)
 
 
 def _explained(directions: NDArray, spans: Sequence[NDArray]) -> NDArray:
     """Return the share of each unit vector (e, rows) in each span (rows, k), (e, spans)."""
+    # One product with all bases next to each other; cumulated sums separate them again.
     squares = (directions @ np.hstack(spans)) ** 2
     ends = np.cumsum([0, *(span.shape[1] for span in spans)])
     total = np.hstack([np.zeros((len(squares), 1)), np.cumsum(squares, axis=1)])

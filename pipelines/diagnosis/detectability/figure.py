@@ -36,6 +36,7 @@ def draw(results: Sequence[Detectable], stem: Path, title: str) -> None:
 def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
     limit = group[0].torque_rms_nm
     rows = np.arange(len(group))
+    # A cause that is never detected has an infinite size; its bar ends at the joint's torque.
     widths = [min(one.smallest_rms_nm, limit) for one in group]
     colors = [BLUE if _seen(one) else GREY for one in group]
     axis.barh(rows, widths, color=colors, height=0.7)

@@ -68,6 +68,7 @@ def _motion(
     motion = Motion(
         time,
         *state,
+        # A copy, because friction is added to the drives' torque and not to the load behind them.
         torque=load.copy(),
         load=load,
         segment=np.zeros(len(time), np.int64),
@@ -113,6 +114,8 @@ def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> 
     D = block.decimation
     lags = np.arange(1, D)
     variance = (1.0 + 2.0 * np.sum((1.0 - lags / D) * rho**lags)) / D
+    # An average keeps the integral of the noise over
+    # all lags, so this and the variance give the share.
     integral = (1.0 + rho) / (1.0 - rho) / D
     rms = np.array([noise.hip_nm, noise.knee_nm]) * np.sqrt(variance)
     return Floor(

@@ -19,6 +19,7 @@ ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "abso
 
 def candidates(d: Diagnosis) -> pd.DataFrame:
     """Return every set that was weighed, the named one first, then by probability."""
+    # The empty set is no row; its probability is in the verdict.
     rows = [_row(d, labels, p) for labels, p in _weighed(d).items() if labels]
     rows += [
         _absorbed(d, effect.name, joint, into)
@@ -38,6 +39,7 @@ def _weighed(d: Diagnosis) -> dict[frozenset[str], float]:
 
 
 def _row(d: Diagnosis, labels: frozenset[str], probability: float) -> dict[str, Any]:
+    # Only the named set and its subsets by one are fitted in full; there are thousands of others.
     fitted = _fitted(d, labels)
     row: dict[str, Any] = {
         "causes": sorted(labels),
@@ -98,6 +100,7 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
     for one in d.named:
         rest = named - {one.element.label}
         rivals = labels - rest
+        # The named set with a tie in a cause's place is the same answer in other words.
         if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
             return "indistinguishable", f"these data cannot separate it from {one.element.label}"
     is_likely = probability >= CRITERIA.likely and any(label.startswith(LAW) for label in labels)

@@ -19,6 +19,7 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     label = named.element.label
     effect, gained = d.effects[label], d.gains[label]
     machine, joint = d.baseline.machine, d.baseline.joints[gained.joint]
+    # Causes overlap, so the gain is over the error that all other causes leave.
     before = d.without[label].errors.rms[gained.joint]
     others = " that the other causes leave" if len(d.named) > 1 else ""
     taken = number(machine, gained.value) if gained.value > 0.0 else "nothing"
@@ -29,6 +30,7 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     doubt = doubt_of_gain(d, label)
     if doubt:
         sentences.append(doubt[1])
+    # A cause that was not tested for being a look-alike has no share, and no doubt of this kind.
     share = d.selected.removed.get(label, 1.0)
     if share < NEARLY_ALL:
         sentences.append(
@@ -81,6 +83,7 @@ def _next(d: Diagnosis, named: NamedCause) -> str | None:
     assert d.selected.posterior is not None
     label, ties = named.element.label, dict(named.ties)
     own, rivals = in_place(d.selected.posterior, label, frozenset(d.causes) - {label})
+    # Ties are no rivals: their probability counts for the cause.
     others = [(rival, p) for rival, p in rivals.items() if rival not in ties and p > 0.0]
     if not others:
         return None

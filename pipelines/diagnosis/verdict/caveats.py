@@ -80,6 +80,7 @@ def _at_ends(d: Diagnosis) -> list[str]:
         for i, parameter in enumerate(cause.effect.shape)
         if cause.is_free(i) and i != cause.onset
         for value in {shape[i] for shape in cause.shapes}
+        # At the end of its range a shape is the best that was tried, and no minimum.
         if any(np.isclose(value, end, rtol=1e-6) for end in reach(parameter))
     ]
 
@@ -96,6 +97,7 @@ def _size_may_be_zero(d: Diagnosis) -> list[str]:
 
 
 def _unrealizable(d: Diagnosis) -> list[str]:
+    # An inertia that is negative within its error is no evidence against the causes.
     if not d.causes or not d.lacks_mass:
         return []
     return [
@@ -108,6 +110,7 @@ def _unrealizable(d: Diagnosis) -> list[str]:
 def _default_length(d: Diagnosis) -> list[str]:
     """Report that the distance between two axes is an exoskeleton's default on another machine."""
     machine, length = d.baseline.machine, d.train[0].motion.geometry.thigh_length_m
+    # A map without this length leaves the default, so that an equal one counts as not given.
     default = length == Geometry().thigh_length_m
     if machine.is_exoskeleton or not machine.mechanism.has_length or not default:
         return []
@@ -150,6 +153,7 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
 
 def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
     """Return joints whose validation error is larger, with it and with the training error."""
+    # The fit has errors of the cuffs too, after those of the drives.
     errors = zip(d.after.errors.rms.tolist(), d.after.fit.rms.tolist(), strict=False)
     pairs = zip(d.baseline.joints, errors, strict=True)
     return (

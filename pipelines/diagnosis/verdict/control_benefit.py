@@ -23,6 +23,7 @@ CASE = SimulateSettings()
 """The reference case of docs/simulation.md: the same for every machine, so that numbers can be
 compared."""
 
+# Settings of `exoid simulate` that do not change the loop.
 NOT_OF_THE_LOOP = {"sweep_nm_s_rad", "figures"}
 
 
@@ -32,6 +33,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
     They are predicted without and with the named causes, from ``settled_after_s`` on: before, the
     drives are at their limit, whatever the leg.
     """
+    # The loop is meant for a leg with a wearer; without such runs the empty machine stands in.
     run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
     benefit: dict[str, Any] = {
         "run": run,
@@ -67,6 +69,7 @@ def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]
     loop = track(
         make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait()
     )
+    # A loop that diverges has no tracking error; the verdict gives the reason instead.
     if loop.ran_away:
         raise InputError(loop.ran_away)
     settled = loop.time >= CASE.settled_after_s
@@ -81,5 +84,6 @@ def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]
 
 def _from_the_begin(term: Term) -> Term:
     """Return a term whose onset is the run's begin, as the loop might end before it."""
+    # Onsets are the only per-run values in seconds.
     onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
     return replace(term, values=np.where(onset, 0.0, term.values))

@@ -43,6 +43,7 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
         By joint and share, (N·m)²; a joint's shares add up to the square of ``baseline_rmse_nm``.
     """
     remaining = d.after.errors.rms**2
+    # The floor is an estimate and may exceed what remains, but shares must add up.
     floor = np.minimum(d.floor_rms**2, remaining)
     causes = shares_of_causes(d.causes, lambda labels: _mean_square(d, labels))
     scatter = scatter_between_periods(d.validate, d.after.residuals)
@@ -55,6 +56,7 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
         if scatter is None:
             shares[UNEXPLAINED] = above
         else:
+            # The scatter is an estimate as well, so the difference may be negative.
             shares[REPEATS] = float(np.clip(remaining[j] - scatter[j], 0.0, above))
             shares[WANDERS] = above - shares[REPEATS]
         budget[joint] = shares
@@ -80,12 +82,14 @@ def shares_of_causes(
     dict of str to (J,) array
         (N·m)², by label.
     """
+    # At most three causes are named, so there are eight sets at most.
     sets = [frozenset(s) for size in range(len(labels) + 1) for s in combinations(labels, size)]
     remaining = {s: left_by(s) for s in sets} if labels else {}
     orders = factorial(len(labels))
     return {
         label: sum(
             (
+                # Share of the orders in which exactly the causes of ``s`` come before this one.
                 factorial(len(s))
                 * factorial(len(labels) - len(s) - 1)
                 / orders
@@ -107,6 +111,7 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
+    # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here.
     fitted = fit(
         [c for c in d.after.fit.causes if c.label in labels],
         d.train,
@@ -147,5 +152,6 @@ def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -
             / np.maximum(count, 1)[:, np.newaxis]
         )
         squares = squares + np.sum((own - mean[place]) ** 2, axis=0)
+        # Each phase spends one degree of freedom on its mean.
         freedom += int(np.sum(np.maximum(count - 1, 0)))
     return squares / freedom if freedom else None

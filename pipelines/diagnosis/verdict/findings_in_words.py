@@ -31,6 +31,7 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     entry, machine = finding.as_json(), d.baseline.machine
     against = d.selected.dropped
     for cause, (label, _) in zip(entry["causes"], finding.causes, strict=True):
+        # A named cause has fitted values; another one has those of the library.
         effect = d.effects.get(label) or d.effect_of(label)
         cause |= {
             "family": family_of(label, weighed),

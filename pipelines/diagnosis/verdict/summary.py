@@ -31,6 +31,7 @@ def summary(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) ->
 
 def _noise_without_periods(d: Diagnosis) -> str:
     """Report noise that is estimated without differences of periods."""
+    # Noise of the training runs weighs causes; that of the validation runs is the floor.
     weighed, floor = d.prepared.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
@@ -197,6 +198,7 @@ def _named(d: Diagnosis, causes: list[Cause]) -> str:
         for cause, doubt in zip(causes, doubts, strict=True)
     )
     before, after = d.before.errors.rms, d.after.errors.rms
+    # The joint that gains most compared with its noise represents all.
     most = int(((before**2 - after**2) / d.floor_rms**2).argmax())
     joint, machine = d.baseline.joints[most], d.baseline.machine
     gain = (
@@ -233,6 +235,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[Cause]) -> str:
 def _remains(d: Diagnosis, most: int) -> str:
     """Return in words the joint's distance from its floor, and other joints above theirs."""
     ratio = d.after.errors.rms / d.floor_rms
+    # A joint may be above its floor and yet explained, if little of its error is left.
     above = d.left_over
     here = f"{'still ' if above[most] else ''}{ratio[most]:.2f} times the floor"
     others = [

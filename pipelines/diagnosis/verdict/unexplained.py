@@ -49,6 +49,7 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
     dependences : list of Dependence
         Of the extended model's residual.
     """
+    # The term is fitted to training runs and measured on validation runs, as every model is.
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     joints = [

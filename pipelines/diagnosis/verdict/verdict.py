@@ -29,6 +29,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     first, joints = d.validate[0], d.baseline.machine.joints
     causes = [_cause(d, named) for named in d.named]
     named = [Cause.model_validate(cause) for cause in causes]
+    # Validation runs, because a fit hides what a model lacks from the runs that it has seen.
     before = dependences(d.validate, d.before.residuals)
     after = dependences(d.validate, d.after.residuals) if d.causes else before
     remainder = unexplained(d, after) if d.leaves_something else None
@@ -167,6 +168,7 @@ def _cause(d: Diagnosis, named: NamedCause) -> dict[str, Any]:
 
 
 def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
+    # A cause of the whole machine has no joint, and pandas does not find None equal to None.
     here = frame["joint"].isna() if effect.joint is None else frame["joint"] == effect.joint
     numbers = ("value", "ci95_low", "ci95_high")
     return [

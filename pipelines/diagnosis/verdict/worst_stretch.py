@@ -55,8 +55,11 @@ def worst_stretch(d: Diagnosis) -> Stretch:
 
 def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
     for number, (run, residual) in enumerate(zip(d.validate, d.before.residuals, strict=True)):
+        # Blocks near reversals are left out: no fit uses them.
         square = np.sum((residual[:, : len(d.floor_rms)] / d.floor_rms) ** 2, axis=1) * scored(run)
+        # A difference of cumulated sums is the sum over a stretch.
         total = np.concatenate([[0.0], np.cumsum(square)])
+        # A run that is shorter than a stretch is one stretch.
         last = max(run.time[-1] - STRETCH_S, run.time[0])
         for begin in np.arange(run.time[0], last + STEP_S, STEP_S):
             inside = np.searchsorted(run.time, [begin, begin + STRETCH_S])
@@ -94,7 +97,9 @@ def simulated_error(
     length = result.error.shape[1]
     first, last = result.first, result.first + length - 1
     times = run.motion.time
+    # Windows that only overlap the stretch are drawn too.
     shown = (times[last] > stretch.begin) & (times[first] < stretch.end)
+    # Each window starts again from the record, so NaN breaks the line before it.
     time = np.pad(
         times[first[shown, np.newaxis] + np.arange(length)],
         ((0, 0), (0, 1)),

@@ -65,6 +65,7 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
     runs = [d.validate[i] for i in chosen]
     before, after = ([e.residuals[i][:, j] for i in chosen] for e in (d.before, d.after))
     if variable is None:
+        # With named causes, the tone is that of the torque which they explain.
         label, x = _along_tone(
             runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j
         )
@@ -85,9 +86,12 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
 
 def _parts(variable: Variable | None, runs: Sequence[Run], j: int) -> tuple[NDArray, ...]:
     if variable is not None and variable.by_direction:
+        # A mean over both directions hides errors of
+        # friction, which change sign with the direction.
         forward = pooled(runs, [run.state[1][:, j] > 0 for run in runs], j)
         return forward, ~forward
     if variable is not None and variable.name == "time":
+        # Runs do not share a clock, so each has its own mean over time.
         number = pooled(runs, [np.full(len(run.time), i) for i, run in enumerate(runs)], j)
         return tuple(number == i for i in range(len(runs)))
     return (np.ones(int(sum(run.usable[:, j].sum() for run in runs)), dtype=bool),)
@@ -109,12 +113,14 @@ def _along_tone(
     runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> tuple[str, list[NDArray]]:
     """Fold time at the strongest tone in residuals (m,), each run from its tone's crest."""
+    # ``tone`` reads column j of several; the others are copies that it does not read.
     wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
     frequency, _ = tone(runs, wide, j)
     x = []
     for run, residual in zip(runs, residuals, strict=True):
         known = run.usable[:, j]
         turned = np.exp(-2j * np.pi * frequency * run.time)
+        # The coefficient's angle is the phase at time zero, so that its crest comes to lie at zero.
         crest = np.angle(residual[known] @ turned[known]) / (2 * np.pi)
         x.append((frequency * run.time + crest + 0.5) % 1.0 - 0.5)
     return f"cycles of a tone of {frequency:.2f} Hz", x
@@ -156,6 +162,7 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
     axis.axhline(0, color="black", lw=0.6)
     step = max(1, len(seen.x) // DOTS)
     if len(seen.x):
+        # A few outliers would squeeze all other dots.
         low, high = np.percentile(seen.x, [0.2, 99.8])
         axis.set_xlim(low - 0.02 * (high - low) - 1e-9, high + 0.02 * (high - low) + 1e-9)
     kinds = [(seen.before, BEFORE, 0.6)] + [(seen.after, AFTER, 0.4)] * changed

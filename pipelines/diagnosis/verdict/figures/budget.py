@@ -58,6 +58,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
 def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
     """Return the colour of every share."""
     labels = [key for key in next(iter(budget.values())) if key not in COLOURS]
+    # There are as many colours as causes in the largest set.
     return COLOURS | dict(zip(labels, CAUSES, strict=False))
 
 
@@ -92,6 +93,7 @@ def stack(
     whole = highest(shares) * scale
     for key, share in shares.items():
         width = share * scale
+        # A cause that raises the error must not shorten the bars of the others.
         start = right if width >= 0 else left
         axis.barh(row, width, left=start, color=colours[key], height=0.7, edgecolor="white", lw=0.5)
         if abs(width) > ROOM * whole:

@@ -96,6 +96,7 @@ def _shares(axis: Axes, verdict: Verdict) -> None:
             if share > NEGLIGIBLE:
                 seen[PARTS[part]] = Patch(color=COLOURS[part])
             start += share
+            # What shows with a person only is a part of what repeats, at its right end.
             person = min(shares.with_person_only or 0.0, share) if part == "repeats" else 0.0
             if person > NEGLIGIBLE:
                 axis.barh(
@@ -152,6 +153,7 @@ def _dependence(axis: Axes, verdict: Verdict) -> None:
         for joint, ranking in verdict.depends_on.items()
     }
     variables = _variables(ranked)
+    # A joint may lack a variable, such as a temperature.
     shares = np.array([[of.get(name, np.nan) for name in variables] for of in ranked.values()])
     axis.imshow(shares, cmap=SHADES, vmin=0.0, vmax=1.0, aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
@@ -196,12 +198,14 @@ def _bars(d: Diagnosis) -> list[Bar]:
     shown = [(labels, p) for labels, p in ranked[:SHOWN] if p >= LEAST]
     bars = [Bar(p, tuple(_elements(d, labels))) for labels, p in shown]
     rest = 1.0 - sum(p for _, p in shown)
+    # A smaller rest reads as 0.00.
     if rest >= 0.5 * LEAST:
         others = ranked[len(shown) :]
         words = f"{len(others)} other set{'s' * (len(others) > 1)}"
         if (
             shown
             and shown[0][0]
+            # A set that contains the first one agrees with it on these causes.
             and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest
         ):
             words += ", mostly the first and more"
@@ -215,6 +219,7 @@ def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str |
         yield NOTHING, None, False, d.status == "nothing_missing"
     answers = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
     against = d.selected.dropped
+    # Listed causes come before laws.
     for label in sorted(labels, key=lambda one: (one.startswith(LAW), one)):
         assert weighed is not None
         words = label_in_words(label, d.baseline.machine) + AGAINST * (label in against)
@@ -259,6 +264,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     axis.set_yticks([y for y, *_ in ticks], [words for _, words, _ in ticks], fontsize=8)
     for label, (*_, named) in zip(axis.get_yticklabels(), ticks, strict=True):
         label.set_fontweight("bold" if named else "normal")
+    # Without a least number of lines, few bars fill the axis.
     axis.set_ylim(max(top, FEWEST), -0.4)
     axis.set_xlim(0.0, 1.1)
     axis.grid(axis="y", visible=False)

@@ -33,6 +33,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     for j, (row, (joint, ranking)) in enumerate(zip(axes, ranked.items(), strict=True)):
         seen = [against(one.variable, d, joint, verdict.runs) for one in ranking]
         height = max(reach(s.before, s.after) for s in seen)
+        # A joint with fewer variables leaves axes over, which are switched off.
         for axis, one, values in zip(row, ranking, seen, strict=False):
             draw(axis, values, float(d.floor.rms[j]), height, bool(d.causes))
             axis.set_title(_predicted(one, bool(d.causes)), fontsize=8)

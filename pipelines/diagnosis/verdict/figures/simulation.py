@@ -52,6 +52,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     for name, colour, validated in models:
         _angles(axes[0], axes[1], validated, d, stretch, name, colour)
         _torques(axes[2], axes[3], validated, d, stretch, colour)
+    # A simulation that runs away would flatten all others.
     for error in axes[1]:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
@@ -143,6 +144,7 @@ def _angles(
             angle.plot([], [], color=colour, lw=2, label=f"{name} (cannot be simulated)")
             continue
         time, drift = simulated
+        # The error is recorded less simulated angle, so their difference is the simulated one.
         recorded = np.interp(time, motion.time, motion.q[:, j])
         angle.plot(time, recorded - drift[:, j], color=colour, lw=2, label=name)
         error.plot(time, 1e3 * drift[:, j], color=colour, lw=1.4)
@@ -160,6 +162,7 @@ def _torques(
     blocks = stretch.within(run.time)
     for j, (torque, error) in enumerate(zip(torques, errors, strict=True)):
         known = run.usable[blocks, j]
+        # NaN breaks the line near reversals, where no model is fitted.
         residual = np.where(known, validated.residuals[stretch.run][blocks, j], np.nan)
         torque.plot(run.time[blocks], run.measured[blocks, j] - residual, color=colour, lw=2)
         error.plot(run.time[blocks], residual, color=colour, lw=1.1)

@@ -100,6 +100,7 @@ def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
     j = d.baseline.joints.index(joint)
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
+    # With at least twice the floor in view, its band is seen as a band.
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(
         f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict.units[joint]['torque']}"
@@ -123,6 +124,7 @@ def _shown_best(d: Diagnosis, verdict: Verdict) -> tuple[str, str, tuple[str, ..
     """Return joint, variable and kinds of run that show the first cause's torque best."""
     first = verdict.causes[0]
     joint, effect = first.gain.joint, effect_named(first.effect)(joint=first.joint)
+    # The difference of both residuals is the torque that the named causes explain.
     runs = [
         (run, b - a)
         for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
@@ -130,6 +132,7 @@ def _shown_best(d: Diagnosis, verdict: Verdict) -> tuple[str, str, tuple[str, ..
     ]
     j = d.baseline.joints.index(joint)
     moved, by = [run for run, _ in runs], [change for _, change in runs]
+    # The phase imitates all that repeats, and so shows no cause.
     known = [v for v in VARIABLES if v.name != "phase" and knows(v, moved, j)]
     shares = {v.name: variable_share(v, moved, by, j) for v in known} | {
         "tone": tone(moved, by, j)[1]
