@@ -207,6 +207,13 @@ def test_a_joint_that_rests_on_its_friction_while_its_set_point_goes_is_in_no_ot
     )
 
 
+def test_a_counter_that_jumps_where_time_does_not_is_one_fault_and_no_missing_samples(sound):
+    session = [(frame.copy(), metadata) for frame, metadata in sound]
+    session[SPOILED][0].loc[3000:, "sequence"] += 40
+    fault = only_fault(session)
+    assert fault.channel == "sequence" and "disagree by more than 3 samples 1 time" in fault.what
+
+
 def test_a_counter_that_starts_again_is_named(sound):
     session = [(frame.copy(), metadata) for frame, metadata in sound]
     session[SPOILED][0].loc[3000:, "sequence"] -= 3000

@@ -57,7 +57,9 @@ def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
         Time in sample periods, less the sample's number.
     """
     if motion.sequence is not None:
-        return np.maximum(_counted(motion.sequence) - 1, 0)
+        step = _counted(motion.sequence)
+        # A counter that jumps where time does not is a fault of its own: no sample is missing.
+        return np.where(_disagrees(motion, step), 0, np.maximum(step - 1, 0))
     # The negative origin makes the window look ahead.
     ahead = minimum_filter1d(late, HORIZON, origin=-(HORIZON // 2), mode="nearest")
     return np.maximum(np.rint(np.diff(ahead)), 0.0).astype(np.int64)
@@ -71,6 +73,12 @@ def _counted(sequence: NDArray) -> NDArray:
     step = np.diff(sequence)
     usual = max(int(np.median(step)), 1) if len(step) else 1
     return np.asarray(np.rint(step / usual).astype(np.int64))
+
+
+def _disagrees(motion: Motion, step: NDArray) -> NDArray:
+    """Return where the counter's steps (n - 1,) and the clock's differ by several samples."""
+    # A late stamp disagrees too, but by less.
+    return np.abs(np.diff(motion.time) * motion.sample_rate_hz - step) > SINGLE
 
 
 def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
@@ -108,15 +116,13 @@ def _counter(motion: Motion) -> Iterator[Fault]:
     """Report a sample counter that goes back, stands still, or jumps where time does not."""
     if motion.sequence is None:
         return
-    step, time_step = _counted(motion.sequence), np.diff(motion.time) * motion.sample_rate_hz
+    step = _counted(motion.sequence)
     back, stands = step < 0, step == 0
-    # A late stamp disagrees too, but by less than several samples.
-    disagrees = (step > 0) & (np.abs(time_step - step) > SINGLE)
     for bad, what, remedy in (
         (back, "goes back", "the device restarted: split the file there"),
         (stands, "stands still", "samples were duplicated: drop the repeated rows"),
         (
-            disagrees,
+            (step > 0) & _disagrees(motion, step),
             "and time_s disagree by more than 3 samples",
             "find out which of the two clocks jumped",
         ),

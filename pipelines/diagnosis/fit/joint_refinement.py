@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
-from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
+from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_of_change
 from pipelines.diagnosis.evidence.baseline import Baseline, relaxed, with_load
 from pipelines.diagnosis.evidence.baseline_columns import gram_of_runs
 from pipelines.diagnosis.evidence.gram import solve
@@ -188,7 +188,7 @@ def _moved(
     """
     moved = list(causes)
     for (number, i, run, unit), step in zip(places, steps, strict=True):
-        of_unit = step / unit_at(moved[number], i, unit, max(run, 0))
+        of_unit = step / unit_of_change(moved[number], i, unit, max(run, 0))
         acting = None if run < 0 else [run]
         ahead = changed(moved[number], i, unit, of_unit, acting)
         effect, value = ahead.effect, ahead.shapes[max(run, 0)][i]

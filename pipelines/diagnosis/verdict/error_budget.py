@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
-from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.joint_fit import fit, with_loads_of
 from pipelines.diagnosis.fit.validation_error import errors_of, scored
 
 FLOOR, REPEATS, WANDERS, UNEXPLAINED = (
@@ -111,12 +111,15 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
-    # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here.
+    # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here, under
+    # the same joint loads.
+    whole = d.after.fit
     fitted = fit(
-        [c for c in d.after.fit.causes if c.label in labels],
-        d.train,
+        [c for c in whole.causes if c.label in labels],
+        with_loads_of(d.train, whole, d.baseline),
         d.baseline,
         d.before.fit.weights,
+        whole.loads,
     )
     return errors_of(d.validate, evaluate(fitted, d.validate, d.baseline)).rms ** 2
 
