@@ -74,6 +74,7 @@ def type_name(dtype: pa.DataType) -> str:
 
 
 def _alike(actual: pa.DataType, expected: pa.DataType) -> bool:
+    # A column without any value has no type of its own, and fits every one.
     if pa.types.is_null(actual):
         return True
     if pa.types.is_dictionary(actual):
@@ -200,6 +201,7 @@ def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
 
 def _refuse_beyond(largest: float, column: pa.ChunkedArray, where: Place, remedy: str) -> None:
     """Refuse the first number whose size exceeds ``largest``; ``remedy`` ends the message."""
+    # The two ends show whether any row is wrong; the row itself is sought only for the message.
     ends = pc.min_max(column).as_py().values()
     if any(end is not None and abs(end) > largest for end in ends):
         row = first_true(pc.greater(pc.abs(column), largest))

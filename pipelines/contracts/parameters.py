@@ -57,6 +57,8 @@ def _errors_are_possible(table: pa.Table, metadata: Mapping[str, Any], source: s
             " write null where it is not known"
         )
     covariance = np.array(metadata.get("covariance") or np.zeros((0, 0)), dtype=float)
+    # Relative to both standard errors, as parameters of different units differ by orders of
+    # magnitude.
     size = np.sqrt(np.abs(np.diag(covariance)))
     asymmetric = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
     if asymmetric.any() or (np.diag(covariance) < 0.0).any():

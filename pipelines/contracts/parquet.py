@@ -206,6 +206,7 @@ def to_json(metadata: Mapping[str, Any], source: str) -> str:
 
 
 def _plain(value: Any) -> Any:
+    # Arrays and scalars of NumPy.
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Path):
@@ -230,6 +231,7 @@ def _fault_of_bytes(path: Path) -> str:
     # First bytes of an Arrow stream, and so of a run's journal.
     stream = b"\xff\xff\xff\xff"
     start = _start(path)
+    # Its name may have been changed, so the content decides.
     if start == stream:
         return (
             f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
 
+# Strict, as otherwise `true` and "1" would pass for numbers.
 Number = Annotated[FiniteFloat, Field(strict=True)]
 ByJoint = dict[str, Number]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2)]
