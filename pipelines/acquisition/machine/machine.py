@@ -93,6 +93,7 @@ class Machine:
         DeviceError
             Names the drives that were enabled, since an unknown program may have moved the leg.
         """
+        # All are disabled before one of them is complained of.
         enabled = [drive.device.label for drive in self.drives if await make_idle(drive)]
         if enabled:
             raise DeviceError(
@@ -210,6 +211,7 @@ class Machine:
             return self.no_force
         forces = self.no_force.copy()
         answers = await all_answers(sensor.look() for sensor in due)
+        # By cuff, in the order of the recording's columns, not of the rig file.
         for sensor, force in zip(due, answers, strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
@@ -221,6 +223,7 @@ class Machine:
         lag_pause_s = 0.0002
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
+            # Without the leads, counters that were started apart would never agree.
             counts = [
                 reading.sequence - lead for reading, lead in zip(readings, self.leads, strict=True)
             ]

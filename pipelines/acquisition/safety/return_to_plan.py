@@ -55,6 +55,7 @@ def step_to_plan(
     walk = 0.8
     due, before, earlier = path
     along, was, lag = (due - before) * rate_hz, (before - earlier) * rate_hz, before - base
+    # Exactly on the plan: its own set-point, without rounding.
     if lag == 0.0 and speed == was:
         return due, along
     deceleration = safety.deceleration_rad_s2

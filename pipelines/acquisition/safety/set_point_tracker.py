@@ -96,6 +96,7 @@ class SetPointTracker:
         speed = reading.velocity
         if isnan(speed):
             speed = (place - self.sent) / silent_s if silent_s else 0.0
+        # By more than a count, in the direction in which its set-points were moving.
         moves_on = (place - self.sent) * drift > self.resolution * abs(drift)
         self.base = self.in_force = place
         self._speed = clamped(speed, *sorted((0.0, self._speed)))
@@ -171,6 +172,7 @@ class SetPointTracker:
         # Not by the drive's counter: one that runs too fast does not make time go by.
         if self._in_lockstep:
             return 1.0 / self._rate
+        # A drive's clock may be faster than the host's by as much.
         return (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
 
     def _allowed_s(self, now: float) -> float:
