@@ -47,6 +47,7 @@ class SetPoints:
         (end - begin, J) array
             rad.
         """
+        # Slices beyond an array's end are empty, so each part contributes only its own rows.
         first, stop = self.first, self.stop
         before, after = (
             self._lead_in[begin:end],

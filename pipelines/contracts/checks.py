@@ -60,6 +60,7 @@ def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.Chu
             f"{where}: found type {actual}, expected {expected}; write the column as {expected}"
         )
     try:
+        # Arrow's cast is safe by default: a value that would change raises an error.
         return column.cast(dtype)
     except pa.ArrowException as error:
         raise ContractError(
@@ -70,6 +71,7 @@ def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.Chu
 
 def type_name(dtype: pa.DataType) -> str:
     """Return an Arrow type by its name in NumPy: float64, not double."""
+    # Arrow prints float32 as float, and float64 as double.
     return re.sub(r"\bfloat\b", "float32", str(dtype).replace("double", "float64"))
 
 
@@ -152,6 +154,7 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
     ContractError
         Names the first row.
     """
+    # A column of choices has few different values, so rows are searched only for the message.
     unknown = [value for value in pc.unique(column).to_pylist() if value not in (None, *choices)]
     if unknown:
         row = first_true(pc.equal(column, unknown[0]))

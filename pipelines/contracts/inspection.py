@@ -113,6 +113,7 @@ DOCUMENTS = {
 def _document(path: Path) -> Inspection | None:
     from pipelines.contracts import verdict  # its many models take time to build
 
+    # Only a file that calls itself JSON is refused for a fault of its text.
     is_json = path.suffix == ".json" and path.is_file()
     content = verdict.parsed(path) if is_json else _parsed(path, _read_json)
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:

@@ -170,6 +170,7 @@ def refuse_place(path: Path, contract: str) -> None:
         raise ContractError(
             f"{path}: expected a name that ends in .parquet, which is what is written; name another"
         )
+    # An empty file has nothing that could be lost.
     if not path.exists() or path.stat().st_size == 0:
         return
     try:
@@ -181,6 +182,7 @@ def refuse_place(path: Path, contract: str) -> None:
         if _start(path) == MAGIC:
             return  # a truncated table may be replaced
         present = "no Parquet table"
+    # Another version of the same contract may be replaced.
     if present.partition("/")[0] != contract.partition("/")[0]:
         raise ContractError(
             f"{path}: holds {present}, not overwritten with {contract}; choose another name or"

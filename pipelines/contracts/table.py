@@ -443,6 +443,7 @@ class Contract:
         if not column.required or column.name in table.column_names:
             return
         known_names = {column.name for column in known}
+        # Only a column that the contract does not know can be a misspelt one.
         others = [name for name in table.column_names if name not in known_names]
         near = closest(column.name, others)
         raise ContractError(

@@ -51,6 +51,7 @@ class NoiseSettings(Settings):
 class DesignSettings(Settings):
     """The excitation, a Fourier series, and the particle swarm that searches it."""
 
+    # Its inverse is the period, after which the excitation repeats.
     base_frequency_hz: Positive = Field(0.1, description="Frequency of the first harmonic.")
     harmonics: int = Field(5, ge=1, le=20, description="How many harmonics each joint has.")
     theta0_rad: Literal["free"] | tuple[float, float] = Field(

@@ -153,6 +153,7 @@ class Machine:
         )
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
         rig = self.rig
+        # Records are matched by their numbers alone, so these leads must be exact.
         if rig.sampling == "recorder" and rig.clock == "real_time" and rig.clocks == "common":
             assert rig.record_rate_hz  # the rig file is checked: recorders have a rate
             leads = await find_leads(self.drives, rig.record_rate_hz)

@@ -60,6 +60,7 @@ def step_to_plan(
         return due, along
     deceleration = safety.deceleration_rad_s2
     # Half of what a stop slows down by is left for what samples make of a parabola.
+    # So v² = 2 (a / 2) lag, but no further than the lag within one sample.
     softly = min(abs(lag) * rate_hz, sqrt(deceleration * abs(lag)))
     # A drive that is sent from rest to its speed limit within a sample jerks the leg with all of
     # its torque.

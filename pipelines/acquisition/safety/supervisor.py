@@ -153,6 +153,7 @@ class Supervisor:
         """
         self.reason.refuse()
         tracker, progress = self.trackers[joint], self.progress
+        # A second step within one sample would be twice as fast.
         if not progress.has_advanced:
             return tracker.repeat(now)
         return tracker.follow_plan(progress.due(joint, progress.cycle), progress.cycle, now)
@@ -179,6 +180,7 @@ class Supervisor:
         """Stop for an error; the first reason is kept, and further ones follow it."""
         is_reported = self.still_enabled or self.state is State.DISABLED
         self.reason.add(error, is_reported=is_reported)
+        # An idle or disabled machine has nothing to stop.
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
