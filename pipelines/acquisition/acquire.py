@@ -94,9 +94,12 @@ def acquire(
     ExoidError
         The run was refused or stopped; DeviceError where a device or a limit was the reason.
     """
+    # All that the files alone can show is refused first, before any device is connected.
     described = load_rig(rig_path)
     if run.run == "with_human":
         with about(rig_path):
+            # Before `in_force`, whose result holds the limits with a wearer under their common
+            # names.
             refuse_unguarded(described, sample_rate_hz)
     rig = described.in_force(run.run)
     trajectory = read_trajectory(trajectory_path)
@@ -115,6 +118,7 @@ def acquire(
     begin(rig, trajectory)
     open_folder(output.parent)
     with about(rig_path):
+        # A recording's rate is that of its rows, not of the set-points.
         recorded_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
     metadata = _metadata(rig, run, trajectory, recorded_hz, mechanism or MechanismSettings())
     metadata |= {"trajectory": trajectory_path.name}
@@ -138,6 +142,7 @@ def acquire(
             supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults, claim
         )
         run_to_its_end(recording, supervisor.abort)
+        # Within the block: a signal that comes now must not cut the recording short.
         return finish_run(output, journal, supervisor)
 
 
@@ -171,6 +176,7 @@ async def record_run(
         if rig.clock == "real_time":
             await until_signal(refuse_unkept_rate(machine, supervisor.rate), stopped_by)
         sampling = sampling_of(machine, supervisor.rate, supervisor.check_records)
+        # After the rehearsal, whose records must not be taken for those of the run.
         await until_signal(machine.empty_records(), stopped_by)
         try:
             with _opened(path, ["time_s", *columns_of(machine)], metadata) as journal:
@@ -203,6 +209,7 @@ async def _ready(
 ) -> NDArray:
     """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
     await until_signal(machine.connect(), stopped_by)
+    # Before anything is written, as a drive of another program must not be disturbed.
     await until_signal(machine.refuse_driven(), stopped_by)
     # Signals wait until every drive is idle, and no fault reset is left half way.
     if reset_faults:

@@ -43,6 +43,7 @@ class Exchange:
         answers = await self.machine.cycle(self._cycle, partial(self._in_turn, decide))
         self.latencies.add(time.perf_counter() - asked_at)
         for joint, drive in enumerate(self.machine.drives):
+            # That is the time of the last answer, so a drive without one now is not marked.
             self._supervisor.trackers[joint].mark_answered(drive.answered_at)
             self.update(joint)
         return answers
@@ -54,6 +55,7 @@ class Exchange:
             now = time.monotonic()
             if self.is_stale(joint, now) or self._supervisor.is_late(now):
                 await self.find(joint)
+                # The cycle's step is outdated by now; `hold` steps by the host's clock.
                 decide = self._supervisor.hold
             return await drive.exchange(decide(joint, time.monotonic()))
 

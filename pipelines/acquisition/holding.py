@@ -38,6 +38,8 @@ class Holding:
         look_pause = 0.25
         drive = self._exchange.machine.drives[joint]
         period = 1.0 / self._supervisor.rate
+        # The plan itself sends one set-point a sample. This task steps in after two samples without
+        # one.
         patience, look_at = SLACK_SAMPLES * period, 0.0
         while True:
             sent_at = self._exchange.sent_at(joint)

@@ -116,8 +116,10 @@ class Loop:
             if supervisor.has_missed(cycle, now):
                 try:
                     newest, now = await self._exchange.find_all()
+                # `has_missed` refuses to go on once the watchdog has expired.
                 except Unanswered:
                     continue
+                # The drives have gone on while they were asked.
                 cycle = max(cycle, newest)
             supervisor.advance(cycle, now)
             answers = await self._exchange.cycle(supervisor.set_point)

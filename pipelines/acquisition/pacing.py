@@ -65,6 +65,8 @@ class PhaseLock:
             if now > self._fresh_until(count, asked) and now - began < self._patience_s:
                 continue  # by now another sample may be latched
             if count != before:
+                # As many periods later as samples were found, and a little earlier, towards the
+                # latch.
                 self._due += (count - looked - LEAN) * self._period
                 self._count = count
                 return count

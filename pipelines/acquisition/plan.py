@@ -67,6 +67,7 @@ def make_plan(
     InputError
         The trajectory, or every ramp of at most ``LONGEST_RAMP_S``, breaks a limit.
     """
+    # Checked before with the file alone; here it gives the number of set-points.
     samples = check_trajectory(rig, trajectory, duration_s, sample_rate_hz)
     lead_in = _ramp(rig, trajectory, start, sample_rate_hz, before=True, end_s=duration_s)
     lead_out = _ramp(rig, trajectory, start, sample_rate_hz, before=False, end_s=duration_s)
@@ -153,6 +154,7 @@ def _ramp(
         # grows towards the motion.
         motion = _extended(trajectory, -ahead[::-1] if before else end_s + ahead)
         reference = rest + (share if before else share[::-1]) * (motion - rest)
+        # With where the leg stands, as the first or last step counts as well.
         path = np.vstack([rest, reference] if before else [reference, rest])
         speed = np.abs(np.diff(path, axis=0)).max(axis=0) * rate
         if (speed <= limits).all():

@@ -29,6 +29,7 @@ def refuse_run_outside(rig: RigSettings, run: NDArray, first: int, rate: float) 
     def when(k: int) -> str:
         return f"at {(first + k + 0.5) / rate:.3f} s"
 
+    # For the run alone: ramps lead from where the leg stands, which may be nearer to a limit.
     margin = rig.safety.angle_margin_rad
     limits = [(drive.angle_rad[0] + margin, drive.angle_rad[1] - margin) for drive in rig.drive]
     remedy = " (its limits less angle_margin_rad); make the excitation smaller"
@@ -117,6 +118,7 @@ def _refuse_beyond(
 ) -> None:
     """Refuse values (n, J) outside each joint's limits, or that are no numbers."""
     for j, (drive, (low, high)) in enumerate(zip(rig.drive, limits, strict=True)):
+        # Negated, so that NaN is outside.
         outside = ~((values[:, j] >= low) & (values[:, j] <= high))
         if outside.any():
             k = int(np.argmax(outside))

@@ -69,6 +69,8 @@ class ProgressReport:
         )
         if row is not None:
             set_point = supervisor.progress.set_point(row)
+            # All samples since the drives were enabled: those of the first two cycles carry no
+            # set-point.
             samples = (set_point + 2) * row.samples_per_cycle
             gaps = self._writer.gaps
             progress = replace(

@@ -73,6 +73,7 @@ def record_journal(
         journal = JournalFile(path)
         summary = summarize(journal)
         place, samples = recording_path(output, summary.abort), summary.samples
+        # A run that was stopped before its first sample leaves no empty recording.
         if samples or not (summary.abort or summary.damaged):
             write_recording(journal, place, summary)
     except (ExoidError, OSError) as error:

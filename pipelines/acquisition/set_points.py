@@ -27,6 +27,7 @@ class SetPoints:
 
     def __getitem__(self, index: int) -> NDArray:
         if not self._begin <= index < self._begin + len(self._block):
+            # Set-points come due in order, so the next ones are computed with this one.
             self._begin, self._block = index, self.between(index, min(index + BLOCK, len(self)))
         return self._block[index - self._begin]
 
@@ -46,6 +47,7 @@ class SetPoints:
         (end - begin, J) array
             rad.
         """
+        # Slices beyond an array's end are empty, so each part contributes only its own rows.
         first, stop = self.first, self.stop
         before, after = (
             self._lead_in[begin:end],

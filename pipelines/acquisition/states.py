@@ -45,6 +45,7 @@ def _has_reason(now: Conditions) -> bool:
 TRANSITIONS: Mapping[State, Mapping[State, Guard]] = {
     State.IDLE: {State.CHECK: lambda now: True},
     State.CHECK: {State.RAMP: lambda now: now.all_enabled, State.ABORT: _has_reason},
+    # After missed samples the plan may be past the run already; then the run is passed through.
     State.RAMP: {State.RUN: lambda now: now.due is not State.RAMP, State.ABORT: _has_reason},
     State.RUN: {
         State.RAMP_DOWN: lambda now: now.due is State.RAMP_DOWN,

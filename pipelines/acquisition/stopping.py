@@ -36,6 +36,7 @@ class Stopping:
 
     async def run(self) -> None:
         """Bring every drive to rest and take its torque away."""
+        # A drive that was sent nothing is disabled since `make_idle`.
         joints = [j for j, drive in enumerate(self._drives) if drive.was_sent]
         self._moving = set(joints)
         stops = [asyncio.ensure_future(self._stop(joint)) for joint in joints]

@@ -43,6 +43,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{TEMPORARY}")
     try:
         yield temporary
+        # Synced before it is renamed, or a power cut could leave an empty file under the final
+        # name.
         _sync(temporary, os.O_RDWR)  # Windows syncs only files that are open for writing
         _replace(path, temporary, is_equal=equal_except_time(path, temporary))
     except BaseException as error:
@@ -116,6 +118,8 @@ def all_or_none(folder: Path, last: str | None = None) -> Iterator[Path]:
             refuse_special(path)
         equal = {file: equal_except_time(path, file) for file, path in targets.items()}
         if last and not all(equal.values()):
+            # If the process is killed from here on, no old `last` stands with new files of the
+            # others.
             targets[Path(temporary) / last].unlink(missing_ok=True)
             equal[Path(temporary) / last] = False
         for file in sorted(targets, key=lambda file: file.name == last):
@@ -134,6 +138,7 @@ def _replace(path: Path, new: Path, *, is_equal: bool) -> None:
 @contextmanager
 def folder_to_fill(path: Path) -> Iterator[None]:
     """Open a folder for the block; remove the folders created for it if the block fails."""
+    # The innermost first, as only an empty folder can be removed.
     created = [folder for folder in (path, *path.parents) if not folder.exists()]
     open_folder(path)
     try:

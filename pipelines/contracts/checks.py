@@ -60,6 +60,7 @@ def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.Chu
             f"{where}: found type {actual}, expected {expected}; write the column as {expected}"
         )
     try:
+        # Arrow's cast is safe by default: a value that would change raises an error.
         return column.cast(dtype)
     except pa.ArrowException as error:
         raise ContractError(
@@ -70,10 +71,12 @@ def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.Chu
 
 def type_name(dtype: pa.DataType) -> str:
     """Return an Arrow type by its name in NumPy: float64, not double."""
+    # Arrow prints float32 as float, and float64 as double.
     return re.sub(r"\bfloat\b", "float32", str(dtype).replace("double", "float64"))
 
 
 def _alike(actual: pa.DataType, expected: pa.DataType) -> bool:
+    # A column without any value has no type of its own, and fits every one.
     if pa.types.is_null(actual):
         return True
     if pa.types.is_dictionary(actual):
@@ -151,6 +154,7 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
     ContractError
         Names the first row.
     """
+    # A column of choices has few different values, so rows are searched only for the message.
     unknown = [value for value in pc.unique(column).to_pylist() if value not in (None, *choices)]
     if unknown:
         row = first_true(pc.equal(column, unknown[0]))
@@ -200,6 +204,7 @@ def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
 
 def _refuse_beyond(largest: float, column: pa.ChunkedArray, where: Place, remedy: str) -> None:
     """Refuse the first number whose size exceeds ``largest``; ``remedy`` ends the message."""
+    # The two ends show whether any row is wrong; the row itself is sought only for the message.
     ends = pc.min_max(column).as_py().values()
     if any(end is not None and abs(end) > largest for end in ends):
         row = first_true(pc.greater(pc.abs(column), largest))

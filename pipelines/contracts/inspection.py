@@ -61,6 +61,7 @@ def inspect(path: Path) -> Inspection:
 
 def _table(path: Path) -> Inspection:
     contract = contract_of(path)
+    # Without checks: a table that breaks its contract is to be described as well.
     table, metadata = parquet.load(path)
     fault = None
     try:
@@ -80,6 +81,7 @@ def _table(path: Path) -> Inspection:
 
 
 def _column(table: pa.Table, name: str) -> dict[str, Any]:
+    # By position: a foreign file may have a name twice, which Arrow refuses to look up.
     index = table.column_names.index(name)
     column, about = table.column(index), table.schema.field(index).metadata or {}
     low, high, missing = None, None, column.null_count
@@ -111,6 +113,7 @@ DOCUMENTS = {
 def _document(path: Path) -> Inspection | None:
     from pipelines.contracts import verdict  # its many models take time to build
 
+    # Only a file that calls itself JSON is refused for a fault of its text.
     is_json = path.suffix == ".json" and path.is_file()
     content = verdict.parsed(path) if is_json else _parsed(path, _read_json)
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:

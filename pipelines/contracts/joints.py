@@ -126,6 +126,7 @@ def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
     tuple of Joint
         By default hip and knee, both revolute.
     """
+    # A leg's files need not list their joints; those of any other machine do.
     if "joints" not in metadata:
         return HIP_AND_KNEE
     return tuple(

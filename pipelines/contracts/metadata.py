@@ -112,6 +112,7 @@ class RunKeys(TableKeys):
     subject: str | None = None
     session: str | None = None
     trajectory: str | None = None
+    # First missing time, s, and number of missing samples of each gap.
     gaps: list[tuple[Finite, Annotated[int, Field(gt=0)]]] | None = None
     abort: str | None = None
     recovered: bool | None = None

@@ -36,6 +36,7 @@ MOTION = Contract(
         per_joint("angle_measured", "measured joint angle"),
         per_joint("velocity", "derivative of the filtered angle"),
         per_joint("acceleration", "second derivative of the filtered angle"),
+        # Not filtered: a fit filters torque and regressor alike, or their relation would not hold.
         per_joint("torque", "what the drive delivers at the joint, as measured"),
         per_joint(
             "velocity_measured", "the drive's own velocity estimate", required=False, nullable=True

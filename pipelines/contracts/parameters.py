@@ -49,6 +49,7 @@ def _covariance_has_a_row_for_each_parameter(
 
 def _errors_are_possible(table: pa.Table, metadata: Mapping[str, Any], source: str) -> None:
     smallest = pc.min(table["std_error"]).as_py()
+    # None where no standard error was estimated.
     if smallest is not None and smallest < 0.0:
         row = first_true(pc.less(table["std_error"], 0.0))
         value = table["std_error"][row].as_py()
@@ -57,6 +58,8 @@ def _errors_are_possible(table: pa.Table, metadata: Mapping[str, Any], source: s
             " write null where it is not known"
         )
     covariance = np.array(metadata.get("covariance") or np.zeros((0, 0)), dtype=float)
+    # Relative to both standard errors, as parameters of different units differ by orders of
+    # magnitude.
     size = np.sqrt(np.abs(np.diag(covariance)))
     asymmetric = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
     if asymmetric.any() or (np.diag(covariance) < 0.0).any():

@@ -170,6 +170,7 @@ def refuse_place(path: Path, contract: str) -> None:
         raise ContractError(
             f"{path}: expected a name that ends in .parquet, which is what is written; name another"
         )
+    # An empty file has nothing that could be lost.
     if not path.exists() or path.stat().st_size == 0:
         return
     try:
@@ -181,6 +182,7 @@ def refuse_place(path: Path, contract: str) -> None:
         if _start(path) == MAGIC:
             return  # a truncated table may be replaced
         present = "no Parquet table"
+    # Another version of the same contract may be replaced.
     if present.partition("/")[0] != contract.partition("/")[0]:
         raise ContractError(
             f"{path}: holds {present}, not overwritten with {contract}; choose another name or"
@@ -206,6 +208,7 @@ def to_json(metadata: Mapping[str, Any], source: str) -> str:
 
 
 def _plain(value: Any) -> Any:
+    # Arrays and scalars of NumPy.
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Path):
@@ -230,6 +233,7 @@ def _fault_of_bytes(path: Path) -> str:
     # First bytes of an Arrow stream, and so of a run's journal.
     stream = b"\xff\xff\xff\xff"
     start = _start(path)
+    # Its name may have been changed, so the content decides.
     if start == stream:
         return (
             f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"

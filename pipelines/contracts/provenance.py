@@ -78,6 +78,7 @@ def recording_behind(path: Path) -> str:
         The file is damaged or of another program.
     """
     metadata = parquet.header(path)[1]
+    # A motion has one input, its recording.
     if metadata["contract"].startswith("motion/") and metadata.get("inputs"):
         return str(metadata["inputs"][0]["sha256"])
     return sha256(path)

@@ -3,6 +3,7 @@
 from pipelines.contracts.metadata import RunKeys
 from pipelines.contracts.table import INTEGER, Column, Contract, per_joint
 
+# Null between two readings, as sensors may be read less often than drives.
 CUFF_FORCES = tuple(
     Column(
         f"{segment}_{side}_force_{axis}_n",

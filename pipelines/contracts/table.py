@@ -16,6 +16,7 @@ from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
 from pipelines.validation.suggestion import closest
 
+# For annotations alone: pandas starts slowly, and Arrow is enough for most commands.
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
@@ -278,6 +279,7 @@ class Contract:
         """
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
+        # Everything is checked before the file is opened.
         rows = self._conform(self._to_arrow(frame, str(path)), metadata, str(path))
         parquet.save(path, [rows], metadata)
 
@@ -303,6 +305,7 @@ class Contract:
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
         self._check_metadata(metadata, str(path))
+        # Rules need all rows at once; no contract that is written in pieces has any.
         parquet.save(path, self.conformed(pieces, metadata, str(path)), metadata)
 
     def refuse_place(self, path: Path) -> None:
@@ -344,6 +347,7 @@ class Contract:
             )
 
     def _to_arrow(self, frame: "pd.DataFrame", source: str) -> pa.Table:
+        # pandas allows a name twice; as keys of `arrays` one of the two would be lost.
         twice = frame.columns[frame.columns.duplicated()]
         if len(twice):
             raise ContractError(
@@ -365,6 +369,7 @@ class Contract:
     def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
         """Return a whole table checked, with the contract's types, units and meanings."""
         self._check_metadata(metadata, source)
+        # One piece in, one piece out: an empty table has raised an error.
         (conformed,) = self.conformed([table], metadata, source)
         self._apply_rules(conformed, metadata, source)
         return conformed
@@ -399,6 +404,7 @@ class Contract:
         ContractError
             The table breaks the contract, or has no rows.
         """
+        # Columns that the contract does not know are kept as they are.
         known = self._columns_for(joints_of(metadata))
         columns = [c for c in known if named is None or c.name in named]
         rows, last_row = 0, None
@@ -422,6 +428,7 @@ class Contract:
     ) -> None:
         if self.time is None or self.time not in piece.column_names:
             return
+        # With the last row of the piece before, which is why the first row number is one less.
         rows = pa.concat_tables([last_row, piece]) if last_row else piece
         where = checks.Place(source, self.time, first_row - (1 if last_row else 0))
         checks.refuse_time_not_increasing(rows, self.time, self.restarts_with, where)
@@ -436,6 +443,7 @@ class Contract:
         if not column.required or column.name in table.column_names:
             return
         known_names = {column.name for column in known}
+        # Only a column that the contract does not know can be a misspelt one.
         others = [name for name in table.column_names if name not in known_names]
         near = closest(column.name, others)
         raise ContractError(
@@ -455,6 +463,8 @@ class Contract:
         checks.refuse_missing(values, column.nullable, where)
         if column.choices:
             checks.refuse_unknown_values(values, column.choices, where)
+        # Only physical quantities have a plausible range: a fitted parameter has its unit in
+        # another column.
         if self.is_bounded and column.dtype == FLOAT and column.unit and column.name != self.time:
             checks.refuse_implausible(values, where)
             if column.unit == "rad":
@@ -465,6 +475,7 @@ class Contract:
 
     def _check_metadata(self, metadata: Mapping[str, Any], source: str) -> None:
         try:
+            # As JSON, the form of the file: a strict model would refuse tuples and NumPy's numbers.
             self.metadata.model_validate_json(parquet.to_json(metadata, source))
         except ValidationError as error:
             fault = explain(error, dict(metadata))

@@ -13,6 +13,7 @@ class TrajectoryKeys(TableKeys):
 
     omega_rad_s: Positive | None = None
     theta0_rad: list[Finite] | None = None
+    # q_j = theta0_j + sum over k of a_jk sin(k omega t) + b_jk cos(k omega t), k from 1.
     a: Matrix | None = None
     b: Matrix | None = None
     criterion: str | None = None

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
 
+# Strict, as otherwise `true` and "1" would pass for numbers.
 Number = Annotated[FiniteFloat, Field(strict=True)]
 ByJoint = dict[str, Number]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -182,6 +183,7 @@ class Control(_Object):
     run: str | None = None
     controller: dict[str, Any] | None = None
     without: Loop | None = None
+    # The key is a reserved word of Python.
     with_: Loop | None = Field(None, alias="with")
 
 
@@ -277,6 +279,7 @@ class Verdict(_Object):
 
     @model_validator(mode="after")
     def _joints_agree(self) -> "Verdict":
+        # Every joint has a noise floor, so all other tables must have the same joints.
         joints = set(self.noise_floor_nm)
         for key, of_joints in self._tables():
             if set(of_joints) != joints:

@@ -41,9 +41,11 @@ def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Wi
     first = start = 0
     for piece in pieces:
         held = piece if held is None else pa.concat_tables([held, piece])
+        # A core is complete only with the margin after it.
         while held.num_rows >= start + length + margin:
             rows = held.slice(0, start + length + margin)
             yield Window(rows, first, slice(start, start + length))
+            # Rows before the margin of the next core are not needed any more.
             passed = max(0, start + length - margin)
             held, first, start = held.slice(passed), first + passed, start + length - passed
     if held is not None and held.num_rows > start:

@@ -17,6 +17,7 @@ _FORMAT = {
     "float64": "d",
 }
 
+# Step of a slice: a little-endian order is the standard's big-endian one, reversed.
 _STEP = {"big": 1, "little": -1}
 
 
@@ -79,8 +80,11 @@ class Block:
         for name, (scale, offset), limits in zip(
             self.names, self._scales, self._ranges, strict=True
         ):
+            # A count beyond the range would raise an error in `struct`, so it saturates. A float is
+            # not rounded.
             value = (values[name] - offset) / scale
             raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
+        # Registers without a name are written as 0; the block of a drive has none (`check_no_gap`).
         packed = bytearray(2 * self.count)
         for place, byte in zip(self._places, self._values_format.pack(*raw), strict=True):
             packed[place] = byte
@@ -99,6 +103,7 @@ class Block:
         float
             SI units; 0 for other registers.
         """
+        # Unsigned registers alone wrap around: 0 follows their greatest count.
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0

@@ -13,6 +13,7 @@ def exact_event_loop() -> asyncio.AbstractEventLoop:
     most_files = 512
     descriptor = os.open(os.devnull, os.O_RDONLY)  # the lowest free one
     os.close(descriptor)
+    # asyncio's choice on Linux, epoll, rounds each sleep up to whole milliseconds. Select does not.
     if sys.platform != "win32" and descriptor <= most_files:
         selector = selectors.SelectSelector()
         with suppress(OSError):  # where select supports only sockets

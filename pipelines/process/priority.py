@@ -12,6 +12,8 @@ def urgent() -> Iterator[None]:
     # A garbage collection through all imported modules would cost several samples.
     gc.freeze()
     granted = False
+    # Priority 1, the lowest of real time, already precedes every ordinary process. Linux refuses it
+    # to ordinary users; other systems may not have the call.
     with suppress(PermissionError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
         granted = True

@@ -38,6 +38,7 @@ class OwnClock:
             Interpolated at the device's instants; none between two of them.
         """
         # Samples of the plant from a device's sampling instant until the sample is available.
+        # So the cubic always has two samples of the plant after the instant.
         delay = 2.5
         self._seen.append(chunk)
         latest = (chunk.sequence[-1] + 1 - delay) / self._plant_rate
@@ -51,6 +52,8 @@ class OwnClock:
         values = _between(
             seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0)
         )
+        # By the device's own clock, samples are exactly one nominal period apart, however fast it
+        # runs.
         began = round(self._offset_s * self._rate)
         return replace(
             values, sequence=began + numbers, time=self._offset_s + instants * self._gain
@@ -59,6 +62,7 @@ class OwnClock:
 
 def _between(seen: Samples, at: NDArray) -> Samples:
     """Interpolate the plant's samples at fractional places ``at`` (k,) by cubic polynomials."""
+    # Four samples around the place, the outermost at -1 and 2; at the ends the nearest four.
     base = np.clip(np.floor(at).astype(int), 1, max(len(seen.time) - 3, 1))
     x = at - base
     weights = np.stack(cubic_weights(x))

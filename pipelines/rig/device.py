@@ -73,6 +73,8 @@ class Device(ABC):
         if written is not None and not self.takes(address, count):
             return ExcCodes.ILLEGAL_ADDRESS
         self.rig.catch_up()  # with the old set-point, before a write takes effect
+        # pymodbus serves FC23 by two calls, a write and then a read. The exchange ends with the
+        # read.
         self.written |= written is not None
         if written is None:
             self.show(self.latched())
@@ -181,6 +183,8 @@ class Drive(Device):
             "time": sample.time[0] % (self.read.span("time") or np.inf),
             "angle": sample.angle[0, j],
             "velocity": sample.velocity[0, j],
+            # A drive reports a current; a client multiplies it by the same constants of the rig
+            # file.
             "current": sample.torque[0, j] / self.torque_per_ampere,
             "temperature": sample.temperature[0, j],
             # The present state, so that a control word shows at once, not at the next sample.
@@ -206,5 +210,6 @@ class Sensor(Device):
 
 def one(samples: Samples, k: int) -> Samples:
     """Return the k-th sample."""
+    # For k = -1 the end must be None, as slice(-1, 0) is empty.
     places = slice(k, k + 1 or None)
     return Samples(**{name: values[places] for name, values in vars(samples).items()})

@@ -15,6 +15,7 @@ class NoRequest(ModbusPDU):
 
     def __init__(self, function: int) -> None:
         super().__init__()
+        # Bit 7 marks an exception reply, which pymodbus sets in the reply itself.
         self.function_code = function & 0x7F
 
     async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
@@ -44,6 +45,7 @@ class Handler(ServerRequestHandler):
         request = self.last_pdu
         if request is None or request.dev_id in self.server.context.device_ids():
             await super().handle_request()
+        # On a bus a missing unit is silent; a gateway reports it.
         elif not self.server.ignore_missing_devices:
             self.server_send(
                 ExceptionResponse(
@@ -58,6 +60,8 @@ class Handler(ServerRequestHandler):
 
 def guarded(server: Server) -> Server:
     """Return a server that no client can stop or let grow without bounds."""
+    # Where this is None, pymodbus replies to function 0, and drops all bytes that came with the
+    # frame.
     decode = server.decoder.decode
     server.decoder.decode = lambda frame: decode(frame) or NoRequest(frame[0])  # type: ignore[method-assign]
     connection = (server.trace_packet, server.trace_pdu, server.trace_connect)

@@ -58,6 +58,7 @@ async def listening(
         return
     server = _network_server(line, devices)
     async with _serving(server, line.place, requests):
+        # For port 0 the system has chosen the number, which clients need.
         number = cast(asyncio.Server, server.transport).sockets[0].getsockname()[1]
         yield f"{line.host}:{number}"
 

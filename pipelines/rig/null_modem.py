@@ -13,6 +13,7 @@ def null_modem() -> Iterator[tuple[str, str]]:
     loop = asyncio.get_running_loop()
     pairs = [os.openpty(), os.openpty()]
     for (near, _), (far, _) in (pairs, pairs[::-1]):
+        # A port that nobody reads fills up, and must not block the event loop of all lines.
         os.set_blocking(near, False)
         loop.add_reader(near, _pass_on, near, far)
     try:

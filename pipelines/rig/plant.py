@@ -100,6 +100,7 @@ class Plant:
         warming = settings.temperature
         self._warming = (warming.ambient_c, warming.heating_c_nm2, warming.time_constant_s)
         self._assembly.temperature[:] = warming.ambient_c
+        # By the rig's seed, not the run's: a sensor keeps its zero from run to run.
         self._zeros = np.random.default_rng(settings.seed).normal(0.0, settings.cuff.zero_n, (4, 3))
         self._samples = 0
 
@@ -161,6 +162,8 @@ class Plant:
         if settings.ripple_correlation_s > 0:
             memory = np.exp(-1.0 / (self.sample_rate_hz * settings.ripple_correlation_s))
         white = self._noise.standard_normal((n, len(JOINTS))) * settings.ripple_nm
+        # First-order autoregressive noise, x = m x' + sqrt(1 - m²) w. Once settled, its rms is that
+        # of w for every m.
         return _first_order(
             np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple
         )
@@ -195,6 +198,8 @@ def term_of(effect: PlantEffect, source: str) -> Term:
 
 def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term]) -> Model:
     """Return the model of the machine, with the person as a rigid body of their own."""
+    # X1 to X4 are sums over bodies, so those of exoskeleton and wearer add up. Both sums must be
+    # possible.
     exo, human = np.array(settings.exo_inertial), np.array(settings.human_inertial)
     for name, X in (("exo_inertial", exo), ("exo_inertial + human_inertial", exo + human)):
         broken = LEG.unrealizable(X, geometry)
@@ -250,6 +255,8 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
         for j in range(joints):
             temperature[k, j] = a.temperature[j]
+            # Copper losses grow with the square of the current, and so of the torque. One Euler
+            # step is enough: the period is far shorter than the time constant.
             final = ambient + heating * torque[k, j] ** 2
             a.temperature[j] += period / time_constant * (final - a.temperature[j])
             direction[j] = np.sign(truth[k, DQ, j])
@@ -262,6 +269,7 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
             loop.load,
             temperature[k],
         )
+        # The torque that the limb takes in the middle of the window is what the cuffs transmit.
         for i in range(a.bounds[4]):
             if of_human[i]:
                 values = a.values[a.value_at[i] : a.value_at[i + 1]]

@@ -40,6 +40,7 @@ def record(
         Table and metadata of ``recording/1``.
     """
     rate = plant.sample_rate_hz
+    # The lead-in moves the plant on; its samples are not part of the recording.
     lead, count = round(LEAD_S * rate), round(duration_s * rate)
     enabled = np.ones(len(JOINTS), dtype=np.bool_)
     plant.run(_lead_in(plant.reference, trajectory, lead, rate), enabled)
@@ -64,8 +65,12 @@ def record(
 def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) -> NDArray:
     """Return set-points (n, J) rad from rest into the motion, by a share from 0 to 1 of it."""
     ahead = (np.arange(-samples, 0) + 0.5) / rate
+    # Three quarters of the lead are the ramp. In the last second the leg follows the motion in
+    # full.
     share = smooth_share((ahead + LEAD_S) / (0.75 * LEAD_S))[:, np.newaxis]
     period = trajectory.period_s
+    # A motion that does not repeat has no angles before its beginning: its first stands for
+    # them.
     motion = trajectory.at(np.mod(ahead, period) if period else np.zeros(samples))[0]
     return start + share * (motion - start)
 

@@ -47,6 +47,7 @@ class Ring:
         if self.fifo is not None:
             self._queue.append(words)
             return
+        # Record n has its place in the ring by n modulo the capacity, as clients expect.
         place = sequence % self.capacity * self._words
         self.held[place : place + self._words] = words
         self.last = sequence
@@ -63,6 +64,7 @@ class Ring:
         address, count : int
             First requested register, and number of registers.
         """
+        # Only what was requested: a ring may have thousands of registers, and is read often.
         low, high = max(address, self.address), min(address + count, self.address + len(self.held))
         if low < high:
             registers[low - first : high - first] = self.held[

@@ -45,6 +45,7 @@ def hidden_effects(path: Path) -> tuple[Term, ...]:
     """Return the effects that a sealed file's seed chooses."""
     file = load_toml(path, SealedFile)
     rng = np.random.default_rng(file.seed)
+    # The order of the draws decides: another order would hide other effects for the same seed.
     chosen = rng.permutation(len(file.possibility))[: file.hidden]
     return tuple(
         _draw_effect(file.possibility[i], rng, f"{path}: possibility[{i}]") for i in chosen

@@ -67,6 +67,7 @@ async def serve(
     for settings, device in zip(
         (*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True
     ):
+        # Devices on no line share a server where they share a port, as units of one gateway.
         own_port = settings.port if port is None else port
         key = own_port if settings.line is None else settings.line
         on_line[key].append(device.as_served())
@@ -128,6 +129,7 @@ def serve_file(
     build_plant(rig, path, run, seed, sample_rate_hz).run(
         np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool)
     )
+    # A second plant: in the first one, a sample of the seed's noise is spent.
     plant = build_plant(rig, path, run, seed, sample_rate_hz)
 
     async def until_stopped() -> None:

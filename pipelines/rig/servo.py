@@ -45,6 +45,7 @@ class Servo:
         self._map = registers
         self._cycle = samples_per_cycle
         self._limits = angle_rad
+        # Steps are in rad per sample, so this is in rad per sample squared.
         self._slowing = deceleration_rad_s2 / sample_rate_hz**2
         self._heartbeat_samples = (
             None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
@@ -67,6 +68,7 @@ class Servo:
     def status(self) -> int:
         """The status word; bits without a meaning in the map are 0."""
         # A fault bit may be part of enabled_mask, but must not be set by disabling alone.
+        # A disabled drive shows all of these bits inverted, which cannot equal the enabled value.
         is_enabled, mask = self._map.enabled_value, self._map.enabled_mask & ~self._map.fault_mask
         word = is_enabled if self.enabled else is_enabled ^ mask
         # The lowest fault bit, as the map does not distinguish faults.
@@ -92,7 +94,7 @@ class Servo:
             self._pace = (set_point - self._set_point) / (cycles * self._cycle)
         elif cycles:
             self._pace = 0.0
-        # One cycle after the last set-point's; CATCH slowly adapts this to when set-points come.
+        # One cycle after the last set-point's; `catch` slowly adapts this to when set-points come.
         way = self._way - self._since + cycles * self._cycle
         self._from, self._way = self._last, max(way + catch * (self._cycle - way), 1.0)
         self._since = 0
@@ -105,6 +107,8 @@ class Servo:
 
         The time decides. Where it is ambiguous, the set-points' speed does.
         """
+        # In cycles since the last set-point should have come, one cycle before it is reached. From
+        # n - EARLY to n + LATE the time means n.
         waited = (self._since + self._cycle - self._way) / self._cycle
         cycles = floor(waited + EARLY)
         if cycles != floor(waited - LATE):
@@ -134,6 +138,7 @@ class Servo:
         reference = self._reference() if self.enabled else angle
         self._step, self._last = reference - self._last, reference
         self._since += 1
+        # A watchdog that expires in motion first lets the drive come to rest (docs/safety.md, 6.5).
         if (
             self.enabled
             and self._heartbeat_samples is not None
@@ -146,6 +151,8 @@ class Servo:
     def _reference(self) -> float:
         if self._control == self._map.halt:
             return self._last
+        # Three stretches: linear to the set-point, on at the set-points' speed, and slower until
+        # rest.
         after = self._since + 1
         if after <= self._way:
             return self._from + (self._set_point - self._from) * after / self._way
@@ -154,4 +161,5 @@ class Servo:
             slower = max(abs(self._step) - self._slowing, 0.0)
             reference = self._last + (slower if self._step > 0 else -slower)
         low, high = self._limits
+        # Between n + LATE and n + 1 - EARLY, the speed of the set-points decides: n or n + 1.
         return min(max(reference, low), high)

@@ -62,7 +62,9 @@ class VirtualRig:
         ]
         self.sensors = [Sensor(self, sensor, rig.map.sensor[sensor.map]) for sensor in rig.sensor]
         self._keep_own_time(cycle_hz * rig.samples_per_cycle(cycle_hz))
+        # One sample before any client connects, or the first reading would have nothing to return.
         self._advance(plant.reference)
+        # Sample 0 has just been latched, so sample n is due n periods from now.
         self._began = asyncio.get_running_loop().time()
 
     def _keep_own_time(self, rate_hz: float) -> None:
@@ -78,6 +80,8 @@ class VirtualRig:
         """Note an exchange with a drive; after the last one's reply the plant goes on."""
         self._waiting.discard(drive)
         if self.lockstep and not self._waiting:
+            # After this request is served: its reply must hold the sample from before its
+            # set-point.
             asyncio.get_running_loop().call_soon(self.catch_up)
 
     def catch_up(self) -> None:
@@ -119,10 +123,13 @@ class VirtualRig:
         """Advance by ``count`` samples without new set-points, from measured angles (J,) rad."""
         for drive in self.drives:
             drive.receive()
+        # A disabled drive's set-point is the measured angle, which is the same for all of these
+        # samples.
         set_points = [
             [drive.servo.next(float(angle[drive.joint])) for drive in self.drives]
             for _ in range(count)
         ]
+        # `Plant.run` takes one set of enabled drives, so they are split where a drive changes.
         for enabled, following in groupby(
             set_points, lambda drives: [follows for _, follows in drives]
         ):

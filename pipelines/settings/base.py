@@ -30,6 +30,7 @@ class Settings(BaseModel):
         SettingsError
             If the result is not valid.
         """
+        # Validated as a whole again, which `model_copy` does not do.
         content = self.model_dump() | {
             name: value for name, value in values.items() if value is not None
         }

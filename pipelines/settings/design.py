@@ -33,6 +33,7 @@ class Bounds(Settings):
 class JointBounds(Settings):
     """The bounds of each joint; defaults are the paper's Table 2."""
 
+    # Equation 12 of the paper misprints these bounds; docs/errata.md compares it with Table 2.
     hip: Bounds = Field(Bounds(angle_rad=(0.0872, 1.2217)), description="Hip, forward positive.")
     knee: Bounds = Field(Bounds(angle_rad=(-1.6232, -0.2269)), description="Flexion negative.")
 
@@ -40,6 +41,7 @@ class JointBounds(Settings):
 class NoiseSettings(Settings):
     """Torque noise and length of a record, for the expected standard errors."""
 
+    # The defaults are those of a virtual rig, [plant] ripple_nm and ripple_correlation_s.
     hip_nm: Positive = Field(0.6, description="Standard deviation of the hip's torque noise.")
     knee_nm: Positive = Field(0.4, description="Standard deviation of the knee's torque noise.")
     correlation_s: NotNegative = Field(0.02, description="Time constant of the noise; 0: white.")
@@ -49,6 +51,7 @@ class NoiseSettings(Settings):
 class DesignSettings(Settings):
     """The excitation, a Fourier series, and the particle swarm that searches it."""
 
+    # Its inverse is the period, after which the excitation repeats.
     base_frequency_hz: Positive = Field(0.1, description="Frequency of the first harmonic.")
     harmonics: int = Field(5, ge=1, le=20, description="How many harmonics each joint has.")
     theta0_rad: Literal["free"] | tuple[float, float] = Field(

@@ -20,6 +20,8 @@ from pipelines.validation.suggestion import similar_file, suggestion
 def _four_runs() -> tuple[RunSettings, ...]:
     """Return both kinds of run, each once to train and once to validate."""
     return (
+        # Seeds differ, or a virtual rig's validation runs would have the noise of the training
+        # runs.
         RunSettings(name="exo_alone_train", run="exo_alone", purpose="train", seed=1),
         RunSettings(name="exo_alone_validate", run="exo_alone", purpose="validate", seed=2),
         RunSettings(name="with_human_train", run="with_human", purpose="train", seed=3),
@@ -39,6 +41,7 @@ class Experiment(Settings):
     diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
 
+    # No field, as it is no key of the file, and no result is to list it.
     _path: Path = PrivateAttr(default=Path("exoid.toml"))
 
     @field_validator("run")
@@ -102,6 +105,7 @@ class Experiment(Settings):
         SettingsError
             Names the key and the path.
         """
+        # A run without a trajectory of its own follows the design's, which is yet to be computed.
         named = {"acquire.rig": self.acquire.rig}
         named |= {
             f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory

@@ -14,4 +14,6 @@ class FilterSettings(Settings):
         "auto", description='Cut-off, or "auto": where the angle\'s spectrum meets its noise floor.'
     )
     order: int = Field(4, ge=1, le=10, description="Order of the Butterworth filter, of each pass.")
+    # Torque and regressor go through the same average, which keeps the model linear
+    # (docs/science.md, section 4).
     block_s: float = Field(0.025, gt=0.0, le=0.5, description="Blocks over which a fit averages.")

@@ -186,6 +186,8 @@ class JointSettings(Settings):
             target = transmission.dimension_at(self.kind, quantity)
             try:
                 _refuse_other_units(reading.unit, transmission.sources(target))
+                # For its error alone: a number of the drive train that is missing shows here, not
+                # in the import.
                 reading.gain(target)
             except ValueError as error:
                 raise ValueError(f"{quantity}.unit: {error}") from error
@@ -258,11 +260,14 @@ class RecordingSettings(Settings):
     def name_of(self, file: Path) -> str:
         """Return the name of the recording of a file."""
         words = {"file": file.stem, "folder": file.absolute().parent.name, "purpose": self.purpose}
+        # Not str.format, which raises an error for a single brace in a name.
         return re.sub(r"\{(.*?)\}", lambda match: words[match[1]], self.name)
 
 
 def _two_parts() -> tuple[RecordingSettings, ...]:
     return (
+        # Two stretches, not a random split: samples are correlated with their neighbours. A random
+        # split would validate on what was fitted.
         RecordingSettings(purpose="train", span=(0.0, 0.7)),
         RecordingSettings(purpose="validate", span=(0.7, 1.0)),
     )
@@ -299,6 +304,7 @@ class ImportMap(Settings):
                     " as both clocks must have a common origin; set time.column, or remove it"
                 )
             if reading.column is not None:
+                # A column that serves twice would count as two independent measurements.
                 owner = owners.setdefault(reading.column, place)
                 if owner != place:
                     raise ValueError(

@@ -64,6 +64,7 @@ class MechanismSettings(Settings):
         SettingsError
             Names the mechanism and its joints.
         """
+        # Names count too: columns, limits and drives are those of hip and knee.
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
                 f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg"

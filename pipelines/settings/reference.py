@@ -42,6 +42,7 @@ def sections_of(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, t
 def rows_of(model: type[BaseModel]) -> Iterator[str]:
     """Yield a row of Markdown for each key of a table, except subtables."""
     for name, field in model.model_fields.items():
+        # A subtable has a section of its own.
         if not any(models_in(field.annotation)):
             yield f"| `{name}` | {_default(field)} | {field.description} |"
 

@@ -30,6 +30,7 @@ def create(folder: Path, exoid: str) -> None:
                 f"{folder / name}: exists already, not overwritten; choose a new folder"
             )
     shutil.copytree(source / "rigs", folder / "rigs")
+    # In a new folder the rigs are inside, not next to it as in the datasets.
     experiment = (source / "experiments" / "default.toml").read_text(encoding="utf-8")
     write_text(folder / "exoid.toml", experiment.replace('"../rigs/', '"rigs/'))
     graph = (source / "experiments" / "experiment.mk").read_text(encoding="utf-8")

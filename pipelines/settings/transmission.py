@@ -47,6 +47,7 @@ STEPS = (
     Step("share", "force", "rated_force_n"),
     Step("angle", "length", "lead_m", per_turn=True),
     Step("angular velocity", "velocity", "lead_m", per_turn=True),
+    # An ideal screw transmits all work: force times travel is torque times angle.
     Step("torque", "force", "lead_m", divides=True, per_turn=True),
 )
 KEYS = tuple(dict.fromkeys(step.key for step in STEPS))
@@ -57,6 +58,7 @@ GEARED = {
     "velocity": -1,
     "torque": 1,
     "force": 1,
+    # Current and temperature are the motor's own, whatever gear follows it.
     "current": 0,
     "temperature": 0,
 }
@@ -74,6 +76,7 @@ def paths(source: str, target: str) -> list[tuple[Step, ...]]:
     """Return all sequences of steps from one dimension to another, the shortest first."""
     if source == target:
         return [()]
+    # The dimensions of `STEPS` form no cycle, so the recursion ends.
     sequences = [
         (step, *rest)
         for step in STEPS
@@ -107,9 +110,11 @@ def gain(source: str, target: str, given: Mapping[str, float], gear_ratio: float
         If a number is missing, or is not needed.
     """
     ways = paths(source, target)
+    # All given numbers must be used: one that is not needed shows a wrong unit, or a wrong reading.
     complete = [way for way in ways if {step.key for step in way} == set(given)]
     if not complete:
         raise ValueError(_problem(ways, target, set(given)))
+    # If several ways need these numbers, the shortest counts.
     return gear_ratio ** GEARED[target] * prod(step.factor(given[step.key]) for step in complete[0])
 
 
@@ -126,6 +131,7 @@ def _problem(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
             unit, words = METRIC[target]
             message += f', or unit = "{unit}", if the log is in {words}'
         return message
+    # No way uses all numbers: name those that are too many for the way that uses most of them.
     spare = min((given - keys for keys in wanted), key=len)
     return f"does not need {_both(spare)}; remove it, or correct the unit"
 

@@ -14,6 +14,7 @@ class Unit:
 
 
 _TURN = 2.0 * pi
+# Exact by definition: the international inch and pound, and standard gravity.
 _INCH, _POUND_FORCE, _KILOGRAM_FORCE = 0.0254, 4.4482216152605, 9.80665
 
 UNITS: dict[str, Unit] = {
@@ -22,6 +23,7 @@ UNITS: dict[str, Unit] = {
     "us": Unit("time", 1e-6),
     "ns": Unit("time", 1e-9),
     "min": Unit("time", 60.0),
+    # Dates are read as whole nanoseconds.
     "iso8601": Unit("time", 1e-9),
     "rad": Unit("angle", 1.0),
     "mrad": Unit("angle", 1e-3),
@@ -69,6 +71,7 @@ UNITS: dict[str, Unit] = {
 SPELLINGS = {
     "s": ("sec", "seconds"),
     "ms": ("msec",),
+    # The micro sign and the Greek letter look alike, but are two characters.
     "us": ("usec", "µs", "μs"),
     "deg": ("°", "degree", "degrees", "Grad"),
     "rad": ("radians",),

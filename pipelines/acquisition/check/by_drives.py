@@ -103,6 +103,8 @@ def move_by_drives(
             for name in ("angle_rad", "torque_nm")
         }
         gains, delay = _answer(columns["angle_rad"], reference, recorded_hz)
+        # In the sense in which the angle counts, which may be against the set-point. Speeds from
+        # noisy angles would weaken the correlation.
         speed = np.gradient(reference[:, j]) * recorded_hz * np.sign(gains[j])
         torque = float(np.corrcoef(columns["torque_nm"], speed)[0, 1])
         answers.append(Answer(drive.joint, float(gains[j]), delay, torque))
@@ -129,6 +131,7 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
     # Distance beyond the movement at which it is stopped, within the rig's own limits.
     room_rad = 0.1
     speed_rad_s = 1.0
+    # Limits with a wearer are the tighter ones, and nothing of this rig is tested yet.
     room, careful = AMPLITUDE_RAD + room_rad, rig.in_force("with_human")
     drives = tuple(
         drive.model_copy(
@@ -144,6 +147,7 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
     )
     # The file is written elsewhere, so relative paths in it must become absolute.
     lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
+    # Not embedded: the virtual rig runs already, and a second one would be another machine.
     tight = careful.model_copy(update={"drive": drives, "line": lines, "embedded": False})
     # Without default values: a default host would contradict a line.
     return tight.model_dump(mode="json", exclude_unset=True, exclude_none=True)
@@ -154,6 +158,7 @@ def _motion(start: Sequence[float]) -> dict[str, Any]:
         "unit": "rad",
         "omega_rad_s": 2 * np.pi / PERIOD_S,
         "theta0_rad": list(start),
+        # Sines alone, so that the movement begins and ends where the leg stands.
         "a": [[AMPLITUDE_RAD, 0.0], [0.0, AMPLITUDE_RAD]],
         "b": [[0.0, 0.0], [0.0, 0.0]],
     }
@@ -184,7 +189,9 @@ def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray
     """Fit angle(t) = gains @ reference(t - delay) + constant; return gains (J,) and delay (s)."""
     longest_delay_s = 0.3
     fits = []
+    # A quarter of the rows at most, so that enough remain for the fit.
     for lag in range(max(1, min(round(longest_delay_s * rate_hz), len(angle) // 4))):
+        # Both joints' set-points: a joint that follows the other's shows exchanged angles.
         Y = np.column_stack([reference[: len(reference) - lag], np.ones(len(reference) - lag)])
         values = np.linalg.lstsq(Y, angle[lag:], rcond=None)[0]
         fits.append((float(np.mean((angle[lag:] - Y @ values) ** 2)), lag, values[:-1]))
@@ -195,6 +202,7 @@ def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray
 def _check_answer(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator[Finding]:
     drive, other = rig.drive[j], rig.drive[1 - j]
     name, where = f"drive {drive.joint}", f"map.drive.{drive.map}"
+    # Exchanged angles first: they, too, do not follow their own set-point.
     gain, cross_gain = gains[j], gains[1 - j]
     if abs(gain) < GAIN and abs(cross_gain) > 1.0 - GAIN:
         yield Finding(
@@ -243,6 +251,8 @@ def _check_stopped(rig: RigSettings, progress: Sequence[Progress]) -> Iterator[F
             continue
         away = reference - reference[0]
         gains = np.zeros(len(rig.drive))
+        # Least squares through the start, for one joint alone: a short movement may not separate
+        # the two.
         gains[j] = away @ (angle - angle[0]) / (away @ away)
         if not LITTLE <= gains[j] <= MUCH:
             yield from _check_answer(rig, j, gains, 0.0)

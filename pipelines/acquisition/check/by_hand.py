@@ -71,6 +71,7 @@ async def by_hand(
     for probe in drives:
         motion, sign = MOTIONS[probe.place]
         await operator.ready(f"{probe.place}: {motion}.")
+        # Half of the smallest swing counts, as nobody measures the degrees.
         moved = await _watch(drives, lambda p: np.array([p.last()["angle"]]), SWING_RAD[0] / 2)
         findings += _check_motion(probe, sign, moved, rate_hz)
     for probe in sensors:
@@ -83,6 +84,7 @@ async def by_hand(
         pressed = await _watch(
             sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives
         )
+        # The cuff pushes back: pressed forward, its force on the leg is backward, and so negative.
         findings += _check_push(probe, -1.0 if front else 1.0, pressed, least)
     return findings
 
@@ -102,12 +104,15 @@ async def _watch(
     back = 0.3
     for probe in probes:
         await probe.step()
+        # The latest answer shows where the movement begins. Those before it are no part of the
+        # movement.
         probe.take()
     rest = np.concatenate([value(probe) for probe in probes])
     largest, still_since, began = np.zeros_like(rest), time.monotonic(), time.monotonic()
     while (now := time.monotonic()) - began < PATIENCE_S:
         await asyncio.gather(*(probe.step() for probe in (*probes, *also)))
         away = np.abs(np.concatenate([value(probe) for probe in probes]) - rest)
+        # Not np.maximum: one NaN among the readings would hide all movements after it.
         largest = np.fmax(largest, away)
         which = int(np.nanargmax(np.nan_to_num(largest)))
         if largest[which] < least or not away[which] < back * largest[which]:

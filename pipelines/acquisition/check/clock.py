@@ -47,6 +47,7 @@ def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
     """
     counter = series.counted("sequence")
     steps = np.diff(counter)
+    # Repeated answers of one sample show no step of the counter.
     steps = steps[steps != 0]
     moved = float(counter[-1] - counter[0])
     clock_rate = None
@@ -171,6 +172,7 @@ def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
     torn = [
         name
         for name in series.block.names
+        # A status word may change at any time, as it shows the present state.
         if name not in ("sequence", "status")
         and np.diff(series.raw(name), axis=0)[is_same_sample].any()
     ]

@@ -12,6 +12,7 @@ from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, REGISTERS, RegisterType
 
+# Many manuals do not name the order of words, so a wrong one is likelier than a wrong type.
 _COST = {"word_order": 1, "type": 2}
 
 
@@ -37,9 +38,11 @@ def _all(name: str, block: Block) -> Iterator[Interpretation]:
     others = (register for other, register in block.registers.items() if other != name)
     taken = {address for register in others for address in register.addresses}
     for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
+        # A longer type must not reach into another register, or beyond what was read.
         end = was.address + REGISTERS[kind]
         if end > block.address + block.count or taken & set(range(was.address, end)):
             continue
+        # A single word has no order.
         if REGISTERS[kind] == 1 and order != was.word_order:
             continue
         update: dict = {}
@@ -95,6 +98,7 @@ def remedy(
     most_named = 2
     best: list[tuple[Interpretation, float]] = []
     for one in _interpretations(name, series.block):
+        # A costlier explanation is not named next to a likelier one.
         if best and one.cost > best[0][0].cost:
             break
         values = (series.counted if counts else series.of)(

@@ -68,6 +68,7 @@ class Expectation:
         """
         # Change of an angle between two samples that is allowed in addition to the speed limit.
         step_rad = 0.01
+        # Misread words may be NaN, or so large that their difference overflows.
         with np.errstate(invalid="ignore", over="ignore"):
             return bool(
                 (

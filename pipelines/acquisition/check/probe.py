@@ -73,6 +73,7 @@ class Series:
         (n,) array
             In SI units.
         """
+        # By the span of the register under test: another type wraps around elsewhere.
         unwrapped = Unwrapper(Block({name: register or self.block.registers[name]}).span(name))
         values = self.of(name, register, bytes_swapped=bytes_swapped)
         return np.array([unwrapped(value) for value in values])
@@ -129,6 +130,7 @@ class Probe:
         if not (self.in_lockstep and isinstance(self.part, Drive)):
             return await self.read()
         asked = time.perf_counter()
+        # In lockstep only an exchange lets time pass, so it carries the word to disable.
         words = await self.part.idle_words(self.part.map.disable, self.last()["angle"])
         self._keep(
             asked,

@@ -49,6 +49,7 @@ async def cycles(
     while time.perf_counter() - began < seconds or len(durations) < fewest:
         start = time.perf_counter()
         due = [p.step() for p in sensors if p.is_due(len(durations))]
+        # As in `Machine.cycle`: in lockstep the exchange with the drives ends the sample.
         if drives and drives[0].in_lockstep:
             await asyncio.gather(*due)
             await asyncio.gather(*(p.step() for p in drives))

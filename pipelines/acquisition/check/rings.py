@@ -54,6 +54,7 @@ async def _fault(
     agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
     await empty_recorder(drive)
     for _ in range(drains):
+        # In lockstep this advances the drives, which would record nothing otherwise.
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
         agreement.add(reading)

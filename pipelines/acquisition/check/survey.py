@@ -203,6 +203,8 @@ def _check_device(
     assert report.latency
     seconds = float(series.answered[-1] - series.answered[0])
     if probe.in_lockstep and rate_hz:
+        # In lockstep time is counted in samples: the computer's clock shows only how fast it
+        # simulates.
         seconds = (len(series.asked) - 1) * probe.every / rate_hz
     elif rate_hz and report.latency.median > SLOW * probe.every / rate_hz:
         findings.append(
@@ -220,6 +222,7 @@ def _check_device(
         findings += check_clock(probe, series, report.clock, seconds, counts_hz)
     if not probe.in_lockstep:
         findings += check_latch(probe, series)
+    # A velocity is compared with its angle only if neither is misread; one error is one finding.
     misread = list(check_registers(probe, series, rig))
     findings += misread
     if not probe.is_drive:

@@ -39,6 +39,7 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     if len(t) < 3:
         return
     travel = np.r_[0.0, np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(t))]
+    # Without means, as an integral has no zero of its own.
     angle, integral = q - q.mean(), travel - travel.mean()
     if np.ptp(q) < moved_rad:
         if np.ptp(travel) > standing_rad + np.ptp(q):

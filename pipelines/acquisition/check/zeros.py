@@ -35,6 +35,7 @@ def check_zeros(
         return  # the registers have to be corrected first
     where = f"{probe.map_path}.read"
     for i, axis in enumerate(AXES):
+        # The register's end is compared in counts, as its SI value depends on scale and offset.
         mean, full = float(forces[:, i].mean()), series.block.registers[axis].counts
         scale, offset = series.block.registers[axis].si
         if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= near_end * full[1]) > 0.5:

@@ -107,6 +107,8 @@ class Drift:
         # Prior standard deviation of the relative difference of two clocks' rates.
         usual = 200e-6
         self._rate_hz = rate_hz
+        # None on the lead; slopes are in samples a second. Few buckets alone would leave the slope
+        # undefined.
         self._prior = np.diag([0.0, (usual * rate_hz) ** -2])
         self._sums = np.zeros((2, 2))
         self._moment = np.zeros(2)
@@ -126,9 +128,12 @@ class Drift:
         """
         # Time constant with which old bounds are forgotten: a quartz depends on its temperature.
         memory_s = 300.0
+        # At one instant t the drives have the numbers (t - origin) / period.
         lead = (first[0] - other[0]) * self._rate_hz
         width = np.hypot(first[1], other[1]) * self._rate_hz
         if self._origin is None:
+            # Relative to the first bounds: sums of squared counters would lose the digits that
+            # matter.
             self._origin = sequence, lead
         # Uniform between the bounds: their width is sqrt(12) standard deviations.
         weight = 12.0 / (width**2 + 12.0 * FLOOR**2)

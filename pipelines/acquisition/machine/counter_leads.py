@@ -53,10 +53,13 @@ def _lead(
     # Largest difference, in samples, between clocks that count as showing the same time.
     same_time = 0.1
     (first_origin, first_width), (origin, width) = first_bounds.now(), bounds.now()
+    # At one instant t the drives have the numbers (t - origin) / period. Each origin is known to
+    # half the width of its bounds.
     bounded = (first_origin - origin) * rate_hz
     margin = (first_width + width) * rate_hz / 2
     by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
     nearest = round(by_clock)
     if abs(by_clock - nearest) < same_time and abs(nearest - bounded) <= margin + 0.5:
         return nearest
+    # Drives with a common clock differ by a whole number, of which a wider range may hold two.
     return round(bounded) if margin <= 0.5 else None

@@ -31,6 +31,7 @@ class Drive:
         self.read_block = Block(registers_of(self.map.read))
         self.write_block = Block(registers_of(self.map.write))
         self._counter_block = Block({"sequence": self.map.read.sequence})
+        # Of a drive without a status word it is never read: every mask needs the register.
         self._status_block = Block({"status": self.map.read.status or self.map.read.sequence})
         self._heartbeat = 0
         has_heartbeat = self.map.write.heartbeat is not None
@@ -110,6 +111,7 @@ class Drive:
         try:
             words = await self.device.read(block.address, block.count, in_motion=True)
         except Unanswered:
+            # As if no new sample had come: pacing waits on, until the watchdog expires.
             return self._newest_sequence
         return self._note_newest(self._decode(block, words)["sequence"], asked)
 
@@ -165,6 +167,7 @@ class Drive:
         before, self._sent = self._sent, nan
         asked = time.perf_counter()
         answer = await self.device.exchange(self.write_block, words, self.read_block)
+        # The sample was latched before the new set-point took effect, so it carries the one before.
         self._sent, self.answered_at = before, time.monotonic()
         reading = self._reading(answer, asked)
         self._sent = reference
@@ -246,6 +249,7 @@ class Drive:
         return number
 
     def _encode(self, control: int, reference: float) -> list[int]:
+        # A drive with such a register counts only a changed value as a sign of life.
         self._heartbeat = (self._heartbeat + 1) % self._heartbeat_span
         return self.write_block.encode(
             {"reference": reference, "control": control, "heartbeat": self._heartbeat}

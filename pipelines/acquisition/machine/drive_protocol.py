@@ -33,6 +33,7 @@ async def is_driven(drive: Drive) -> bool:
     while time.monotonic() < until:
         await asyncio.sleep(watch_pause_s)
         words, angle = await _set_point_and_angle(drive)
+        # Written so that a NaN counts as driven.
         if words != first_words or not abs(angle - first_angle) <= driven_rad:
             return True
     return False
@@ -97,6 +98,7 @@ async def reset_fault(drive: Drive) -> None:
         with suppress(DeviceError):  # the first error is the cause
             await drive.write_idle(drive.map.disable, values["angle"])
         raise
+    # A reset word that stays in the register could clear a later fault unseen.
     await drive.write_idle(drive.map.disable, values["angle"])
 
 
@@ -133,6 +135,7 @@ async def refuse_other_rate(drive: Drive, rate_hz: float, setting: str) -> None:
     await asyncio.sleep(rate_s)
     asked_again = time.perf_counter()
     last = await drive.look()
+    # The time between the two samples is between these, whenever each was latched.
     longest, shortest = time.perf_counter() - asked, asked_again - answered
     samples, seconds = last.sequence - first.sequence, last.time - first.time
     # One sample more or less at either end; the latency of the replies is allowed for.

@@ -32,6 +32,7 @@ def embedded(
     command = [sys.executable, "-m", "exoid_cli", "rig", "serve", str(path), "--run", run.run]
     command += ["--seed", str(run.seed), "--sample-rate-hz", str(sample_rate_hz)]
     command += ["--port", "0", "--until-input-ends"]
+    # A file, as a pipe that nobody reads would fill up and block the rig.
     with tempfile.TemporaryFile() as errors:
         # The rig ends with its input, which the system closes even if this process is killed.
         process = subprocess.Popen(
@@ -42,6 +43,7 @@ def embedded(
             bufsize=0,
             **_ON_ITS_OWN,
         )
+        # Reading the rig's first lines has no time-out of its own.
         late = threading.Timer(START_S, process.kill)
         late.start()
         try:

@@ -45,6 +45,7 @@ class Sensor:
         DeviceError
             The sensor has not answered for too long, or its counter went back or leapt.
         """
+        # The first call begins the wait, so that a sensor that never answers is noticed too.
         self._watchdog.waited(time.monotonic())
         try:
             values = self.block.decode(
@@ -94,4 +95,5 @@ class Sensor:
         (first, since), (last, until) = self._first, self._last
         if self._in_lockstep or until - since < settled_s:
             return inf
+        # How long each reply was under way is unknown, but it is at most `reply_s`.
         return leap * (1.0 + (last - first) / (until - since) * (now - until + self._reply_s))

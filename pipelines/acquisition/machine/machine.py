@@ -93,6 +93,7 @@ class Machine:
         DeviceError
             Names the drives that were enabled, since an unknown program may have moved the leg.
         """
+        # All are disabled before one of them is complained of.
         enabled = [drive.device.label for drive in self.drives if await make_idle(drive)]
         if enabled:
             raise DeviceError(
@@ -152,6 +153,7 @@ class Machine:
         )
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
         rig = self.rig
+        # Records are matched by their numbers alone, so these leads must be exact.
         if rig.sampling == "recorder" and rig.clock == "real_time" and rig.clocks == "common":
             assert rig.record_rate_hz  # the rig file is checked: recorders have a rate
             leads = await find_leads(self.drives, rig.record_rate_hz)
@@ -210,6 +212,7 @@ class Machine:
             return self.no_force
         forces = self.no_force.copy()
         answers = await all_answers(sensor.look() for sensor in due)
+        # By cuff, in the order of the recording's columns, not of the rig file.
         for sensor, force in zip(due, answers, strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
@@ -221,6 +224,7 @@ class Machine:
         lag_pause_s = 0.0002
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
+            # Without the leads, counters that were started apart would never agree.
             counts = [
                 reading.sequence - lead for reading, lead in zip(readings, self.leads, strict=True)
             ]

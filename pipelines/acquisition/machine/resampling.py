@@ -39,6 +39,7 @@ class Track:
 
     def waits_for(self, position: float) -> bool:
         """Return whether samples around a position are still to come."""
+        # The cubic's last sample is the second one after the position.
         needed = floor(position) + (0 if position == floor(position) else 2)
         return self.newest is None or self.newest < needed
 
@@ -72,6 +73,7 @@ class Track:
             name: sum(weight * getattr(reading, name) for weight, reading in parts)
             for name in INTERPOLATED
         }
+        # Number and status cannot be interpolated; they are those of the sample before.
         return replace(near[1], **values)
 
 
@@ -119,5 +121,6 @@ class Alignment:
             if len(row) == len(samples):
                 rows.append(row)
             for track, position in zip(self._tracks, known, strict=True):
+                # Positions increase, and the cubic's first sample is one before the position.
                 track.forget(floor(position) - 1)
         return rows

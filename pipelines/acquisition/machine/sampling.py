@@ -132,6 +132,7 @@ class CycleSource:
 
     def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
         self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
+        # Looks at a fixed phase would never narrow the bounds, so they are spread at random.
         self._dither = np.random.default_rng(0)
         self.pending = BackgroundRequest()
 
@@ -147,6 +148,7 @@ class CycleSource:
         low, high = (share * self._period_s for share in SECOND_LOOK)
         bounds = self._drive.bounds
         due = bounds.until_next_sample(time.perf_counter()) if bounds else None
+        # Until the next sample's instant is known, any phase is as good as another.
         if due is None:
             aim = self._dither.uniform(low, high)
         else:
@@ -229,6 +231,7 @@ class AlignedSampling:
         for drives in self._alignment.rows(samples):
             sequence = drives[0].sequence
             forces = self._forces.pop(sequence, self._machine.no_force)
+            # A row that was left out never asks for its forces.
             for missed in [earlier for earlier in self._forces if earlier < sequence]:
                 del self._forces[missed]
             self._last = Row(drives, forces, self._machine.samples_per_cycle)
@@ -264,6 +267,8 @@ class AlignedSampling:
             if self._last is None or drift.estimate is None:
                 continue
             first, other = self._last.drives[0], self._last.drives[j]
+            # Both times are of one instant, as the other drive was resampled. The rate leads back
+            # to `since_s`.
             offset = other.time - first.time - drift.estimate.rate * (first.time - since_s)
             clocks[self._machine.drives[j].settings.joint] = {
                 "offset_s": offset,
@@ -282,6 +287,7 @@ def sources_of(machine: Machine, cycle_hz: float) -> list[RecorderSource | Cycle
     if machine.rig.sampling == "recorder":
         return [RecorderSource(drive) for drive in machine.drives]
     period = 1.0 / (cycle_hz * machine.samples_per_cycle)
+    # Cycles keep in step with the first drive's counter, so it needs no second reading.
     return [CycleSource(drive, period, looks_again=j > 0) for j, drive in enumerate(machine.drives)]
 
 

@@ -31,6 +31,7 @@ def client_of(
 ) -> ModbusBaseClient:
     """Return the client of a line, not yet connected."""
     # Without retries: a set-point that comes late is wrong by then.
+    # Nor does pymodbus connect again by itself: that takes long, and other drives may be moving.
     common: Mapping[str, Any] = {
         "timeout": timeout_s,
         "retries": 0,

@@ -210,6 +210,7 @@ class Device:
         try:
             response = await self.line.ask(self._unit, time_out.seconds, request, **arguments)
         except (ModbusException, OSError) as error:
+            # On an open line the next request may be answered; a lost line ends the run.
             kind = Unanswered if self._client.connected else DeviceError
             raise kind(
                 f"{self.label}: did not answer {action} within {time_out.seconds:.3g} s; check"

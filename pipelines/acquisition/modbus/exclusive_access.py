@@ -40,6 +40,7 @@ def _names(line: LineSettings) -> set[str]:
         return {os.path.realpath(line.place)}
     with suppress(OSError):  # an unknown host cannot be reached either
         addresses = socket.getaddrinfo(line.host, line.port, type=socket.SOCK_STREAM)
+        # By address, as one host may have several names.
         return {f"{address[0]}:{line.port}" for *_, address in addresses}
     return {line.place}
 

@@ -116,6 +116,7 @@ class Line:
             await self._open()
             self._failed = False
             for late in self._late.values():
+                # A reply on the old connection can come no more.
                 late.came.set()
             self._late.clear()
 
@@ -129,6 +130,7 @@ class Line:
         try:
             yield
         finally:
+            # A turn in which nothing was asked leaves no reply to await.
             if waits and not self._used:
                 self._asked.pop(unit, None)
             self._holder = None
@@ -182,6 +184,8 @@ class Line:
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
+                # On a line of its own with transaction ids, a late reply is recognised and does no
+                # harm.
                 if unit in self._asked and (len(self.devices) > 1 or not self.has_transaction_ids):
                     self._late[unit] = LateReply(within_s)
             self._asking = False

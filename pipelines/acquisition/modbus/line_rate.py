@@ -66,7 +66,9 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
             records[drive.line] += took_s / brings * rig.record_rate_hz
     sensors = _sensors_s(rig) if with_sensors else {}
     cycle = look + max(drives.values()) + max(sensors.values(), default=0.0)
+    # Drains take this part of a line's time, whatever the rate of cycles is.
     share = 1.0 - max(records.values(), default=0.0)
+    # A drain may fall into a single cycle, and must not delay its set-points.
     longest = max(
         cycle + max(drains.values(), default=0.0),
         cycle / share if share > 0.0 else float("inf"),
@@ -123,16 +125,20 @@ def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
 
 def _exchange_characters(registers: DriveMap) -> int:
     """Return the characters of an FC23 exchange, request and reply as RTU frames."""
+    # Request: unit, function, 4 addresses and counts of 2, byte count, CRC of 2. Reply: unit,
+    # function, byte count, CRC.
     return 13 + 2 * Block(registers_of(registers.write)).count + 5 + 2 * _count(registers)
 
 
 def _read_characters(registers: int) -> int:
     """Return the characters of an FC03 reading, request and reply as RTU frames."""
+    # Request: unit, function, address, count, CRC. Reply: unit, function, byte count, CRC.
     return 8 + 5 + 2 * registers
 
 
 def _queue_characters(registers: int) -> int:
     """Return the characters of an FC24 reading, request and reply as RTU frames."""
+    # Request: unit, function, address, CRC. Reply: unit, function, two counts of 2, CRC.
     return 6 + 8 + 2 * registers
 
 

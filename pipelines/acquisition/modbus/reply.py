@@ -49,6 +49,7 @@ class ReplyDecoder(DecodePDU):
         """Return the reply, or an InvalidReply."""
         function = frame[0]
         if function > ERROR:
+            # The framer has removed unit and CRC. Function and exception code remain.
             whole = len(frame) == 2
         elif function in ASKED_FOR:
             whole = _is_whole(function, frame)
@@ -69,6 +70,7 @@ class ReplyDecoder(DecodePDU):
 def _is_whole(function: int, frame: bytes) -> bool:
     """Return whether a reply has the length of its function and counts."""
     if function == WRITE_MULTIPLE:
+        # Function, address and count.
         return len(frame) == 5
     if function == READ_FIFO:
         size, count = int.from_bytes(frame[1:3], "big"), int.from_bytes(frame[3:5], "big")

@@ -80,7 +80,9 @@ class Ring:
         DeviceError
             The drive did not answer, or refused.
         """
+        # Older records are overwritten already.
         first = newest + 1 if self._next is None else max(self._next, newest + 1 - self._capacity)
+        # The rest waits: set-points of this drive must not.
         newest = min(newest, first + self._most - 1)
         if first > newest:
             self._next = first
@@ -175,12 +177,14 @@ class Queue:
             self._began = newest
         for _ in range(self._reads):
             read = await self._read()
+            # Near the newest sample: a record's own number wraps around.
             numbers = [int(unwrap(record["sequence"], newest, self._span)) for record in read]
             self._fetched += [
                 (number, record)
                 for number, record in zip(numbers, read, strict=True)
                 if number > self._began
             ]
+            # A read that is not full has emptied the queue.
             if len(read) < self.block:
                 break
         records, self._fetched = self._fetched, []

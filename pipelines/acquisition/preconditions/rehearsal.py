@@ -48,8 +48,10 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
     # With very slow devices, all cycles would take minutes.
     while done < cycles and late <= allowed:
         count = await pace.wait(last)
+        # A counter that went on by more than one has let a sample go by.
         late += count > last + 1
         last = count
+        # With reads in place of exchanges, so that nothing is written.
         row = (await machine.cycle(done, _look)).row
         done += 1
         if row and sources:

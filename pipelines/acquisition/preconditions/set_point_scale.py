@@ -56,6 +56,7 @@ def _difference(written: Register, read: Register) -> tuple[str, str, str] | Non
         if written.scale == read.scale:
             return "unit", written.unit, read.unit
         return "scale", f"{written.scale:g} {written.unit}", f"{read.scale:g} {read.unit}"
+    # A difference of less than a count is lost in rounding.
     if abs(written.si[1] - read.si[1]) > max(written.step, read.step):
         return "offset", f"{written.si[1]:g} rad", f"{read.si[1]:g} rad"
     return None

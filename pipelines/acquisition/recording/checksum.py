@@ -24,6 +24,7 @@ def with_checksum(batch: bytes, head: bytes) -> bytes:
     head : bytes
         The stream's head, which the checksum covers too.
     """
+    # Metadata come before the columns, so the first occurrence is the right one.
     place = batch.index(BLANK) + len(BLANK) - 8
     return b"%b%08x%b" % (batch[:place], crc32(batch, crc32(head)), batch[place + 8 :])
 

@@ -24,6 +24,7 @@ def columns_of(machine: Machine) -> Columns:
         cuff = sensor.settings.cuff
         for i, axis in enumerate("xyz"):
             columns[f"{cuff}_force_{axis}_n"] = _of_cuff(CUFFS.index(cuff), i)
+    # The first drive's, whose clock and counter are the machine's.
     columns["sequence"] = lambda row: row.drives[0].sequence
     return columns
 

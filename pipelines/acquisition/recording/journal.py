@@ -90,6 +90,7 @@ class Journal:
             try:
                 self._write(self._batch(rows))
             except OSError:
+                # In their order, before those that have come meanwhile.
                 self._waiting.extendleft(reversed(rows))
                 raise
 
@@ -147,6 +148,7 @@ class Journal:
             pa.array(column, type=field.type)
             for column, field in zip(columns, self._schema, strict=True)
         ]
+        # Of this whole stream only the batch is kept: the file has one head and one end.
         stream = io.BytesIO()
         with pa.ipc.new_stream(stream, self._schema) as writer:
             metadata = {**(more or {}), checksum.KEY: checksum.BLANK}

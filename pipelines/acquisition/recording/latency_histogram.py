@@ -17,6 +17,7 @@ class Latencies:
 
     def add(self, seconds: float) -> None:
         """Count one cycle."""
+        # Bins of equal ratio: percentiles are within 1 % of their value, whatever that is.
         place = int(log(max(seconds / SHORTEST_S, 1.0)) / log(STEP))
         self._counts[min(place, BINS - 1)] += 1
         self._longest = max(self._longest, seconds)

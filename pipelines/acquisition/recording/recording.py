@@ -78,8 +78,10 @@ def summarize(journal: JournalFile) -> JournalSummary:
             continue
         sequence = batch.rows.column("sequence").to_numpy()
         if offset is None:
+            # Time 0 is where the recording begins, even if its first samples are missing.
             offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
         index = sequence + offset
+        # With the last sample of the batch before, as a gap may lie between the two.
         gaps = gaps + _gaps(np.concatenate([[reached - 1], index]), rate_hz)
         samples += len(index)
         reached = int(index[-1]) + 1
@@ -95,6 +97,7 @@ def summarize(journal: JournalFile) -> JournalSummary:
         return JournalSummary(samples, planned, rate_hz, gaps, abort, damaged=damaged)
     abort = last_words[ABORT].decode() or None
     if abort is None:
+        # After an early end the rest of the plan is no gap.
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
     metadata = json.loads(last_words[METADATA])
     damaged = damaged or int(last_words[ROWS]) != journal.rows

@@ -55,6 +55,7 @@ def recover(path: Path, output: Path | None = None) -> Recovery:
         raise InputError(
             f"{path}: is no file, expected the journal that a killed run left; name another"
         )
+    # Until the recording is written: another process must not recover the same journal.
     with locked(path) as lock:
         if not lock.free:
             raise InputError(

@@ -36,10 +36,12 @@ class SampleWriter:
         missing = range(self._next, min(sample, self._samples))
         if missing:
             self.gaps.append((missing.start / self._rate_hz, len(missing)))
+        # Samples of the ramp have negative numbers, and are not missed.
         self._next = max(sample + 1, 0)
         if not 0 <= sample < self._samples:
             return
         if self.began_at is None:
+            # Where the trajectory begins, even if the first samples are missing.
             self.began_at = row.time - sample / self._rate_hz
         values = [value(row) for value in self._columns.values()]
         try:

@@ -35,6 +35,7 @@ def _are_possible(rows: pa.RecordBatch) -> NDArray:
         if name.endswith(always_measured) or name == "time_s":
             possible &= np.isfinite(values)
         else:
+            # NaN is a value that was not measured, as a force between two readings.
             possible &= ~np.isinf(values)
         if name.endswith("_rad"):
             possible &= ~(np.abs(values) > LARGEST_ANGLE_RAD)

@@ -119,6 +119,7 @@ class EnableStates:
 
     def _update(self, reports: Iterable[tuple[int, DriveStatus]]) -> None:
         """Note every report, then raise the first reason to stop that there is."""
+        # All are noted first: the stop must know every drive that has dropped out.
         reasons = [self._states[joint].update(status) for joint, status in reports]
         for reason in filter(None, reasons):
             raise DeviceError(reason)

@@ -86,6 +86,7 @@ class Enabling:
             A drive is not enabled after ``safety.control_s``, or a limit is broken.
         """
         self._enable_states.update_all(answers)
+        # Within the watchdog's time a lost reply is no reason to stop, as the leg is at rest.
         silent = [answer for answer in answers.drives if isinstance(answer, Unanswered)]
         if silent and waited_s > self._rig.safety.watchdog_s:
             raise silent[0]

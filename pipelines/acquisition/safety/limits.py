@@ -103,6 +103,7 @@ class Limits:
             if all(map(isfinite, forces[cuff].tolist())):
                 self._cuff_read_at[cuff] = cycle
             silent_s = (cycle - self._cuff_read_at.setdefault(cuff, cycle)) / self._rate
+            # Between two of its turns a sensor is not read, and that is no silence.
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
                     f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f}"
@@ -239,6 +240,7 @@ def slowed(
     tuple of float
         rad and rad/s.
     """
+    # Constant deceleration: v t - a t² / 2, until the speed is zero.
     moving_s = min(time_s, abs(speed) / deceleration)
     path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)
     remaining = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0

@@ -87,6 +87,7 @@ class PlanProgress:
 
     def set_point(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; it may be outside the plan."""
+        # Set-point 0 is sent at the cycle after the first one, and reached at the end of the next.
         return row.sequence - self._first_cycle - 2
 
     def sample(self, row: Row) -> int:
@@ -105,4 +106,5 @@ class PlanProgress:
 
     def _index(self, cycle: int) -> int:
         """Return which set-point of the path is due at a cycle."""
+        # Before the first cycle the path is at rest; after the last it stays at its end.
         return min(max(cycle - self._first_cycle, 0), self._length)

@@ -75,6 +75,7 @@ class RecordAgreement:
         self._xy += exchanged.torque * recorded.torque
         self._yy += recorded.torque**2
         if self._compared >= COMPARED and self._xx > self._compared * little_nm**2:
+            # Of rms values: noise in its regressor would make the slope of a regression too small.
             ratio = copysign(sqrt(self._yy / self._xx), self._xy)
             if not abs(ratio - 1.0) <= RATIO:
                 what = exchanged.torque, recorded.torque

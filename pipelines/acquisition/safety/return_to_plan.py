@@ -55,10 +55,12 @@ def step_to_plan(
     walk = 0.8
     due, before, earlier = path
     along, was, lag = (due - before) * rate_hz, (before - earlier) * rate_hz, before - base
+    # Exactly on the plan: its own set-point, without rounding.
     if lag == 0.0 and speed == was:
         return due, along
     deceleration = safety.deceleration_rad_s2
     # Half of what a stop slows down by is left for what samples make of a parabola.
+    # So v² = 2 (a / 2) lag, but no further than the lag within one sample.
     softly = min(abs(lag) * rate_hz, sqrt(deceleration * abs(lag)))
     # A drive that is sent from rest to its speed limit within a sample jerks the leg with all of
     # its torque.

@@ -70,6 +70,7 @@ class SafeStop:
         tracker = self._trackers[joint]
         error = reading.angle - tracker.base
         allowed = self._safety.following_error_rad + tracker.drive.speed_rad_s * late / self._rate
+        # Latched: a leg that was let go of must not be held again.
         self.pressing |= not abs(reading.torque) <= tracker.drive.torque_nm
         self.pressing |= not abs(error) <= allowed
         self._enable_states.update(joint, reading)

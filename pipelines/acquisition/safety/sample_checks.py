@@ -39,6 +39,7 @@ class SampleChecks:
             for joint, history in enumerate(self._histories)
         ]
         """The answers to exchanges, by joint."""
+        # Streams of their own: records come later than the exchanges, and would seem to go back.
         self._records = [
             SampleStream(rig, joint, sample_rate_hz, history)
             for joint, history in enumerate(self._histories)

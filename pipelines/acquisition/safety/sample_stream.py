@@ -31,6 +31,7 @@ class SampleStream:
         self._cycle = rig.samples_per_cycle(sample_rate_hz)
         self._cycle_hz, self._rate = sample_rate_hz, sample_rate_hz * self._cycle
         self._watchdog = Watchdog(rig.safety.watchdog_s)
+        # What comes within the watchdog's time, and one cycle more.
         self._most = self._cycle * (1 + ceil(rig.safety.watchdog_s * sample_rate_hz))
         self._history = history
         self._clock = ClockCheck(self._label, self._cycle, self._rate)
@@ -139,8 +140,10 @@ class SampleStream:
                 f" within {seconds:.4f} s, faster than its limit of {limit:g} rad/s;"
                 f" {self._or_else(reading)}check the encoder, or the word order in the rig file"
             )
+        # The mean of both speeds is the speed in between only from one sample to the next.
         measured = 0.5 * (before.velocity + reading.velocity)
         if samples == 1 and abs(speed - measured) > speed_share * limit:
+            # Of equal size but opposite sign: most likely a sign in the rig file, not the encoder.
             mirrored = abs(speed + measured) < speed_share * abs(speed)
             turn = "turn the sign of one of the two, or " if mirrored else ""
             return (

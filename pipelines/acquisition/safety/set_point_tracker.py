@@ -88,6 +88,7 @@ class SetPointTracker:
         self.mark_answered(now)
         silent_s, drift = now - self.sent_at, self._drift_speed
         if self._reports_reference:
+            # A report counts only as far as the speed limit leads in the silence.
             reach = self.drive.speed_rad_s * silent_s
             place = clamped(reading.reference, self.sent - reach, self.sent + reach)
         else:  # the leg lags behind a drive that holds, and is ahead with one that moves on
@@ -96,6 +97,7 @@ class SetPointTracker:
         speed = reading.velocity
         if isnan(speed):
             speed = (place - self.sent) / silent_s if silent_s else 0.0
+        # By more than a count, in the direction in which its set-points were moving.
         moves_on = (place - self.sent) * drift > self.resolution * abs(drift)
         self.base = self.in_force = place
         self._speed = clamped(speed, *sorted((0.0, self._speed)))
@@ -171,6 +173,7 @@ class SetPointTracker:
         # Not by the drive's counter: one that runs too fast does not make time go by.
         if self._in_lockstep:
             return 1.0 / self._rate
+        # A drive's clock may be faster than the host's by as much.
         return (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
 
     def _allowed_s(self, now: float) -> float:
@@ -179,6 +182,8 @@ class SetPointTracker:
 
     def _send(self, reference: float, speed: float, now: float) -> float:
         """Note the set-point that the drive is sent now and its speed, rad/s; return it."""
+        # Time that a step takes beyond what has passed is borrowed, up to two samples, and paid
+        # back.
         step, elapsed_s = reference - self.sent, self._elapsed_s(now)
         ahead = self._slack_used + abs(step) / self.drive.speed_rad_s - elapsed_s
         self._slack_used = clamped(ahead, 0.0, SLACK_SAMPLES / self._rate)

@@ -20,6 +20,7 @@ class StopReason:
 
     def add(self, error: BaseException, *, is_reported: bool) -> None:
         """Add a reason; the first one is kept, and one that ``is_reported`` already is extended."""
+        # Any other error is a fault of exoid's own, whose traceback is reported.
         ours = not isinstance(error, DeviceError | KeyboardInterrupt | SystemExit | CancelledError)
         if ours and self.fault is None:
             self.fault = error
@@ -28,6 +29,7 @@ class StopReason:
             self.text = reason
         elif reason not in (self.text, *self.further):
             self.further.append(reason)
+            # `join` has run by then, so the text is extended here.
             if is_reported:
                 self.text = f"{self.text}; then {reason}"
 

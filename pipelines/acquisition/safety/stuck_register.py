@@ -83,10 +83,12 @@ class StuckRegisters:
         self, name: str, last: StuckValue, reading: Reading, seconds: float
     ) -> float:
         """Return by how much angle or velocity contradict a value that stood still, rad."""
+        # By the integral of the velocity, the only other measurement of the motion.
         if name == "angle":
             return abs(self._travel - last.travel)
         if name == "velocity" and reading.angle == last.angle and reading.velocity != 0.0:
             return inf  # one that stands has no speed
+        # Compared with the travel that a constant speed would have given.
         if name == "velocity":
             return abs(reading.angle - last.angle - reading.velocity * seconds)
         return inf

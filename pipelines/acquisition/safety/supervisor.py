@@ -117,6 +117,7 @@ class Supervisor:
         """
         self.reason.refuse()
         awaited_s = now - self.progress.followed_at
+        # One late reply is no reason to slow down: the plan goes on for as long as it may take.
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self.trackers[joint].slow_down(now)
         cycle = self.progress.cycle + int(awaited_s * self.rate)
@@ -135,6 +136,7 @@ class Supervisor:
         self.reason.refuse()
         self.checks.refuse_silence(cycle, now)
         self._due = self.progress.state(cycle)
+        # State by state, as after missed samples several may have gone by.
         while self.state is not self._due:
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         left_out = max(cycle - self.progress.cycle - 1, 0)
@@ -151,6 +153,7 @@ class Supervisor:
         """
         self.reason.refuse()
         tracker, progress = self.trackers[joint], self.progress
+        # A second step within one sample would be twice as fast.
         if not progress.has_advanced:
             return tracker.repeat(now)
         return tracker.follow_plan(progress.due(joint, progress.cycle), progress.cycle, now)
@@ -177,6 +180,7 @@ class Supervisor:
         """Stop for an error; the first reason is kept, and further ones follow it."""
         is_reported = self.still_enabled or self.state is State.DISABLED
         self.reason.add(error, is_reported=is_reported)
+        # An idle or disabled machine has nothing to stop.
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 

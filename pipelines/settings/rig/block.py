@@ -3,6 +3,8 @@
 from pipelines.settings.base import Settings
 from pipelines.settings.rig.register import DIMENSION, Register
 
+# "MODBUS application protocol specification" V1.1b3: FC03 and FC23 read 125, FC23 writes 121 at
+# most.
 MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
 """Registers that one exchange carries."""
 
@@ -46,6 +48,7 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
                     f"{name}.{quantity}: register {address} is part of {taken[address]} too"
                 )
             taken[address] = quantity
+    # Registers in between are read too, whatever they are.
     length = max(taken) - min(taken) + 1
     if length > MOST_REGISTERS[name]:
         raise ValueError(
@@ -91,6 +94,7 @@ def check_no_gap(block: Settings, name: str) -> None:
     ValueError
         Names the first register without a name.
     """
+    # Reading a gap is harmless. Writing 0 to an unknown register may change the drive's settings.
     named = {address for register in registers_of(block).values() for address in register.addresses}
     unnamed = sorted(set(range(min(named), max(named))) - named)
     if unnamed:

@@ -31,6 +31,7 @@ def check_joints(drives: Sequence[DriveSettings]) -> None:
         Names the joints.
     """
     joints = [drive.joint for drive in drives]
+    # The order matters: column 0 of every array is the hip's, column 1 the knee's.
     if joints != ["hip", "knee"]:
         raise ValueError(
             f"drive: found {', '.join(joints)}, expected one for the hip, then one for the knee"
@@ -88,6 +89,7 @@ def check_lines(lines: Mapping[str, LineSettings], devices: Sequence[DeviceSetti
             raise ValueError(
                 f'line.{name}: no device is on it; remove it, or give one line = "{name}"'
             )
+    # Devices take turns on each line. Two lines to one place would send requests at the same time.
     for place, times in Counter(line.place for line in lines.values()).items():
         if times > 1:
             raise ValueError(
@@ -202,6 +204,8 @@ def check_set_points(drives: Sequence[DriveSettings], maps: Maps, safety: Safety
                 f" the {drive.joint}'s limits; correct its type or scale"
             )
         low, high = drive.with_human.angle_rad or drive.angle_rad
+        # Rounding must stay a small part of the following error, or a leg that follows well is
+        # stopped.
         coarsest = min(following_rad, high - low) / 4.0
         if register.step > coarsest:
             raise ValueError(
@@ -266,6 +270,8 @@ def _check_block_reach(
         if register is None:
             continue
         low, high = register.span
+        # Strictly: a register that ends at the limit saturates there, so its value never breaks the
+        # limit.
         if not (low < lowest and highest < high):
             unit = DIMENSION[quantity][0]
             raise ValueError(

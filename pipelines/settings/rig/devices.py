@@ -27,6 +27,7 @@ class DeviceSettings(Settings):
     @model_validator(mode="after")
     def _has_one_address(self) -> Self:
         for key in ("host", "port"):
+            # Only keys that the file has: host and port have defaults too.
             if self.line is not None and key in self.model_fields_set:
                 raise ValueError(f"{key}: found together with line = {self.line!r}; remove one")
         return self
@@ -59,6 +60,7 @@ class DriveSettings(DeviceSettings):
 
     @model_validator(mode="after")
     def _limits_are_in_order(self) -> Self:
+        # Here and not by `check_tighter`, which compares single numbers.
         with_human_rad = self.with_human.angle_rad or self.angle_rad
         for low, high in (self.angle_rad, with_human_rad):
             if low >= high:

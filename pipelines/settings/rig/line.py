@@ -40,6 +40,7 @@ class NetworkLine(Line):
 
     def at(self, place: str) -> Self:
         """Return the line with another host and port."""
+        # From the right, as an IPv6 address has colons of its own.
         host, _, port = place.rpartition(":")
         return self.model_copy(update={"host": host, "port": int(port)})
 
@@ -166,6 +167,7 @@ class RtuLine(Line):
         float
             s.
         """
+        # One silence before the request, one before the reply.
         return characters * self._character_s + 2 * self.quiet_s
 
 

@@ -34,6 +34,7 @@ class TemperatureSettings(Settings):
     """Heating of the motors."""
 
     ambient_c: float = Field(24.0, description="Temperature of the room.")
+    # °C/(N·m)²: losses in the winding grow with the square of the torque.
     heating_c_nm2: NotNegative = Field(0.01, description="Final rise per joint torque squared.")
     time_constant_s: Positive = Field(400.0, description="Of the rise.")
 
@@ -41,6 +42,7 @@ class TemperatureSettings(Settings):
 class PlantSettings(Settings):
     """The machine behind a virtual rig's registers."""
 
+    # X1 and X2 are in kg·m², X3 and X4 in kg·m (docs/science.md, section 1).
     exo_inertial: Four = Field((1.0, 0.22, 0.55, 2.3), description="X1..X4 of the exoskeleton.")
     human_inertial: Four = Field((1.6, 0.41, 1.23, 3.4), description="X1..X4 of the wearer's leg.")
     coulomb_nm: Pair = Field((2.66, 4.72), description="Coulomb friction.")
@@ -63,6 +65,7 @@ class PlantSettings(Settings):
     kd_nm_s_rad: Pair = Field((120.0, 40.0), description="Damping of the position loops.")
     limit_nm: Pair = Field((200.0, 200.0), description="Torque at which the drives saturate.")
     counts_per_turn: Pair = Field((400000.0, 400000.0), description="Of the encoder; 0: ideal.")
+    # Noise of first order; the expected errors of [design.noise] assume the same.
     ripple_nm: Pair = Field((0.6, 0.4), description="RMS of the error of the measured torque.")
     ripple_correlation_s: NotNegative = Field(0.02, description="Time constant of that error.")
     cuff: CuffSettings = Field(CuffSettings(), description="The cuffs.")

@@ -115,6 +115,7 @@ class Register(Settings):
         if self.counts is None:
             return -inf, inf
         scale, offset = self.si
+        # A negative scale turns the order of the ends round.
         low, high = sorted(count * scale + offset for count in self.counts)
         return low, high
 
@@ -130,4 +131,5 @@ class Register(Settings):
             return True
         scale, offset = self.si
         least, greatest = self.counts
+        # Rounded as a value is when it is written.
         return all(least <= round((value - offset) / scale) <= greatest for value in (low, high))

@@ -110,17 +110,20 @@ class DriveMap(Settings):
                 f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
                 f"0x{self.enabled_mask:04X} only; correct one of them"
             )
+        # The default of 0 may be the value of a disabled drive, which would then count as enabled.
         if self.enabled_mask and "enabled_value" not in self.model_fields_set:
             raise ValueError(
                 f"enabled_value: missing with enabled_mask 0x{self.enabled_mask:04X}; add the value"
                 " of these bits while the drive is enabled, from its manual"
             )
+        # An enabled drive would always report a fault, and no run could begin.
         both = self.enabled_value & self.fault_mask
         if both:
             raise ValueError(
                 f"fault_mask: found 0x{self.fault_mask:04X}, but 0x{both:04X} of it is in"
                 f" enabled_value 0x{self.enabled_value:04X}. An enabled drive has no fault"
             )
+        # Otherwise every disabled drive, too, would report a fault.
         if self.enabled_mask and not self.enabled_mask & ~self.fault_mask:
             raise ValueError(
                 f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask"
@@ -132,6 +135,7 @@ class DriveMap(Settings):
             return
         counters = {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence}
         for name, counter in counters.items():
+            # Records are matched with exchanges by number, which needs equal wraparounds.
             if counter and counter.type != self.read.sequence.type:
                 raise ValueError(
                     f"ring.{name}.type: found {counter.type}, expected {self.read.sequence.type} as"

@@ -54,6 +54,7 @@ class RigSettings(Settings):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
+        # First that every name leads to a map or a line: the later checks look them up.
         consistency.check_joints(self.drive)
         consistency.check_maps("drive", self.drive, self.map.drive)
         consistency.check_maps("sensor", self.sensor, self.map.sensor)
@@ -88,6 +89,8 @@ class RigSettings(Settings):
 
     def turn_of(self, sensor: SensorSettings) -> int:
         """Return the cycle, among its ``every``, in which a sensor is read: they take turns."""
+        # Sensors that are read equally often are spread over the cycles, so that all cycles take as
+        # long.
         equal = [other.cuff for other in self.sensor if other.every == sensor.every]
         return equal.index(sensor.cuff) % sensor.every
 
@@ -122,6 +125,8 @@ class RigSettings(Settings):
                 f" {sample_rate_hz:g} Hz, expected a whole multiple"
             )
         for name, drive in self.map.drive.items():
+            # While the records of one cycle are read, those of the next already overwrite the
+            # oldest ones.
             if drive.ring and drive.ring.capacity and drive.ring.capacity < 2 * ratio:
                 raise SettingsError(
                     f"map.drive.{name}.ring.capacity: found {drive.ring.capacity} with {ratio:.0f}"
@@ -137,6 +142,7 @@ class RigSettings(Settings):
             if self.plant
             else {}
         )
+        # Measured lengths of the file count more than those of the plant.
         return plant | self.geometry.model_dump(exclude_none=True)
 
     def known_controllers(self) -> dict[str, dict]:
@@ -175,5 +181,6 @@ def load_rig(path: Path | str) -> RigSettings:
         Names the key that is missing or wrong.
     """
     rig = load_toml(path, RigSettings)
+    # Only here, as the settings themselves do not know in which folder their file is.
     lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
     return rig.model_copy(update={"line": lines})

@@ -8,6 +8,7 @@ from pipelines.settings.base import Settings
 from pipelines.settings.rig.block import MOST_REGISTERS, check_block, check_counter, registers_of
 from pipelines.settings.rig.register import Register
 
+# "MODBUS application protocol specification" V1.1b3, section 6.18.
 MOST_QUEUED = 31
 """Registers that one FC24 answer carries."""
 
@@ -42,6 +43,7 @@ class RingSettings(Settings):
             raise ValueError(
                 f"words: found {self.words}, but the record's registers take {length}; correct one"
             )
+        # An answer removes its records from the queue, so a record must fit into one answer.
         if self.fifo is not None and self.words > MOST_QUEUED:
             raise ValueError(
                 f"words: found {self.words}, expected at most {MOST_QUEUED} for an FC24 answer"

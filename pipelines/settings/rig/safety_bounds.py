@@ -31,12 +31,14 @@ def check_safety_bounds(drives: Iterable[DriveSettings], safety: SafetySettings)
         for name, most in DRIVE.items():
             _check_at_most(f"drive[{i}].{name}", getattr(drive, name), most)
         for angle in drive.angle_rad:
+            # Beyond a turn the limits are most likely degrees.
             if not abs(angle) <= 2 * pi:
                 raise ValueError(
                     f"drive[{i}].angle_rad: found {angle:g}, expected radians, at most one turn"
                 )
     for name, most in SAFETY.items():
         _check_at_most(f"safety.{name}", getattr(safety, name), most)
+    # Each kind of run has its own speeds, but both stop with the same deceleration.
     for run in ("exo_alone", "with_human"):
         for drive in drives:
             _check_stop(drive.in_force(run), safety.in_force(run), run)
@@ -55,6 +57,7 @@ def _check_stop(drive: DriveSettings, safety: SafetySettings, run: str) -> None:
     stop_s = 1.0
     speed, slowing = drive.speed_rad_s, safety.deceleration_rad_s2
     room = drive.angle_rad[1] - drive.angle_rad[0]
+    # A stop from speed v at deceleration a takes v / a, over a distance of v² / (2 a).
     needed = max(speed / stop_s, speed**2 / 2.0 / room)
     if slowing < needed:
         raise ValueError(
