@@ -65,6 +65,7 @@ def _numbered(array: np.ndarray, name: str) -> Iterator[tuple[str, np.ndarray]]:
         return
     if array.dtype.kind not in "biufOUS":
         return
+    # A vector in any orientation: MATLAB's are matrices with one row or one column.
     if max(array.shape) == array.size:
         yield name, array.reshape(-1)
         return

@@ -61,6 +61,7 @@ def _flattened(content: Any, table: str | None) -> Columns:
             known = [str(known) for known in below] if isinstance(below, Mapping) else []
             raise InputError(f"has no {key!r}, which source.table names; {suggestion(key, known)}")
         below = below[key]
+    # Constants next to the table stay available to expressions, such as a gain.
     constants = {name: values for name, values in flattened(content).items() if len(values) == 1}
     return flattened(below, "" if _has_keys(below) else table) | constants
 

@@ -75,6 +75,7 @@ def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
         received.append(time)
         stamps.append(10**9 * message.header.stamp.sec + message.header.stamp.nanosec)
         for quantity in QUANTITIES:
+            # A JointState may leave velocity or effort empty.
             for joint, value in zip(message.name, getattr(message, quantity), strict=False):
                 values.setdefault(f"{joint}.{quantity}", {})[row] = value
     columns: Columns = {"stamp": np.array(stamps), "log_time": np.array(received)}
