@@ -33,6 +33,7 @@ def held_friction(term: Term, whole: Holding) -> Holding:
     if not negative:
         return whole
     reason = f"its {' and '.join(negative)} friction is negative and drives the joint"
+    # Two negative coefficients leave nothing that a simulator accepts.
     if len(negative) == 2:
         return left_out(reason)
     return approximate(f"its other coefficient only: {reason}")

@@ -67,8 +67,7 @@ class UnitInName:
 
 def unit_in(name: str) -> UnitInName | None:
     """Return the unit in a name; None where it has none."""
-    # Brackets first, as nothing but a unit stands in them; elsewhere the same letters may be a
-    # word.
+    # Brackets first: a unit in them is one for sure, elsewhere the same letters may be a word.
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
         unit = None if text in OTHERS else _written(text)

@@ -78,7 +78,7 @@ def likeliest_integrals(
     time_s, *columns = _middle(time_s, *angles, *velocities)
     if len(time_s) < 5 * SPAN or not angles or not velocities:
         return []
-    # Two minus signs round the stride up, so that the limit on all values holds.
+    # Two minus signs round the stride up: at most so many rows of each column remain.
     some = slice(None, None, -(-len(time_s) // max(fewest_screened, most_screened // len(columns))))
     whole = [_interpolated(column) for column in columns]
     # Rows of length one: their products are cosines, whose squares are shares of variance.

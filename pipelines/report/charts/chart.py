@@ -107,6 +107,7 @@ def thinned_alike(charts: Sequence[Chart], values: int) -> list[Chart]:
     values : int
         Greatest number of values of all charts.
     """
+    # Bisection for the largest common number of rows: short charts stay whole, long ones share.
     low, high = 1, max((len(chart.x) for chart in charts), default=1)
     while low < high:
         rows = (low + high + 1) // 2

@@ -116,6 +116,7 @@ def _loop_tiles(session: Session) -> list[Tile]:
         replays = [models[name] for name in ("baseline", "extended") if name in models]
         stated = [replay.metadata.get(key, {}) for replay in replays]
         errors = [of_joints[joint.name] for of_joints in stated if joint.name in of_joints]
+        # Only runs that both models can follow show a gain.
         if len(errors) == 2:
             pairs.append(errors)
     if not pairs:

@@ -157,6 +157,7 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
         None if pd.isna(row[key]) else float(row[key])
         for key in ("ci95_low", "ci95_high", "std_error")
     )
+    # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     names = {key: row[key] for key in ("effect", "name", "symbol", "unit")}
     numbers: dict[str, Any] = {

@@ -85,5 +85,6 @@ def _bound(session: Session, name: str, joint: str | None) -> Effect | None:
 def _machine(joints: tuple[Joint, ...], session: Session) -> Machine:
     geometries = (one.metadata.get("geometry") for one in session.of_kind("parameters"))
     geometry = next((one for one in geometries if isinstance(one, dict)), {})
+    # Files may hold further keys, which Geometry does not take.
     known = {key: geometry[key] for key in ("thigh_length_m", "gravity_m_s2") if key in geometry}
     return machine_of(joints, Geometry(**known))
