@@ -116,6 +116,7 @@ def _planned(
     with about(files[0]):
         refuse_unfit(motions)
     observed = [observe(motion) for motion in motions]
+    # A planned motion has no residual, so that its noise comes from the settings.
     noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
     known = known_effects(experiment.diagnose.known, motions[0].machine)
     return detectability(observed, baseline_of(observed, known), noise, power, report)
@@ -145,6 +146,7 @@ def _show(results: Sequence["Detectable"]) -> None:
     console.say("")
     tied = [(one.effect.label, ", ".join(one.tied_with)) for one in results if one.tied_with]
     console.table(("at that size", "could also be"), tied)
+    # As a set of sorted tuples, because each member of a group names all others.
     never = sorted(
         {tuple(sorted((one.effect.label, *one.never_apart))) for one in results if one.never_apart}
     )
@@ -159,6 +161,7 @@ def _row(one: "Detectable") -> tuple[str, ...]:
     whole = "whole leg" if machine.is_exoskeleton else "whole machine"
     cause = (one.effect.name, one.effect.joint or whole)
     share = one.smallest_rms_nm / one.torque_rms_nm
+    # It would need as much torque as the whole motion.
     if share >= 1.0:
         return (*cause, "not to be seen", "", "")
     rms = number(machine, one.smallest_rms_nm)

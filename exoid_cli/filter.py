@@ -59,6 +59,7 @@ def _targets(
         output = open_experiment(config, problem="-o: missing").out / "motions"
     elif len(files) == 1 and not output.is_dir():
         return [(files[0], output)]
+    # Motions keep the names of their recordings, by which later stages match them.
     names = [file.name for file in files]
     for name in names:
         if names.count(name) > 1:

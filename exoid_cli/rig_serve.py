@@ -57,6 +57,7 @@ def serve(
 
     def announce(address: str, line: str | None) -> None:
         nonlocal announced
+        # The first address is known once the start is over.
         starting.close()
         if not announced and not until_input_ends:
             console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")

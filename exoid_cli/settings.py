@@ -38,6 +38,7 @@ def check(
       exoid settings check my_experiment/exoid.toml --json
     """
     folder = open_experiment(config, allow_damaged=True)
+    # Imported recordings need no rig.
     if folder.of_stage("acquire"):
         folder.experiment.refuse_what_cannot_run()
     console.emit(folder.experiment.model_dump(mode="json"))

@@ -54,6 +54,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
 def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     count = Counter(one.state.value for one in stage)
+    # A stage is as bad as its worst step.
     state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
     why = reasons[0] if reasons else ""

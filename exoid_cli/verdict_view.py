@@ -73,6 +73,7 @@ def _show_findings(verdict: "Verdict") -> None:
     if not cases:
         return
     shown = [_broken(row.words, row.depth) for row in tree]
+    # One width for both tables, so that their probabilities stand in one column.
     width = max(map(len, chain([MISSING, WHAT], *shown)))
     tables = {
         MISSING: [(case.words, case.probability) for case in cases],

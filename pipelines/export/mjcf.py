@@ -49,13 +49,9 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
+    # implicitfast treats damping implicitly: strong viscous friction stays stable at this step.
     ET.SubElement(
-        # implicitfast treats damping implicitly: stiff friction stays stable at this step.
-        root,
-        "option",
-        gravity=gravity,
-        timestep=number(TIMESTEP_S),
-        integrator="implicitfast",
+        root, "option", gravity=gravity, timestep=number(TIMESTEP_S), integrator="implicitfast"
     )
     world = ET.SubElement(root, "worldbody")
     names = unique(one_line(joint.name) for joint in exported.joints)
@@ -93,15 +89,9 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     centre = numbers(*(body.centre + offset))
     ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
+    # No contacts: the shapes are nominal, and links that touch would add forces.
     ET.SubElement(
-        # No contacts: the shapes are nominal, and links that touch would add forces.
-        element,
-        "geom",
-        type="capsule",
-        size="0.03",
-        fromto=end,
-        contype="0",
-        conaffinity="0",
+        element, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0"
     )
     return element
 
