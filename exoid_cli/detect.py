@@ -53,6 +53,7 @@ def detect(
     from pipelines.diagnosis.detectability.detectability import as_json
 
     if not files:
+        # The planned excitation: causes can be judged before the first recording.
         files = [open_experiment(config, problem="no excitation is given").step("design").target]
     experiment = settings_in_force(config)
     if output:
@@ -80,6 +81,7 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
     from pipelines.contracts import TRAJECTORY, contract_of
     from pipelines.errors import InputError
 
+    # Excitations may be TOML; recordings and motions are always Parquet.
     kinds = [file.suffix == ".toml" or contract_of(file) is TRAJECTORY for file in files]
     if any(kinds) and len(files) > 1:
         raise InputError(

@@ -67,7 +67,7 @@ def diagnose(
     if known:
         settings = settings.model_copy(update={"diagnose": DiagnoseSettings(known=tuple(known))})
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
-    # Before the search, which takes minutes, as it would be lost.
+    # Before the search, as its result would be lost.
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings))

@@ -84,6 +84,7 @@ def inputs_and_folder(
 ) -> tuple[list[Path], Path]:
     """Return a stage's inputs and output folder, from the experiment unless they are given."""
     return (
+        # Opened only where something is missing: outside an experiment all may be given.
         files or list(open_experiment(config, problem=problem).step(stage).inputs),
         output or open_experiment(config, problem="-o: missing").step(stage).target.parent,
     )

@@ -163,6 +163,7 @@ def _write(
     PARAMETERS.write(output / "parameters.parquet", model.parameters, shared | described)
     residuals_file = output / "residuals.parquet"
     with console.working("predicting every run"):
+        # The names of models in residuals/1, which a report draws.
         name = "extended" if model.extension.terms else "baseline"
         rows = residuals(model.runs, model.model_of, name, model.training.cutoff_hz)
         # In pieces, as the residuals of all runs need not fit into memory.

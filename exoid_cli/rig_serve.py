@@ -86,6 +86,7 @@ def serve(
 def _address(bind: str, anyone: bool) -> str:
     """Return the address to listen on; one that other computers reach needs ``anyone``."""
     addresses = _addresses(bind)
+    # All of them: a name may stand for a loopback address and an open one.
     if addresses and all(ip_address(address).is_loopback for address in addresses):
         return addresses[0]  # not the name, which may be resolved differently the next time
     if not anyone:

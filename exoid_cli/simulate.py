@@ -188,6 +188,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
     no_closed_loop = recorded.why_no_closed_loop(motion)
+    # A file of its own, as its rows are another simulation of the same run.
     closed_loop_file = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
     about_replay = {
         "simulation_rmse_rad": rmse,

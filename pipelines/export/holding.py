@@ -21,6 +21,7 @@ def sound_friction(term: Term) -> tuple[float, float]:
     tuple of float
         N·m and N·m·s/rad.
     """
+    # `held_friction` states the loss, so nothing is dropped in silence.
     coulomb, viscous = (max(float(value), 0.0) for value in term.values)
     return coulomb, viscous
 

@@ -106,6 +106,7 @@ class Session:
         for one in self.artifacts:
             if one.sha256 == digest:
                 return one.path
+        # By name first: hashing every log of a folder may read gigabytes.
         same_name = (path for path in self._others if path.name == name)
         return next((path for path in same_name if sha256(path) == digest), None)
 
@@ -292,6 +293,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 def _below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*")):
+        # Hidden folders hold temporary files and settings for make.
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if not hidden and path.is_file():
             yield path
@@ -311,6 +313,8 @@ def _document(path: Path) -> Artifact | None:
     try:
         content = verdicts.parsed(path)
     except ContractError:
+        # JSON that cannot be parsed counts as exoid's only if it looks like it; others are left
+        # alone.
         if path.name == "verdict.json" or CONTRACT_KEY.search(
             path.read_text(encoding="utf-8", errors="replace")
         ):

@@ -51,6 +51,7 @@ def _filled(values: list) -> list:
 
 def _array(content: Any) -> np.ndarray:
     try:
+        # Objects are numbers with missing values among them, or text.
         array = np.atleast_1d(np.asarray(content))
         return array.astype(float) if array.dtype == object else array
     except (ValueError, TypeError):  # text among numbers, or rows of different lengths

@@ -39,6 +39,7 @@ def _content(path: Path) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
+        # Not one document: perhaps one record a line, as loggers append them.
         lines = [line for line in text.splitlines() if line.strip()]
         try:
             return [json.loads(line) for line in lines]

@@ -80,6 +80,7 @@ def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
                 values.setdefault(f"{joint}.{quantity}", {})[row] = value
     columns: Columns = {"stamp": np.array(stamps), "log_time": np.array(received)}
     for name, known in values.items():
+        # NaN where a message lacks the joint, so that all columns have a row a message.
         columns[name] = np.full(len(stamps), np.nan)
         columns[name][list(known)] = list(known.values())
     return columns

@@ -89,6 +89,7 @@ class Chart:
         """
         if len(self.x) <= rows:
             return self
+        # One choice of rows for all curves, because they share x.
         kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)
         panels = tuple(
             replace(panel, series=tuple(replace(s, values=s.values[kept]) for s in panel.series))

@@ -183,6 +183,7 @@ class ErrorAndFloor:
     @property
     def words(self) -> str:
         """Errors and floors in one line."""
+        # Also in floors, since the floors of two sessions may differ with their sensors.
         parts = [
             f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
             for v, f in zip(self.values, self.floors, strict=True)
@@ -203,6 +204,7 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
         unit = torque_unit(first, joint)
         floors = (first.noise_floor_nm[joint], second.noise_floor_nm[joint])
         for words, key in kinds:
+            # The refusal of different machines guarantees that both have this joint.
             errors = (getattr(first, key)[joint], getattr(second, key)[joint])
             rows.append(ErrorAndFloor(joint, words, unit, errors, floors))
     return rows

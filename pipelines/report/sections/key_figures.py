@@ -55,6 +55,7 @@ def worst_joint(session: Session) -> Joint | None:
     verdict = session.verdict
     if not verdict:
         return None
+    # In units of the floor, as torques of different joints cannot be compared.
     before, floor = verdict.baseline_rmse_nm, verdict.noise_floor_nm
     if verdict.causes:
         name = verdict.causes[0].gain.joint
@@ -121,6 +122,7 @@ def _loop_tiles(session: Session) -> list[Tile]:
             pairs.append(errors)
     if not pairs:
         return []
+    # One run for both numbers: a mean would mix motions of different size.
     before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
     is_worse = after > before
     small = "worse with the causes" if is_worse else f"rms error of the simulated {joint.effort}"

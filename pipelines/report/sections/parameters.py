@@ -113,6 +113,7 @@ class Row:
     def span(self) -> tuple[float, float]:
         """The range that contains all intervals."""
         known = [e for e in self.estimates if e]
+        # The value, too, as a parameter without interval has no ends.
         ends = [value for e in known for value in (e.value, e.low, e.high) if value is not None]
         return min(ends), max(ends)
 

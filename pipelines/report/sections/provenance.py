@@ -69,6 +69,7 @@ def _origins(session: Session) -> list[Origin]:
 def _input(session: Session, stated: dict[str, str]) -> Input:
     if session.file_of(stated["name"], stated["sha256"]):
         state = "found"
+    # The same name with other bytes: the input was made again after it was used.
     elif any(one.path.name == stated["name"] for one in session.artifacts):
         state = "changed"
     else:

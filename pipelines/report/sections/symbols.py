@@ -50,6 +50,7 @@ def meaning(session: Session, effect: str, joint: str, name: str) -> str:
 
 def unit(session: Session, key: str) -> str:
     """Return the unit of a parameter by its key in a trajectory file, such as ``hip_viscous``."""
+    # Keys of a trajectory join joint and parameter; those without a joint are of the rigid body.
     joint = next((one for one in session.joints if key.startswith(f"{one.name}_")), None)
     if joint:
         named = _parameters_of(
