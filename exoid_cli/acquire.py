@@ -106,6 +106,7 @@ def _record(
         if not overwrite:
             refuse_recorded(output)
 
+    # An imported recording cannot be made again by this command.
     refuse_imported(output)
     # Before any question, and again by `record` once no other run can record there.
     claim()
@@ -113,6 +114,7 @@ def _record(
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     rigs: list[RigSettings] = []
     reports: list[Callable[[Progress], None]] = []
+    # Two stacks, since the message of the start ends exactly when the picture of the run begins.
     with ExitStack() as starting, ExitStack() as view:
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
@@ -127,6 +129,7 @@ def _record(
                 starting.enter_context(console.starting(what))
 
         def report(progress: "Progress") -> None:
+            # The picture begins with the first progress: a question before it needs the terminal.
             if not reports:
                 starting.close()
                 reports.append(view.enter_context(_run_view(rigs[0], run)))
@@ -173,9 +176,11 @@ def _run_view(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], N
         view.update(progress)
         if console.err.is_terminal or not console.speaks:
             return
+        # A change of state is shown at once, as it may be a stop.
         if progress.state is not last_state or time.monotonic() - last_line >= line_s:
             last_line, last_state = time.monotonic(), progress.state
             printer.print(plain_line(progress))
 
+    # The run only queues lines; a slow output delays the printer's thread alone.
     with BackgroundPrinter(console.say) as printer, console.live(view):
         yield report

@@ -25,7 +25,10 @@ class BackgroundPrinter:
         return self
 
     def __exit__(self, *_: object) -> None:
+        # None ends the thread; if the queue is full it is dropped, and the daemon thread dies at
+        # exit.
         self._put(None)
+        # Bounded, as a terminal stopped by Ctrl-S would never take the last lines.
         self._thread.join(CLOSING_S)
 
     def print(self, text: str) -> None:

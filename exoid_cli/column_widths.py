@@ -20,6 +20,7 @@ def column_widths(
         max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table
     ]
     room = width - gap * (len(table) - 1)
+    # Nothing to break, or even the shortest pieces do not fit.
     if sum(wanted) <= room or sum(widths) > room:
         return [None] * len(table)
     for _ in range(room - sum(widths)):

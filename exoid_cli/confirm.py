@@ -28,6 +28,7 @@ def confirm(
     from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 
     _require_terminal(f"run {run.name} moves a person")
+    # An excitation repeats, so one period has its extremes.
     seconds = min(run.duration_s, motion.period_s or run.duration_s)
     angles, velocities = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     lines = [
@@ -45,6 +46,7 @@ def confirm(
     cuffs = "none on the cuffs"
     if rig.sensor:
         cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
+    # From the highest speed of any drive, at the deceleration of a stop.
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
     lines += [
         f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C"
@@ -106,12 +108,14 @@ class OperatorPrompt:
         import asyncio
 
         console.err.print(f"\n{prompt}\nPress Enter when you begin.", markup=False)
+        # Waiting in the loop, not in readline: the check goes on reading its devices meanwhile.
         entered, loop = asyncio.Event(), asyncio.get_running_loop()
         loop.add_reader(sys.stdin, entered.set)
         try:
             await entered.wait()
         finally:
             loop.remove_reader(sys.stdin)
+        # An empty text is the end of input; Enter alone is a line break.
         if not sys.stdin.readline():
             raise InputError(
                 "standard input ended before the check did; start it again in a terminal"

@@ -37,6 +37,7 @@ class Console:
         self.quiet = self.json = False
         self._gathered: list[Any] | None = None
         self._warned = set[str]()
+        # Cached properties: the next invocation may have other streams.
         for name in ("out", "err"):
             self.__dict__.pop(name, None)
 
@@ -176,6 +177,7 @@ class Console:
         """Show the task that is being started; without a terminal, print it once it takes long."""
         late = threading.Timer(LATE_S, lambda: self.err.print(_as_text(what), soft_wrap=True))
         late.daemon = True
+        # On a terminal the spinner says it already.
         if self.speaks and not self._may_move:
             late.start()
         try:
@@ -231,6 +233,7 @@ def _plain(value: Any) -> Any:
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
+    # JSON has no NaN; float() also turns numpy's scalar into Python's.
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if value is None or isinstance(value, str | int):

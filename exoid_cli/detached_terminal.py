@@ -15,6 +15,7 @@ class DetachableTerminal(io.FileIO):
         try:
             return super().write(data)
         except OSError as error:
+            # EIO is what a write to a closed terminal returns; a full disk must still fail.
             if error.errno != errno.EIO:
                 raise
             return memoryview(data).nbytes
@@ -26,6 +27,7 @@ def tolerate_closed_terminals() -> None:
         return  # a console there is no file, and closing it ends the process
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
+        # Files and pipes keep their errors, as their output would be incomplete.
         if stream is not None and stream.isatty():
             raw = DetachableTerminal(stream.fileno(), "w", closefd=False)
             buffer = io.BufferedWriter(raw)

@@ -53,6 +53,7 @@ def detect(
     from pipelines.diagnosis.detectability.detectability import as_json
 
     if not files:
+        # The planned excitation: causes can be judged before the first recording.
         files = [open_experiment(config, problem="no excitation is given").step("design").target]
     experiment = settings_in_force(config)
     if output:
@@ -80,6 +81,7 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
     from pipelines.contracts import TRAJECTORY, contract_of
     from pipelines.errors import InputError
 
+    # Excitations may be TOML; recordings and motions are always Parquet.
     kinds = [file.suffix == ".toml" or contract_of(file) is TRAJECTORY for file in files]
     if any(kinds) and len(files) > 1:
         raise InputError(
@@ -116,6 +118,7 @@ def _planned(
     with about(files[0]):
         refuse_unfit(motions)
     observed = [observe(motion) for motion in motions]
+    # A planned motion has no residual, so that its noise comes from the settings.
     noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
     known = known_effects(experiment.diagnose.known, motions[0].machine)
     return detectability(observed, baseline_of(observed, known), noise, power, report)
@@ -145,6 +148,7 @@ def _show(results: Sequence["Detectable"]) -> None:
     console.say("")
     tied = [(one.effect.label, ", ".join(one.tied_with)) for one in results if one.tied_with]
     console.table(("at that size", "could also be"), tied)
+    # As a set of sorted tuples, because each member of a group names all others.
     never = sorted(
         {tuple(sorted((one.effect.label, *one.never_apart))) for one in results if one.never_apart}
     )
@@ -159,6 +163,7 @@ def _row(one: "Detectable") -> tuple[str, ...]:
     whole = "whole leg" if machine.is_exoskeleton else "whole machine"
     cause = (one.effect.name, one.effect.joint or whole)
     share = one.smallest_rms_nm / one.torque_rms_nm
+    # It would need as much torque as the whole motion.
     if share >= 1.0:
         return (*cause, "not to be seen", "", "")
     rms = number(machine, one.smallest_rms_nm)

@@ -67,6 +67,7 @@ def diagnose(
     if known:
         settings = settings.model_copy(update={"diagnose": DiagnoseSettings(known=tuple(known))})
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
+    # Before the search, as its result would be lost.
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings))
@@ -74,6 +75,7 @@ def diagnose(
     with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
         diagnosis = find(motions, report, settings.diagnose.known)
     document = verdict(diagnosis)
+    # Checked before anything is written, so that a verdict on disk is always a valid one.
     checked = check(document, str(output / "verdict.json"))
     machine, geometry = motions[0].machine, motions[0].geometry
     sections = ("mechanism", "filter", "diagnose")
@@ -104,6 +106,7 @@ def diagnose(
         "candidates": candidates(diagnosis),
     }
     detectable = as_json(detectability(diagnosis.train, diagnosis.baseline, diagnosis.floor))
+    # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
     with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():
             metadata = shared | (model if name == "parameters" else {})
@@ -116,6 +119,7 @@ def diagnose(
 
             draw(diagnosis, checked, folder)
         drawn = {path.name for path in folder.iterdir()}
+    # Figures of an earlier diagnosis would contradict the new verdict.
     for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
         if old not in drawn:
             (output / old).unlink(missing_ok=True)

@@ -56,6 +56,7 @@ def _page(effect: type) -> None:
     console.note(description["equation"])
     console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
+    # At no joint, so in the units of a joint that turns.
     parameters = effect().parameters
     rows = [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in parameters]
     console.table(headings, rows)

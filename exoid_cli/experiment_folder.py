@@ -69,7 +69,9 @@ def open_experiment(
         raise InputError(
             f"{begin}there is no {NAME} in {Path.cwd()}; {_how_to_begin(named=not problem)}"
         )
+    # Results lie next to exoid.toml, wherever the command is called.
     folder = out or file.parent
+    # Imported recordings count as runs, although exoid.toml has no [[run]] for them.
     experiment, imported = with_imported(Experiment.load(file), folder)
     if not allow_damaged:
         imported.refuse_damaged()
@@ -82,6 +84,7 @@ def inputs_and_folder(
 ) -> tuple[list[Path], Path]:
     """Return a stage's inputs and output folder, from the experiment unless they are given."""
     return (
+        # Opened only where something is missing: outside an experiment all may be given.
         files or list(open_experiment(config, problem=problem).step(stage).inputs),
         output or open_experiment(config, problem="-o: missing").step(stage).target.parent,
     )

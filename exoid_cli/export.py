@@ -75,6 +75,7 @@ def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
     is_file = output.suffix and not output.is_dir()
     path = output if is_file else output / f"{model.stem}{chosen.suffix}"
     for other in FORMATS:
+        # A mistaken suffix would be opened by the wrong program, so it is refused.
         if other.suffix == path.suffix != chosen.suffix:
             raise SettingsError(
                 f"-o {path}: is a file name of --to {other.name}, expected {chosen.suffix} with"
@@ -88,6 +89,7 @@ def _texts(exported: "Exported", chosen: "Format[Exported]", path: Path) -> dict
     files = {
         path.with_suffix(suffix): text for suffix, text in chosen.write(exported, path.stem).items()
     }
+    # A suffix of the user's own, such as .mjcf, is kept for the main file.
     if path.suffix not in {file.suffix for file in files}:
         files[path] = files.pop(path.with_suffix(chosen.suffix))
     return files

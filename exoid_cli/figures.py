@@ -49,6 +49,7 @@ def figures(
             raise InputError(
                 f"--only {name}: there is no such figure here; {suggestion(name, list(drawn))}"
             )
+    # A name given twice is drawn once.
     names = list(dict.fromkeys(only or drawn))
     open_folder(output)
     with console.progress("drawing", len(names)) as report:

@@ -57,8 +57,10 @@ def _targets(
         files = [step.inputs[0] for step in folder.of_stage("filter")]
     if output is None:
         output = open_experiment(config, problem="-o: missing").out / "motions"
+    # One file may be given a name; several need a folder.
     elif len(files) == 1 and not output.is_dir():
         return [(files[0], output)]
+    # Motions keep the names of their recordings, by which later stages match them.
     names = [file.name for file in files]
     for name in names:
         if names.count(name) > 1:

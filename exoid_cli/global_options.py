@@ -22,6 +22,7 @@ def with_global_options(function: Callable[..., Any]) -> Callable[..., Any]:
         console.add_options(quiet=quiet, json=json)
         return function(**values)
 
+    # Keyword-only, so that parameters without a default may follow those with one.
     parameters = [
         parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for parameter in inspect.signature(function, eval_str=True).parameters.values()

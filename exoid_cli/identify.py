@@ -102,6 +102,7 @@ def identify(
             " folder"
         )
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
+    # Before the fit, whose result would be lost.
     for contract, name in ((PARAMETERS, "parameters"), (RESIDUALS, "residuals")):
         contract.refuse_place(output / f"{name}.parquet")
     settings = settings_in_force(config)
@@ -120,6 +121,7 @@ def identify(
     if effect:
         method_used["effects"] = effect
     if causes:
+        # The last input, with its hash: the diagnosis whose causes are refitted.
         method_used["causes"] = shared["inputs"][-1]
     figures = _write(model, output, shared | {"method": method_used}, figures=options.figures)
     _report(model, runs[0].machine)
@@ -161,8 +163,10 @@ def _write(
     PARAMETERS.write(output / "parameters.parquet", model.parameters, shared | described)
     residuals_file = output / "residuals.parquet"
     with console.working("predicting every run"):
+        # The names of models in residuals/1, which a report draws.
         name = "extended" if model.extension.terms else "baseline"
         rows = residuals(model.runs, model.model_of, name, model.training.cutoff_hz)
+        # In pieces, as the residuals of all runs need not fit into memory.
         RESIDUALS.write_pieces(residuals_file, rows, shared)
     if not figures:
         return []

@@ -116,6 +116,7 @@ def _recordings(
     from pipelines.importing.recordings import recordings, refuse_to_overwrite
 
     sources: dict[Path, Path] = {}
+    # One for all files, because counters are compared across logs.
     before = Beginnings()
     logs: list[dict[str, Any]] = []
     with all_or_none(output) as folder:
@@ -124,6 +125,7 @@ def _recordings(
             with console.working(f"reading {file.name}"):
                 for recording in recordings(file, settings, map_, before):
                     path = output / recording.file
+                    # Asked before it is written, as the second recording would replace the first.
                     if path in sources:
                         raise InputError(_same_name(path, sources[path], file))
                     refuse_to_overwrite(path)
@@ -162,6 +164,7 @@ def _say_next_step(output: Path, names: list[str], map_: Path) -> None:
     problems = list(missing_for_verdict(imported, names, map_))
     for problem in problems:
         console.say(problem)
+    # An exoid.toml next to the recordings makes the folder an experiment.
     settings_file = output.parent / NAME
     if not problems and not settings_file.exists():
         console.say(

@@ -25,6 +25,7 @@ def init(
     """
     from pipelines.settings.template import create
 
+    # The Makefile calls exoid by its path: make may have another PATH, without the environment.
     command = Path(sys.argv[0])
     words = [sys.executable, "-m", "exoid_cli.app"]
     if command.name == "exoid":

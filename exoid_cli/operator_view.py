@@ -80,6 +80,7 @@ class OperatorView:
         self._run = run
         self._progress: Progress | None = None
         self._forces = np.full((4, 3), np.nan)
+        # In the past, so that no warning is shown at the start.
         self._lost_at = self._near_at = float("-inf")
 
     def update(self, progress: "Progress") -> None:
@@ -101,6 +102,7 @@ class OperatorView:
         progress, now = self._progress, time.monotonic()
         if progress is None:
             return ""
+        # The most urgent first: with drives enabled after a stop, only the operator can act.
         if progress.still_enabled:
             return "PRESS E-STOP"
         if progress.abort is not None:

@@ -41,6 +41,7 @@ def show_parameters(
 def _interval(row: Mapping[Any, Any], joints: "Sequence[Joint]") -> str:
     ends = [row[key] for key in ("ci95_low", "ci95_high")]
     if any(end is None or not isfinite(end) for end in ends):
+        # Without an interval the value was not estimated.
         return "held"
     return " … ".join(format_value(end, joints) for end in ends)
 

@@ -58,6 +58,7 @@ def recover(
         except InputError as error:
             refused.append(error)
     console.emit([_as_json(recording) for recording in recovered])
+    # All are reported; the last one is raised, and makes the exit code.
     for refusal in refused[:-1]:
         console.fail(str(refusal))
     if refused:

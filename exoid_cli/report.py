@@ -63,6 +63,7 @@ def report(
     with console.working("writing the page"):
         page = page_of(session, title, output)
     write_text(output, page)
+    # After the page is written: a damaged file leaves a hole, which is no reason to fail.
     warn_of_unreadable(session)
     summary = session.verdict.summary if session.verdict else None
     console.emit({"path": str(output), "bytes": len(page.encode()), "summary": summary})

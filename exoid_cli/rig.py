@@ -18,6 +18,7 @@ class _RigGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         words = [word for word in args if word not in ("--json", "--quiet", "-q")]
+        # A word that is no file and near a command is a typing error, and gets a suggestion.
         mistyped = words and not Path(words[0]).exists() and closest(words[0], list(self.commands))
         if words and words[0] not in (*self.commands, "--help") and not mistyped:
             args = ["serve", *args]

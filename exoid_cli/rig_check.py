@@ -63,9 +63,11 @@ def check(
     from pipelines.acquisition.check.check import check_rig, refuse_to_move_a_person
     from pipelines.errors import DeviceError
 
+    # An imported recording that is damaged is no reason not to check the rig.
     if file is None:
         folder = open_experiment(config, problem="no rig file is given", allow_damaged=True)
         file = folder.experiment.file(folder.experiment.acquire.rig)
+    # Outside an experiment no rate is wanted, and none is compared.
     if rate_hz is None and (config or in_experiment_folder()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":
@@ -141,6 +143,7 @@ def _times(latency: "Latency | None") -> tuple[str, ...]:
 def _small(histogram: tuple[int, ...]) -> str:
     """Draw a histogram on one line."""
     most = max(histogram)
+    # Rounded up, so that a single slow answer is seen.
     return "".join(BLOCKS[-(-count * (len(BLOCKS) - 1) // most)] for count in histogram)
 
 
@@ -171,6 +174,7 @@ def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
     cycle = rate.cycle
     steps = len(cycle.histogram)
     ratio = cycle.most / cycle.least
+    # The histogram's bins are equally wide in the logarithm of the duration.
     edges = [cycle.least * ratio ** (k / steps) * 1e3 for k in range(steps + 1)]
     most = max(cycle.histogram)
     rows = [

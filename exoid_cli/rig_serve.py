@@ -57,6 +57,7 @@ def serve(
 
     def announce(address: str, line: str | None) -> None:
         nonlocal announced
+        # The first address is known once the start is over.
         starting.close()
         if not announced and not until_input_ends:
             console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
@@ -85,6 +86,7 @@ def serve(
 def _address(bind: str, anyone: bool) -> str:
     """Return the address to listen on; one that other computers reach needs ``anyone``."""
     addresses = _addresses(bind)
+    # All of them: a name may stand for a loopback address and an open one.
     if addresses and all(ip_address(address).is_loopback for address in addresses):
         return addresses[0]  # not the name, which may be resolved differently the next time
     if not anyone:

@@ -43,7 +43,9 @@ def run(
 
     folder = open_experiment(config, out)
     _refuse_unknown(stages or [], folder)
+    # With a named stage, the steps that it needs, too; others may stay stale.
     wanted = needed_for(folder.of_stage(*stages) if stages else folder.steps, folder.steps)
+    # Before the first step: a rig that cannot run would else stop the work in its middle.
     if any(step.stage == "acquire" for step in wanted):
         folder.experiment.refuse_what_cannot_run()
     judged = [one for one in Judge(folder.out).all(folder.steps) if one.step in wanted]

@@ -38,6 +38,7 @@ def check(
       exoid settings check my_experiment/exoid.toml --json
     """
     folder = open_experiment(config, allow_damaged=True)
+    # Imported recordings need no rig.
     if folder.of_stage("acquire"):
         folder.experiment.refuse_what_cannot_run()
     console.emit(folder.experiment.model_dump(mode="json"))
@@ -61,6 +62,7 @@ def split(
     from pipelines.settings import Experiment
     from pipelines.workflow.split import split as split_settings
 
+    # A file a section lets make compare times: a changed section makes only its own stages stale.
     split_settings(Experiment.load(config), out)
     console.emit({"folder": out, "written": sorted(path.name for path in out.iterdir())})
     console.say(f"{out}: one file a section, and graph.mk")

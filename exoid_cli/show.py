@@ -49,6 +49,7 @@ def show(
     _show_facts("Where it came from", _folded(inspection.origin))
     if not (complete and inspection.contract.startswith("verdict/")):
         _show_facts("Metadata", inspection.metadata)
+    # After all that can be shown, because a fault also sets the exit code.
     if inspection.fault:
         raise inspection.fault
 
@@ -112,6 +113,7 @@ def _folded(origin: dict[str, Any]) -> dict[str, Any]:
 
 
 def _show_facts(title: str, facts: dict[str, Any]) -> None:
+    # Lists of like objects are tables of their own; as dotted keys they would fill pages.
     tables = {key: value for key, value in facts.items() if _is_table(value)}
     lines = _lines({key: value for key, value in facts.items() if key not in tables})
     if lines:

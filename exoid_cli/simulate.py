@@ -62,6 +62,7 @@ def simulate(
         raise SettingsError(
             "--reference and --replay exclude each other: a replay follows its recording; drop one"
         )
+    # Nothing is given, so the steps of the experiment are meant.
     if parameters is output is run is reference is replay is None:
         folder = open_experiment(config, problem="no parameters are given")
         run_stages(context, folder, "simulate", "replay", again=again)
@@ -112,6 +113,7 @@ def _track(
     wanted = read_trajectory(reference) if reference else gait()
     with console.working("simulating"):
         loop = track(plant, chosen, wanted)
+    # A loop that diverges has no error worth a table.
     if loop.ran_away:
         raise InputError(
             f"{loop.ran_away}: the loop is unstable, or the disturbance stronger than the drives;"
@@ -186,6 +188,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
     no_closed_loop = recorded.why_no_closed_loop(motion)
+    # A file of its own, as its rows are another simulation of the same run.
     closed_loop_file = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
     about_replay = {
         "simulation_rmse_rad": rmse,

@@ -75,6 +75,7 @@ def bring_up_to_date(
                 raise
             skipped.append(SkippedStep(step, str(error)))
             console.warn(f"{error}; {step.target.as_posix()} is left out")
+        # Judged again, so that steps that need its result see its new state.
         judge.judge(step)
     return results, skipped
 
@@ -130,6 +131,7 @@ def _run(context: typer.Context, judged: "Judged", more: Sequence[str]) -> StepR
     # The root is a group of commands, which click declares as any command.
     command = root.command.get_command(root, name)  # type: ignore[attr-defined]
     with (
+        # The inner command's document becomes a part of this one's.
         console.gathering() as documents,
         command.make_context(name, list(arguments), parent=root) as inner,
     ):

@@ -37,11 +37,13 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     console.emit(
         [*(_damaged_as_json(file) for file in folder.damaged), *(_as_json(one) for one in judged)]
     )
+    # Steps of a stage follow each other in the graph, as groupby needs.
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
     files = [file.relative_to(folder.out).as_posix() for file in folder.damaged]
     rows = [("import", "damaged", file, REMEDY) for file in files]
     rows += [_line(stage, folder.out) for stage in stages]
     console.table(("stage", "state", "result", "why"), rows)
+    # After the table, so that the state of all else is seen.
     if folder.damaged:
         raise InputError(damage(folder.damaged))
     todo = sum(not one.done for one in judged)
@@ -54,6 +56,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
 def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     count = Counter(one.state.value for one in stage)
+    # A stage is as bad as its worst step.
     state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
     why = reasons[0] if reasons else ""

@@ -14,12 +14,14 @@ def message(error: TyperException) -> str:
     context: Any = getattr(error, "ctx", None)
     text, option = error.format_message().rstrip("."), getattr(error, "option_name", None)
     help_command = f"`{context.command_path} --help`" if context else "`exoid --help`"
+    # Errors of an option's value name an option, too, so the text decides.
     if option and text.startswith("No such option"):
         return _unknown(option, "option", context.command.get_params(context), help_command)
     no_command = re.match(r"No such command '(.*?)'", text)
     if no_command:
         commands = list(context.command.commands) if context else []
         return _unknown(no_command[1], "command", commands, help_command)
+    # click's own words vary; a fault of a value is worded as in settings files.
     parameter = getattr(error, "param", None)
     if parameter is not None:
         fault = _value_fault(parameter, error.message)

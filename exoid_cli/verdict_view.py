@@ -56,6 +56,7 @@ def _show_faults(verdict: "Verdict") -> None:
     faults = verdict.data_faults
     if verdict.acquisition_at_fault:
         console.say("\nNo cause was sought. Correct the acquisition, and record again.")
+    # The summary has named the first one.
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")
@@ -73,6 +74,7 @@ def _show_findings(verdict: "Verdict") -> None:
     if not cases:
         return
     shown = [_broken(row.words, row.depth) for row in tree]
+    # One width for both tables, so that their probabilities stand in one column.
     width = max(map(len, chain([MISSING, WHAT], *shown)))
     tables = {
         MISSING: [(case.words, case.probability) for case in cases],
@@ -176,6 +178,7 @@ def _in_words(parameter: "Parameter") -> str:
     """Return a parameter with its interval; an assumed or chosen value has none."""
     low, high = parameter.ci95
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    # An interval of no width is of a value that was chosen or assumed.
     interval = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
     return f"{parameter.name} {parameter.value:.4g}{unit} ({interval})"
 

@@ -113,6 +113,7 @@ def _leg(exported: Exported) -> tuple[Body, ...]:
     hip, knee = exported.joints
     across = [_moment_across(exported, joint) for joint in (hip, knee)]
     length, shift = exported.geometry.thigh_length_m, exported.shift()
+    # First moments of mass, along and across; only their magnitude bounds the masses.
     of_shank = np.hypot(X3, across[1])
     if X2 <= 0 or X2 * (X1 - X2) <= (length * of_shank) ** 2:
         raise InputError(
@@ -122,9 +123,11 @@ def _leg(exported: Exported) -> tuple[Body, ...]:
             " c, matlab or json, which need no bodies"
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
+    # What the equations above leave for m1 (c1² + a1²) + I1 of the thigh.
     inertia = X1 - X2 - m2 * length**2
     along = X4[0] - m2 * length if X4 else 0.0
     of_thigh = np.hypot(along, across[0])
+    # At its minimum the thigh would be a point mass, without inertia about its own centre.
     m1 = max(2.0 * of_thigh**2 / inertia, m2)
     thigh = Body(hip, m1, inertia - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
     shank = Body(
@@ -148,6 +151,7 @@ def _turntable(exported: Exported) -> tuple[Body, ...]:
 
 def _lift(exported: Exported) -> tuple[Body, ...]:
     (joint,), (mass, weight), (shift,) = exported.joints, exported.X, exported.shift()
+    # X2 is the weight less a counterweight's; a share without gravity takes the latter's place.
     carried = 1.0 - weight / (mass * exported.geometry.gravity_m_s2)
     return (Body(joint, mass, _cube(mass), axis=RISES, shift=shift, carried=carried),)
 

@@ -169,6 +169,7 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
         "NAME": name.upper(),
         "GUARD": f"{name.upper()}_H",
         "joints": joints,
+        # C has no arrays of length zero.
         "room": max(1, model.memories),
         "memory_comment": _comment(
             [f"memory of {of_memory}" if of_memory else "no effect has memory; pass any number"]
@@ -206,6 +207,7 @@ def _array(values: Iterable[float]) -> str:
 
 def _group(name: str, group: list[Equation]) -> str:
     lines = _lines(group, lambda e: LANGUAGE.added(e.outcome, "tau"))
+    # Compilers warn of arguments that are not used.
     unused = "" if group else "    (void)at;\n    (void)tau;\n"
     return f"static void {name}(const struct instant *at, double *tau) {{\n{unused}{lines}}}"
 

@@ -27,6 +27,8 @@ from pipelines.export.formula import (
 from pipelines.export.language import identifier, unique
 from pipelines.model import Term
 
+# Kernels may read it. The caller of an exported file has no measurement of it, so such terms are
+# left out.
 TEMPERATURE = "at.temperature"
 """An input that no exported file has."""
 
@@ -108,6 +110,7 @@ def holding(term: Term) -> Holding:
     kernels = (effect.reaction, effect.derivative, effect.torque_reading)
     try:
         present = [kernel for kernel in kernels if kernel is not None]
+        # With the values as numbers, so that a condition on them alone is decided as in the file.
         outcomes = [_outcome(term, kernel, list(term.values), "at.q", 0) for kernel in present]
     except NotWritable as error:
         return left_out(str(error))
@@ -135,6 +138,7 @@ def equations(exported: Exported) -> Equations:
     """
     terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
     named = [(term, parameter) for term in terms for parameter in term.effect.fitted]
+    # Two effects can have parameters of one name at a joint; the file's own names are taken, too.
     names = unique((_constant_name(term.effect, parameter) for term, parameter in named), RESERVED)
     constants = [
         Constant(name, float(value), parameter.unit, f"{term.effect.label}: {parameter.meaning}")
@@ -147,6 +151,7 @@ def equations(exported: Exported) -> Equations:
         Constant(GEOMETRY[0], length, "m", "first to second joint axis"),
         Constant(GEOMETRY[1], gravity, "m/s²", "acceleration of gravity"),
     )
+    # An encoder's error is in the angles of motor and link alike, a tilt only in the link's.
     sensor = exported.shift(Side.SENSOR)
     model = Equations(
         exported.joints,
@@ -175,6 +180,8 @@ def _add_equations(model: Equations, term: Term, values: list[Formula], first: i
         return Equation(effect.label, effect.equation, outcome, first_memory)
 
     if effect.reaction is not None:
+        # Links come before drives, and inertia before the rest: the load of the drives must be
+        # known.
         model.groups[GROUPS[2 * on_drive + (not effect.inertial)]].append(equation(effect.reaction))
     if effect.derivative is not None:
         model.rates.append(equation(effect.derivative, first))
@@ -194,6 +201,7 @@ def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> l
     at: Any = Instant._make([Formula("constant", ("at.t",)), *whole])
 
     def arguments() -> tuple[tuple, list]:
+        # A reading starts from the drives' torques and changes some; other kernels write to zeros.
         if kernel is term.effect.torque_reading:
             torque: list = list(Elements("tau", joints))
             return (at.t, torque, values, joint, [], list(Elements(TEMPERATURE, joints))), torque

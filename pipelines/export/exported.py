@@ -50,6 +50,7 @@ class Exported:
     def terms(self) -> tuple[Term, ...]:
         """The model's terms, with bodies that move together added up."""
         bodies = [term for term in self.model if isinstance(term.effect, RigidBody)]
+        # Torque is linear in inertial parameters, so those of machine and limb add up.
         body = replace(bodies[0], values=np.sum([term.values for term in bodies], axis=0))
         return (body, *(term for term in self.model if not isinstance(term.effect, RigidBody)))
 
@@ -130,6 +131,7 @@ def shift_of(term: Term) -> NDArray | None:
         return None
     joints, joint = len(term.effect.on.joints), column_of(term)
     shifts = []
+    # A constant shift is equal at two angles; that of an eccentric encoder is not.
     for angle in (np.zeros(joints), np.ones(joints)):
         reading = angle.copy()
         term.effect.reading(reading, term.values, joint)
@@ -182,6 +184,7 @@ def exported(
         judged = list(zip(whole, reasons, strict=True))
         present = [term for term, reason in judged if not reason]
         absent = [(term, left_out(reason)) for term, reason in judged if reason]
+        # Effects of the wearer act only in runs with one.
         kind = "with_human" if run == HUMAN else run
         acting = Model(tuple(present)).for_run(kind)
         # Refuses models that no real machine has.

@@ -60,6 +60,7 @@ class Format(Generic[Source]):
     def holding(self, term: Term) -> Holding:
         """Return how the format holds a term, with a note on values that differ between runs."""
         holding = self.holds(term)
+        # A file holds one value; such a parameter has another one in every run.
         per_run = [p.name for p in term.effect.parameters if p.per_run]
         if holding.degree is Degree.NOT or not per_run:
             return holding

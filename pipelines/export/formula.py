@@ -51,6 +51,8 @@ class Formula:
         return _sum(other, self)
 
     def __sub__(self, other):
+        # Sums and products with 0 and 1 are simplified while tracing, or files would be full of
+        # vanishing terms.
         return self if _is(other, 0) else Formula("-", (self, other))
 
     def __rsub__(self, other):
@@ -98,6 +100,7 @@ class Formula:
     def __ne__(self, other):
         return _compare("!=", self, other)
 
+    # Comparing formulae makes a condition, so none can be the key of a dictionary.
     __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self):
@@ -158,6 +161,7 @@ class Condition:
     def __bool__(self) -> bool:
         """Return the value on the current path; without one, stop at the fork."""
         choices = _CHOICES.get()
+        # By its text, because each pass through the kernel makes the same comparison a new object.
         key = repr(self)
         if key not in choices:
             raise _Fork(self, key)
@@ -217,6 +221,8 @@ def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
     function = _plain(kernel.py_func, {})
     paths = 0
 
+    # The kernel runs again with both values of each condition that it meets, until no path has an
+    # open one.
     def walk(choices: dict[str, bool]):
         nonlocal paths
         paths += 1
@@ -239,10 +245,14 @@ def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
 def _plain(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:
     """Return an uncompiled function that calls uncompiled functions, and accepts formulae."""
     if function not in done:
+        # The same code with other globals, in which kernels are uncompiled and math accepts
+        # formulae.
         scope: dict[str, Any] = {}
         plain = FunctionType(
             function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
         )
+        # Registered before its globals are replaced, so that kernels may call each other in a
+        # circle.
         done[function] = plain
         known = function.__globals__
         scope |= {
@@ -315,6 +325,7 @@ _COMPARED = {
 
 def _compare(sign: str, a: Any, b: Any) -> Condition | bool:
     one, other = (side.value if isinstance(side, Formula) else float(side) for side in (a, b))
+    # Two known values are compared now: constants of the file never take the other branch.
     if one is None or other is None:
         return Condition(sign, a, b)
     return bool(_COMPARED[sign](one, other))

@@ -21,6 +21,7 @@ def sound_friction(term: Term) -> tuple[float, float]:
     tuple of float
         N·m and N·m·s/rad.
     """
+    # `held_friction` states the loss, so nothing is dropped in silence.
     coulomb, viscous = (max(float(value), 0.0) for value in term.values)
     return coulomb, viscous
 
@@ -33,6 +34,7 @@ def held_friction(term: Term, whole: Holding) -> Holding:
     if not negative:
         return whole
     reason = f"its {' and '.join(negative)} friction is negative and drives the joint"
+    # Two negative coefficients leave nothing that a simulator accepts.
     if len(negative) == 2:
         return left_out(reason)
     return approximate(f"its other coefficient only: {reason}")

@@ -58,6 +58,7 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
+    # JSON has no NaN.
     return {str(key): None if pd.isna(value) else value for key, value in row.items()}
 
 

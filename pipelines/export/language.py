@@ -43,6 +43,7 @@ class Language:
 
     def _text_and_precedence(self, formula: Any) -> tuple[str, int]:
         if not isinstance(formula, Formula):
+            # A negative number is a negation: as the base of a power it needs brackets.
             return repr(float(formula)), SIGN if formula < 0 else ATOM
         operator, operands = formula.operator, formula.operands
         if operator == "constant":
@@ -51,11 +52,15 @@ class Language:
             return self.element(*operands), ATOM
         if operator in BINARY:
             precedence = BINARY[operator]
+            # Differences and quotients associate to the left, so that an equal operator at the
+            # right needs brackets.
             right = self.text(operands[1], precedence + (operator in "-/"))
             return f"{self.text(operands[0], precedence)} {operator} {right}", precedence
         if operator == "neg":
             return f"-{self.text(operands[0], POWER)}", SIGN
         if operator == "**":
+            # Brackets around both operands: MATLAB's ^ associates to the left, Python's ** to the
+            # right.
             return self.power(*(self.text(operand, ATOM) for operand in operands)), POWER
         return f"{self.names.get(operator, operator)}({', '.join(map(self.text, operands))})", ATOM
 

@@ -14,6 +14,7 @@ KEYWORDS = """
 """
 
 LANGUAGE = Language(
+    # MATLAB has every function under its own name.
     names={},
     element=lambda name, index: f"{name}({index + 1})",
     power=lambda base, exponent: f"{base}^{exponent}",
@@ -139,6 +140,7 @@ def _functions(model: Equations) -> Iterable[str]:
 
 def _function(head: str, lines: list[str], model: Equations) -> str:
     """Return a function with the constants that it uses."""
+    # Local functions share no variables, so each defines the constants that it uses.
     known = set(re.findall(r"\w+", "\n".join(lines)))
     used = [
         f"{c.name} = {c.value!r}; {_comment([f'{c.unit}, {c.meaning}'])}"

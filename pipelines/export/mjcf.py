@@ -49,6 +49,7 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
+    # implicitfast treats damping implicitly: strong viscous friction stays stable at this step.
     ET.SubElement(
         root, "option", gravity=gravity, timestep=number(TIMESTEP_S), integrator="implicitfast"
     )
@@ -88,6 +89,7 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     centre = numbers(*(body.centre + offset))
     ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
+    # No contacts: the shapes are nominal, and links that touch would add forces.
     ET.SubElement(
         element, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0"
     )
@@ -100,6 +102,7 @@ def _frame(body: Body) -> dict[str, str]:
     axis = np.array(body.axis)
     if body.joint.kind == "prismatic":
         return {"pos": numbers(*(-body.shift * axis))} | carried
+    # A rotation by minus the shift, so that the joint's own angle is the encoder's reading.
     quat = numbers(np.cos(0.5 * body.shift), *(-np.sin(0.5 * body.shift) * axis))
     return {"pos": numbers(*body.place), "quat": quat} | carried
 
@@ -122,6 +125,7 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     rotor, soft = exported.of(Element.ARMATURE, name), exported.of(Element.SERIES_SPRING, name)
     armature = rotor.values[0] if rotor else 0.0
     if soft:
+        # Behind a spring the motor moves apart from the link, so its own joint needs an inertia.
         armature += motor_inertia(soft.effect, exported.model, exported.geometry)
     return attributes | ({"armature": number(armature)} if armature else {})
 
@@ -140,6 +144,7 @@ def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
     if soft is None:
         return {}
     stiffness, hardening = soft.values
+    # Coefficients of 1, twist and twist² of the stiffness k (1 + h twist²).
     text = numbers(stiffness, 0.0, stiffness * hardening) if hardening else number(stiffness)
     damping = 2.0 * soft.effect.damping_ratio * np.sqrt(stiffness * soft.effect.motor_inertia)
     return {"stiffness": text, "damping": number(damping)}
@@ -168,6 +173,7 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
         return
     # The channel reads g T or g T + o; for a command u the drive delivers the T that reads u.
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
+    # Solved for T: the order of gain and offset decides whether the offset is scaled, too.
     at_zero = -(offset.values[0] if offset else 0.0)
     if gain and offset and _comes_before(exported, gain, offset):
         at_zero *= per_unit

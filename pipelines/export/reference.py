@@ -37,6 +37,7 @@ def table() -> str:
 def _plausible(effect: type[Effect]) -> Term:
     """Return an effect with values in the middle of their typical ranges."""
     bound = effect(joint=None if effect.whole_leg else (effect.joints or ("hip",))[0])
+    # Holdings depend on values, such as negative friction, so typical ones are needed.
     return Term(bound, bound.values_from(np.array([np.mean(p.typical) for p in bound.parameters])))
 
 

@@ -67,11 +67,13 @@ def _joint(
     joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
     # Set back by the encoder's shift.
     back, turns = -body.shift * np.array(body.axis), body.joint.kind == "revolute"
+    # Axes are coordinate axes: the rotation's vector is then its roll, pitch and yaw.
     place, turned = (body.place, back) if turns else (back, np.zeros(3))
     ET.SubElement(joint, "origin", xyz=numbers(*place), rpy=numbers(*turned))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=link)
     ET.SubElement(joint, "axis", xyz=numbers(*body.axis))
+    # URDF requires limits, and the model has none.
     ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
     friction = exported.of(Element.FRICTION, body.joint.name)
     if friction and _friction(friction).degree is not Degree.NOT:

@@ -19,6 +19,7 @@ def document(root: ET.Element, comment: Iterable[str]) -> str:
 
 def number(value: float) -> str:
     """Return a number with all its digits."""
+    # repr gives the shortest text that reads back as the same number.
     return repr(float(value))
 
 

@@ -102,6 +102,8 @@ class Log:
                 count = counted(int(rows.sum()), "row")
                 seen = f"{channel.enabled} {state} in {count}: {meaning}"
                 findings.append(Finding(channel.target, seen, TAKEN_FOR_MISSING))
+        # Missing, not zero: such a row leaves the recording, while a torque of zero would enter the
+        # fit.
         return np.where(off | blank, np.nan, values)
 
     def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
@@ -111,6 +113,8 @@ class Log:
         picked = {}
         for name in names:
             values = self.columns[name]
+            # A constant has one row. Only an expression can use it; a channel needs a value a
+            # stamp.
             if len(values) not in (1, self.rows) or (len(values) == 1 and channel.reading.column):
                 raise InputError(
                     f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it has a"
@@ -134,8 +138,10 @@ class Log:
         note = noting(channel.target, findings)
         values = quantity(reading, channel.gain, columns, channel.target, note)
         known = np.isfinite(values)
+        # Both clocks count from one origin, the first stamp of the log's own clock.
         since = clock.seconds(stamps[known], self.origin, self.settings, of_time)
         own = clock.runs(since, stamps[known], of_time)
+        # Runs of two clocks cannot be matched, as neither shows which of the other it belongs to.
         if len(own) != 1:
             raise InputError(
                 f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one"
@@ -144,8 +150,10 @@ class Log:
         at = run.began_s + run.time_s
         interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
         steps = np.diff(time)
+        # The definition of a gap in `Sampling.of`.
         gap = steps > 1.5 * np.quantile(steps, 0.95)
         behind = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps) - 1)
+        # A sample at the edge of a gap is known, although the interval behind it is not.
         on_sample = time[behind] == at
         interpolated[gap[behind] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
@@ -165,6 +173,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     channels = tuple(_channels(settings))
     needed = _needed(channels, settings.time)
     for name, where in needed.items():
+        # Asked first: a name that occurs twice is absent, because both columns have numbers.
         if f"{name}#1" in source.names:
             raise SettingsError(
                 f"has {name!r} twice, which {where} in {map_path} names; name {name}#1, {name}#2"
@@ -179,6 +188,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     findings: list[Finding] = []
     note = noting("time", findings)
     if settings.time.column is None:
+        # The longest, as constants have one row.
         rows = max(map(len, columns.values()))
         run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), note)
         columns = _as_numbers(columns, set(), findings)
@@ -203,7 +213,9 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
                 f"joint[{i}].{name}",
                 reading,
                 gain,
+                # The equation of motion needs both; other channels may be blank in some rows.
                 required=name in ("angle", "torque"),
+                # While a drive is off only its torque is no measurement; the encoder still is one.
                 enabled=joint.enabled if name == "torque" else None,
             )
     for i, force in enumerate(settings.force):

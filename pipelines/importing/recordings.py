@@ -103,6 +103,7 @@ def recordings(
             inputs=[*_files(path), map_path],
             config=settings.model_dump(mode="json", exclude_none=True),
         )
+        # The paths as they were given, from which a report writes the command that repeats this.
         given = {"source": path.as_posix(), "map": map_path.as_posix()}
         _check_length(log)
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
@@ -114,6 +115,7 @@ def recordings(
 
 
 def _files(path: Path) -> list[Path]:
+    # A bag is a folder; the order makes its list of hashes the same on every system.
     return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
 
 
@@ -164,6 +166,7 @@ def _recordings_of(
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))
     _note_period(columns, settings, wanted, note)
+    # On the whole run: short spans show less, and each would repeat the remarks.
     findings += plausibility.check(columns, settings)
     findings += before.check(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
@@ -171,6 +174,7 @@ def _recordings_of(
     for recording, rows in zip(wanted, spans, strict=True):
         own = {name: values[rows] for name, values in columns.items()}
         begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
+        # Rate and gaps of the span itself, as a logger's rate may change during a run.
         cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
         metadata = _metadata(settings, recording, cut) | provenance
         in_source = run.rows[whole][rows]
@@ -318,6 +322,7 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
     begin, end = 0.0, np.inf
     if recording.span is not None:
         begin, end = (share * duration_s for share in recording.span)
+        # A span excludes its end, so that neighbours share no row; only the last one takes it.
         end = np.inf if recording.span[1] == 1.0 else end
     elif recording.span_s is not None:
         begin, end = recording.span_s
@@ -337,6 +342,7 @@ def _check_overlap(
     """Refuse samples both to train and to validate."""
     for (one, first), (other, second) in combinations(zip(wanted, spans, strict=True), 2):
         both = slice(max(first.start, second.start), min(first.stop, second.stop))
+        # Common samples would make the validation error an error of training.
         if one.purpose != other.purpose and both.start < both.stop:
             begin, end = time[both][[0, -1]]
             raise SettingsError(

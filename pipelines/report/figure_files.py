@@ -23,6 +23,7 @@ def figures(session: Session) -> Drawings:
     if session.verdict:
         drawings["error"] = partial(falls_figure, falls(session.verdict))
         drawings["error-budget"] = partial(budget_figure, budget(session.verdict))
+    # Functions, not figures: a session has dozens, and only the chosen ones are drawn.
     return drawings | {chart.key: partial(chart_figure, chart) for chart in charts(session).all}
 
 

@@ -40,7 +40,9 @@ def _written(value: float, decimals: int) -> str:
     if value != 0 and not PLAIN[0] <= abs(value) < PLAIN[1]:
         text = f"{value:.{DIGITS - 1}e}"
     else:
+        # round() also takes negative decimals, for 12346 to 12300; a format does not.
         text = f"{round(value, decimals):.{max(decimals, 0)}f}"
     if text.startswith("-"):
+        # A typographic minus, and none before a number that was rounded to zero.
         return f"−{text[1:]}" if float(text) else text[1:]
     return text

@@ -102,9 +102,11 @@ class Session:
         Path or None
             None if the folders lack it.
         """
+        # By its bytes, as it may have been renamed since it was used.
         for one in self.artifacts:
             if one.sha256 == digest:
                 return one.path
+        # By name first: hashing every log of a folder may read gigabytes.
         same_name = (path for path in self._others if path.name == name)
         return next((path for path in same_name if sha256(path) == digest), None)
 
@@ -141,6 +143,7 @@ class Session:
         """
         files = self.of_kind("verdict")
         usual = [folder / "diagnosed" for folder in self.folders]
+        # Other folders may hold diagnoses that were made by hand; the stage's own one counts.
         files = [one for one in files if one.path.parent in usual] or files
         if len(files) > 1:
             names = ", ".join(self.shown(one.path) for one in files)
@@ -183,6 +186,7 @@ class Session:
     def identified(self) -> list[Artifact]:
         """The models of ``exoid identify``, baselines first."""
         others = [one for one in self.of_kind("parameters") if one is not self.extended]
+        # False sorts first, and the sort keeps the order of the paths.
         return sorted(others, key=lambda one: bool(one.additions))
 
     @property
@@ -240,6 +244,7 @@ def simulation_kind(artifact: Artifact) -> str:
     """
     if "windows" in artifact.metadata:
         return "windows"
+    # Files of simulations state no kind: each has keys that the others lack.
     return "drives" if "closed_loop_rmse_rad" in artifact.metadata else "loop"
 
 
@@ -267,6 +272,7 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
                 unreadable[path] = str(error)
                 continue
             if artifact:
+                # By the resolved path: folders may be given twice, or one inside another.
                 artifacts.setdefault(path.resolve(), artifact)
     if config is None:
         paths = (folder / "exoid.toml" for folder in folders)
@@ -287,6 +293,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 def _below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*")):
+        # Hidden folders hold temporary files and settings for make.
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if not hidden and path.is_file():
             yield path
@@ -296,6 +303,7 @@ def _artifact(path: Path) -> Artifact | None:
     if path.suffix == ".json":
         return _document(path)
     _, metadata = parquet.header(path)
+    # Raises for a contract that exoid does not know, so that the file counts as unreadable.
     contract_of(path)
     return Artifact(path, metadata["contract"], metadata, sha256(path))
 
@@ -305,6 +313,8 @@ def _document(path: Path) -> Artifact | None:
     try:
         content = verdicts.parsed(path)
     except ContractError:
+        # JSON that cannot be parsed counts as exoid's only if it looks like it; others are left
+        # alone.
         if path.name == "verdict.json" or CONTRACT_KEY.search(
             path.read_text(encoding="utf-8", errors="replace")
         ):

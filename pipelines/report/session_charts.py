@@ -19,6 +19,7 @@ def charts(session: Session, values: int | None = None) -> Charts:
         list(residual_charts(session)),
         list(control_charts(session)),
     ]
+    # Thinned together, because the limit is of the whole page; then back into their groups.
     flat = [chart for group in groups for chart in group]
     thin = iter(flat if values is None else thinned_alike(flat, values))
     measured, residuals, control = (tuple(next(thin) for _ in group) for group in groups)
@@ -31,4 +32,5 @@ def _hero(session: Session, residuals: Sequence[Chart]) -> Chart | None:
         return None
     variable = most_explained_variable(session, joint).replace("_", "-")
     key = f"residual-{joint.name}-{variable}"
+    # A copy with another key, as the same chart also stands among the residuals.
     return next((replace(chart, key="verdict") for chart in residuals if chart.key == key), None)

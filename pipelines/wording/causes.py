@@ -39,9 +39,11 @@ def shares_in_words(causes: Iterable["Cause"]) -> dict[str, str]:
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:
     """Return a sentence with its labels replaced by words."""
+    # Longest first, because one label may be the beginning of another.
     known = sorted(set(labels), key=len, reverse=True)
     if not known:
         return text
+    # Not inside a longer word: a joint may be called knee2.
     pattern = rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])"
     return re.sub(pattern, lambda match: any_label_in_words(match[0]), text)
 
@@ -60,5 +62,6 @@ def _tied_in_words(cause: "Cause") -> str:
         return words
     if len(ties) > 1:
         return f"{words} or {len(ties)} others that these data cannot separate"
+    # The joint is named once if both causes are at it.
     other, where = cause_in_words(ties[0]), f" at {the(cause.joint or '')}"
     return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"

@@ -83,6 +83,7 @@ def outcomes(verdict: "Verdict") -> tuple[Outcome, ...]:
     if posterior is None:
         return ()
     nothing, unlisted = round(posterior.nothing_missing, 2), round(posterior.unlisted, 2)
+    # Three numbers rounded on their own may add up to 0.99 or 1.01, so the last is the remainder.
     listed = round(max(1.0 - nothing - unlisted, 0.0), 2)
     return (
         Outcome("nothing", "nothing", nothing),
@@ -107,6 +108,7 @@ def searched_runs(verdict: "Verdict") -> str:
 def shares(verdict: "Verdict") -> list[Shares]:
     """Return how each joint's residual splits."""
     rows = []
+    # A sliding joint has a position; `depends_on` names every coordinate an angle.
     slides = all(of["angle"] == "m" for of in verdict.units.values())
     names = {"angle": "position"} if slides else {}
     for joint, router in verdict.router.items():
@@ -138,6 +140,7 @@ def _grow(root: Node, finding: "Finding") -> None:
 def _answer(node: Node, last: "Step", finding: "Finding") -> None:
     """Add a named cause, with those that are tied with it below one line for all of them."""
     first, *ties = finding.causes
+    # A tie cannot be decided, so the probability is of all its members together.
     words = TIED if ties else first.words
     here = _under(node, (last.level, last.value), words, finding.probability)
     here.is_answer = True

@@ -53,6 +53,7 @@ def effect_at(
         if fits(one)
         for place in one.possible(machine)
     ]
+    # The same effect at another joint is the likeliest correction; without one, all effects.
     expected = [one.label for one in can_be if one.name == effect.name] or [
         one.label for one in can_be
     ]

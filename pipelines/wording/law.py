@@ -94,5 +94,6 @@ def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:
     """Return a wording for a joint or the machine; a sliding joint has a position and a force."""
     if joint and machine is not None:
         own = machine.joint(joint)
+        # LAWS are worded for a joint that turns.
         words = words.replace("angle", own.place).replace("torque", own.effort)
     return words.format(joint=the(joint) if joint else "the machine")

@@ -58,6 +58,7 @@ def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, 
     logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
     counted = {quantity: Counting(lost_sign(values)) for quantity, values in logged.items()}
     unit = joint.columns["angle"].unit
+    # Without a unit any of these may be a turn; an angle in counts wraps at a register.
     turns = [turn for name, turn in TURNS.items() if unit in (None, name)]
     full = full_at(counted["angle"].undone(logged["angle"]), turns)
     if full is None:
@@ -92,7 +93,10 @@ def lost_sign(values: NDArray) -> int | None:
         held = known[known <= 1.0001 * full]
         upper = np.count_nonzero(held >= full / 2)
         lower = np.count_nonzero(held < full / 2)
+        # A signed quantity near zero leaves the middle of the unsigned range empty; a counter
+        # passes through it.
         empty = np.count_nonzero((held > 0.4 * full) & (held < 0.6 * full)) < 0.01 * len(known)
+        # An outlier may lie above 2^15, but hardly above 2^31, where one row is enough.
         common = upper >= few * len(known) or (bits == 32 and upper)
         if common and lower and empty and len(held) > 0.98 * len(known):
             return bits

@@ -46,9 +46,11 @@ def propose(paths: Sequence[Path]) -> Proposal:
     for path in paths[1:]:
         _check_columns(path, source)
     columns[time.column] = time.stamps(columns[time.column])
+    # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = _longest_run(columns[time.column], time.unit)
     assert run is not None, "a clock goes forward over ten rows or more"
     rows = len(columns[time.column])
+    # Columns of another length are constants, or have a clock of their own.
     of_run = {name: values[run.rows] for name, values in columns.items() if len(values) == rows}
     with about(paths[0]):
         joints = group_joints(
@@ -137,6 +139,7 @@ def _dates(values: NDArray) -> NDArray | None:
     """Return a column of dates as nanoseconds; None where it has other values."""
     if values.dtype.kind in "biuf" or not len(values):
         return None
+    # The first value alone shows text that is no date, without parsing a long column.
     if np.isnan(whole_nanoseconds(values[:1])).any():
         return None
     stamps = whole_nanoseconds(values)
@@ -161,6 +164,7 @@ def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
         order = " carries ".join(joint.name for joint in joints)
         proposal.doubt("joint", f"order of the columns: {order}; exchange their tables if not")
     if len(joints) > 1:
+        # It blocks nothing: without it, later stages take the length of exoid.toml.
         proposal.unknown(
             "thigh_length_m", "axis of the first joint to that of the second", blocks=False
         )
@@ -191,6 +195,7 @@ def _motion(joint: JointColumns, columns: Mapping[str, NDArray]) -> NDArray:
     """Return the set-points of a joint, (n,), else its angles, without wraparounds."""
     motion = {quantity: m for quantity, m in joint.columns.items() if quantity in MOTION}
     joint = replace(joint, columns=motion)
+    # Set-points repeat exactly; angles also have noise and the drive's errors.
     quantity = "reference" if "reference" in joint.columns else "angle"
     return countings(joint, columns)[quantity].undone(columns[joint.columns[quantity].column])
 
@@ -211,8 +216,10 @@ def _write_recordings(
     for number, path in enumerate(paths):
         proposal.table("[[recording]]", "recording")
         pattern = "/".join(path.absolute().parts[-2:]) if same_names else path.name
+        # `files` is a pattern, in which an open bracket begins a set of letters.
         proposal.key("files", pattern.replace("[", "[[]"))
         proposal.key("name", "{folder}_{file}" if same_names else "{file}")
+        # One file at least is left to validate, whatever the share.
         proposal.key("purpose", "train" if number < min(train, len(paths) - 1) else "validate")
         _write_period(proposal, periods[number])
 

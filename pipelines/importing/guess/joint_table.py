@@ -108,6 +108,7 @@ class _JointWriter:
         angle = self.logged["angle"]
         turn = TURNS.get(self.units.angle, np.inf)
         self.turns = float(np.ptp(angle[np.isfinite(angle)]) / turn)
+        # A range against twice the largest angle, which holds to either side of zero.
         self.too_far = 2.0 * np.pi * self.turns > 2.0 * LARGEST_ANGLE_RAD
         # The angle may then be that of a motor, before its gear.
         self.may_be_motor = self.units.angle == "counts" or self.too_far
@@ -261,6 +262,7 @@ class _JointWriter:
         swings_rad = 2.0
         # Error of that direction by friction and backlash; within it the log's zero hangs down.
         hangs_rad = 0.15
+        # With little gravity in the torque, its direction is an error of the other terms.
         shows_gravity = (
             fit is not None
             and fit.explained >= FOLLOWS
@@ -270,6 +272,7 @@ class _JointWriter:
         if fit is None or not shows_gravity:
             self.proposal.key("zero", 0.0, "reading where the joint is at zero", sure=False)
             return
+        # A torque of the wrong sign makes gravity point upward.
         down = float(np.angle(-np.exp(1j * fit.down_rad))) if fit.backwards else fit.down_rad
         if abs(down) < hangs_rad:
             why = f"gravity's torque vanishes at {down:.2f} rad: zero hangs down"
@@ -283,6 +286,8 @@ class _JointWriter:
         named = self.joint.columns[drive].unit
         dimension = UNITS[named].dimension if named else ""
         lost_sign = self.counters[drive].bits is not None
+        # Drives log currents as whole mA. Another column without a unit counts as such a register
+        # only if its sign was lost.
         whole = are_whole(self.logged[drive]) if drive == "current" else lost_sign
         if named and dimension == "share":
             self.proposal.key("unit", named, FROM_NAME)
@@ -331,6 +336,7 @@ class _JointWriter:
         """Return the unit of a torque or force, why, and whether a drive can be that strong."""
         quantity, si = ("force", "N") if self.slides else ("torque", "N·m")
         unit, why = (named, FROM_NAME) if named else (si, "no name has its unit; SI assumed")
+        # A quantile, so that an outlier does not change the unit.
         reach = float(np.nanquantile(np.abs(values), 0.99)) * UNITS[unit].factor
         if reach <= STRONGEST[quantity]:
             return unit, why, named is not None

@@ -13,6 +13,7 @@ from pipelines.importing.quantities.consistency import integral_agreement, likel
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS
 
+# A torque needs no further constant; a current or voltage is proportional to it.
 TURNING = ("torque", "current", "force", "voltage")
 """Quantities that show the torque of a revolute joint's drive, the best first."""
 
@@ -72,6 +73,7 @@ def group_joints(
         for m in meanings
         if m not in enabled and m.column != clock and _moves(columns[m.column], rows)
     ]
+    # Counts may be of anything, so they pass for angles only where no name means an angle.
     named = any(_is_angle(m) for m in usable)
     if not named:
         usable = [_counted(m, columns[m.column]) for m in usable]
@@ -90,6 +92,7 @@ def group_joints(
         )
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
+    # A stable sort: joints without a place in a limb keep the order of their columns.
     return sorted(joints if named else map(_with_reason_of_counts, joints), key=_place)
 
 
@@ -176,6 +179,7 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
             twin = TWIN.sub("", others[0]) == TWIN.sub("", candidates[0].column)
             doubt = "no name shows which, " if twin else ""
             why[quantity] = f"{doubt}rather than {', '.join(others)}"
+    # Names in a map begin with a letter, so that joint 2 becomes joint2 there.
     named = key if key and key[0].isalpha() else ""
     return JointColumns(named or (f"joint{number}" if joints > 1 else "joint"), chosen, why)
 
@@ -192,6 +196,7 @@ def _by_behaviour(
         # For a single sine the angle integrates to the velocity, too, but with a negative slope.
         if agreement is not None and agreement.slope > 0.0:
             pairs.append((agreement.explained, angle, velocity))
+    # One pair only: without names nothing shows to which of several joints a torque belongs.
     best = max(pairs, key=lambda pair: pair[0], default=None)
     if best is None or best[0] < obvious:
         return []

@@ -111,6 +111,7 @@ def _from_slope(
         if (UNITS[one].dimension == "angle") == (UNITS[other].dimension == "angular velocity")
         and abs(_turns(slope, one, other) - 1.0) < NEAR
     ]
+    # A pair with the angle's own unit comes first: it changes the least.
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
         in_units = f"integrates to {sign * _turns(slope, *same[0]):.4g} {explained}"
@@ -119,6 +120,7 @@ def _from_slope(
         other, velocity = fitting[0]
         why = f"fits the velocity, which {reason}"
         return Units(other, why, False, velocity, reason, False, sign)
+    # Both units are known, so the remaining factor is of a gear: the velocity is the motor's.
     ratio = _gear(slope, unit, velocity_named) if sure and velocity_named else None
     if ratio and velocity_named:
         reason += f", as of a motor that turns {ratio:g} times for one turn of the joint"
@@ -191,6 +193,7 @@ def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
 def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
     """Return the unit in which an encoder's steps divide a turn into a power of two, if any."""
     steps = np.abs(np.diff(np.unique(known)))
+    # Differences by rounding in float64 are no steps of the encoder.
     steps = steps[steps > 1e-9 * np.ptp(known)] if len(steps) else steps
     if len(steps) < 5:
         return None
@@ -199,6 +202,7 @@ def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
         return None
     for unit, turn in TURNS.items():
         bits = np.log2(turn / step)
+        # Encoders have 10 to 24 bits. Coarser steps divide a turn into a power of two by chance.
         if 9.5 < bits < 24.5 and abs(bits - round(bits)) < 1e-3:
             return unit, f"its steps of {step:.4g} make 2^{round(bits)} of a turn in {unit}", True
     return None

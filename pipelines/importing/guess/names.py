@@ -108,6 +108,7 @@ class Meaning:
     @property
     def rank(self) -> int:
         """Order of preference: measured, perhaps measured, filtered, commanded."""
+        # A filter delays a signal, and a command is no measurement at all.
         return 3 * self.commanded + 2 * self.filtered + (not self.measured)
 
 
@@ -119,9 +120,11 @@ def meanings(names: Iterable[str]) -> list[Meaning]:
 def meaning(name: str) -> Meaning:
     """Return the meaning of a name."""
     plain = TWIN.sub("", name)
+    # The unit first: its letters would pass for words of the joint's name.
     in_name = unit_in(plain)
     words = _split(in_name.rest if in_name else plain)
     quantity = _quantity(set(words))
+    # A letter or a short word may be part of the name, as the A of joint_A.
     if in_name and not (in_name.decides or _confirms(in_name, quantity, set(words))):
         in_name, words = None, _split(plain)
         quantity = _quantity(set(words))
@@ -129,16 +132,20 @@ def meaning(name: str) -> Meaning:
     unit = None
     if in_name:
         unit = in_name.unit
+        # A unit that no map has overrides the words: torque in N·m/s is the rate of a torque.
         quantity = in_name.quantity or (quantity if unit else "")
         words = [word for word in words if word not in SIGNS]
     commanded = bool(distinct & COMMANDED)
+    # The current i_d along the rotor's field makes no torque; i_q across it does.
     if distinct & SOMETHING_ELSE or {"i", "d"} <= distinct:
         quantity = ""
     elif distinct & ENABLED or ("on" in distinct and distinct & SWITCHED):
         quantity = "enabled"
         words = [word for word in words if word not in ENABLED | SWITCHED | {"on"}]
+    # Only of an angle. A commanded torque stays a torque, as some logs have no measured one.
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
+    # A unit that contradicts the words was part of the name.
     if unit and UNITS[unit].dimension not in DIMENSIONS.get(quantity, ()):
         unit = None
     return Meaning(
@@ -189,10 +196,13 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
     if in_name.unit == "m":
         return bool(words & SLIDES)
     if in_name.quantity == "temperature":
+        # The T of T_C is a temperature, although t alone is time.
         return quantity == "temperature" or "t" in words
     if in_name.quantity == "time":
+        # A last s is often a plural or a symbol; ms, us and ns are nothing else.
         return quantity == "time" or (not quantity and in_name.unit != "s")
     if not in_name.quantity:
+        # Drives log a share, in %, of their rated torque or current.
         return quantity in ("torque", "current")
     if in_name.quantity == "force" and "f" in words:
         return True
@@ -203,6 +213,7 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
 
 def _split(name: str) -> list[str]:
     """Return the words of a name in lower case, with compounds like Motordrehzahl split."""
+    # Umlauts are spelled out before accents are dropped: ü is ue in German words, é is e.
     plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)
     plain = "".join(
         letter

@@ -36,6 +36,7 @@ class Proposal:
         """Add a key with its value and the reason for it."""
         if not sure:
             self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks=False))
+        # Strings, numbers and lists are written alike in JSON and TOML.
         text = f"{name} = {json.dumps(value, ensure_ascii=False)}"
         self.lines.append(_with_reason(text, why if sure else f"UNSURE: {why}"))
 

@@ -85,7 +85,9 @@ def guess_time(
         and _is_even(columns[m.column].astype(float))
     ]
     named = [m for m in advancing if m.quantity == "time"]
+    # The best evidence first. A coarse named clock gives way to a finer one of its rate.
     candidates = named or _finer(advancing, coarse, columns, typed) or coarse or advancing
+    # False sorts first: a column with a unit in its name is the better evidence.
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
@@ -102,6 +104,7 @@ def _guess(
     known = _unit(meaning, typed)
     if known is None and not fitting:
         return None
+    # Usual rates span three decades, so that mostly one unit fits.
     unit = known or fitting[0]
     rate_hz = _rate_hz(step, unit)
     is_usual, is_named = _is_usual(rate_hz), meaning.quantity == "time"
@@ -150,6 +153,7 @@ def _finer(
         values = columns[meaning.column].astype(float)
         own = [] if meaning.quantity else _usual_rates(meaning, _step(values, False), typed)
         if any(
+            # A finer clock must not start over: a coarse one never goes back.
             abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1]
             for unit, hz in own
             for rate in rates
@@ -268,6 +272,7 @@ def _step(values: NDArray, coarse: bool) -> float:
         if usual.any():
             return float(np.sum(steps[usual]) / np.sum(rows[usual]))
         return np.median(steps) / np.median(rows)
+    # Without steps back, at which the clock starts over.
     steps = np.diff(values)
     return float(np.median(steps[steps > 0]))
 
@@ -279,6 +284,7 @@ def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)
     ]
+    # A register is full at the same reading each time; breaks that differ are restarts.
     if full and full[0] and len(set(full)) == 1:
         return full[0], False
     return None, len(runs) > 1

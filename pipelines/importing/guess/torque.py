@@ -59,14 +59,19 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
     half = max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s)))))
     if len(time_s) < FEWEST + 2 * half:
         return None
+    # Derivatives of the parabola through three angles, a window apart. A difference of neighbouring
+    # rows would be noise.
     before, at, after = angle_rad[: -2 * half], angle_rad[half:-half], angle_rad[2 * half :]
     first, last = time_s[half:-half] - time_s[: -2 * half], time_s[2 * half :] - time_s[half:-half]
+    # Both halves nearly equal: otherwise the slope is not that at the middle, as across a gap.
     regular = np.abs(first - last) < 0.2 * np.median(first)
     if np.count_nonzero(regular) < FEWEST:
         return None
     dq = (after - before) / (first + last)
     ddq = 2.0 * ((after - at) / last - (at - before) / first) / (first + last)
+    # Averaged over the same window, so that it is smoothed about as the acceleration is.
     mean = np.convolve(torque, np.ones(2 * half + 1) / (2 * half + 1), "valid")
+    # tanh in place of sgn: noise at standstill would reverse the friction at random.
     slow = 0.05 * float(np.std(dq)) + 1e-12
     Y = np.column_stack([ddq, np.tanh(dq / slow), np.sin(at), np.cos(at), np.ones_like(at)])[
         regular
@@ -80,6 +85,8 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
         explained=1.0 - float(np.var(residual) / np.var(tau)),
         inertia=float(a),
         friction=float(b),
+        # Both terms together are A sin(q - down), A > 0: the drive must lift the joint away from
+        # down.
         down_rad=float(np.arctan2(-d, c)),
         gravity_share=float(np.std(gravity) / np.std(tau)),
         reach_rad=float(np.ptp(at)),

@@ -67,6 +67,7 @@ class UnitInName:
 
 def unit_in(name: str) -> UnitInName | None:
     """Return the unit in a name; None where it has none."""
+    # Brackets first: a unit in them is one for sure, elsewhere the same letters may be a word.
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
         unit = None if text in OTHERS else _written(text)
@@ -75,6 +76,7 @@ def unit_in(name: str) -> UnitInName | None:
     matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
     if not matches:
         return None
+    # The last one, because a unit follows what it is of.
     last = matches[-1]
     unit = _written(last[0])
     decides = last.re is _WORD and (unit is None or _is_plain(last[0], unit))
@@ -118,9 +120,12 @@ _ALONE = [
     if len(text) > 1
 ]
 # `in` and `min` are also words, so they are units in brackets only.
+# Longest first, as an alternation takes the first that matches: rad would hide rad/s.
 _ANY = "|".join(
     re.escape(text) for text in sorted(_ALONE, key=len, reverse=True) if text not in ("in", "min")
 )
+# Borders of words in snake_case and camelCase alike: torque_Nm, torqueNm. A single letter is a unit
+# only at the end, as in time_s: elsewhere it is a symbol.
 _BEFORE, _AFTER = r"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]))", r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
 _WORD = re.compile(rf"{_BEFORE}(?i:{_ANY}){_AFTER}")
 _LETTER = re.compile(r"(?<=[^\W_][_\s./,:-])[smAVNKC°%]$")

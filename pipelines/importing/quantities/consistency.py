@@ -41,8 +41,11 @@ def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Ag
         where signs differ. None where nothing moves, or the log is too short.
     """
     time_s, angle, velocity = whole_rows(time_s, angle, velocity)
+    # Neighbouring spans overlap. Fewer than five spans end to end agree by chance.
     if len(time_s) < 5 * SPAN:
         return None
+    # Steps over a span need no constant of integration. A bias of the velocity cannot add up over
+    # the whole log, either.
     return _through_origin(angle[SPAN:] - angle[:-SPAN], _travel(time_s, velocity))
 
 
@@ -75,8 +78,10 @@ def likeliest_integrals(
     time_s, *columns = _middle(time_s, *angles, *velocities)
     if len(time_s) < 5 * SPAN or not angles or not velocities:
         return []
+    # Two minus signs round the stride up: at most so many rows of each column remain.
     some = slice(None, None, -(-len(time_s) // max(fewest_screened, most_screened // len(columns))))
     whole = [_interpolated(column) for column in columns]
+    # Rows of length one: their products are cosines, whose squares are shares of variance.
     steps = _unit_rows([(angle[SPAN:] - angle[:-SPAN])[some] for angle in whole[: len(angles)]])
     travels = _unit_rows([_travel(time_s, velocity)[some] for velocity in whole[len(angles) :]])
     likely: list[tuple[float, int, int]] = []
@@ -123,6 +128,7 @@ def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
     xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
     if xx == 0.0 or yy == 0.0 or xy == 0.0:
         return None
+    # A regression of y on x alone would understate the slope, because x has noise, too.
     return Agreement(float(np.sign(xy)) * np.sqrt(yy / xx), xy**2 / (xx * yy))
 
 
@@ -148,6 +154,8 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
     if len(time_s) < 5 * SPAN:
         return 0.0, 0.0
     velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
+    # The mean torque over the span of the velocity: a shift in time between both would change their
+    # product.
     averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
     power = averaged * velocity
     return float(np.mean(power)), float(np.mean(np.abs(power)))
@@ -172,5 +180,6 @@ def whole_rows(*columns: NDArray) -> list[NDArray]:
 
 
 def _middle(*columns: NDArray) -> tuple[NDArray, ...]:
+    # The middle, as machines often stand still at both ends of a log.
     middle = slice(max(0, (len(columns[0]) - MOST) // 2), (len(columns[0]) + MOST) // 2)
     return tuple(column[middle] for column in columns)

@@ -50,14 +50,18 @@ def quantity(
     raw = _raw(reading, columns, where, note)
     if reading.signed_bits is not None:
         raw = signed(raw, reading.signed_bits, note)
+    # After the sign, as limits are of signed readings. Before unwrapping, because an impossible
+    # reading would count as a wraparound.
     if reading.range is not None:
         raw = _within(raw, reading.range, note)
     if reading.wraps_at is not None:
+        # The joint's zero as a raw reading: most joints begin less than half a turn from it.
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
         raw = unwrapped(raw, reading.wraps_at, note, near)
     unit = unit_named(reading.unit)
     assert unit is not None, "the map checks its units"
     if reading.wraps_at is None:
+        # Only reported: a step by a turn may be meant, as in a set-point.
         full = full_at(raw, _turns(reading, unit))
         if full is not None:
             seen = f"steps by {full:.6g} from one row to the next, as a full counter does"

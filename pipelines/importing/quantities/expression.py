@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import SettingsError
 
+# Arithmetic only. A map may come from others, so that no call or attribute may be evaluated.
 OPERATORS: dict[type, Callable] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -31,6 +32,7 @@ class Expression:
         self._text, self._where = text, where
         self._quoted: list[str] = []
         try:
+            # Names in backquotes become identifiers first: the parser refuses blanks in names.
             self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
         # The parser raises each of these, depending on the text.
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -45,6 +47,8 @@ class Expression:
 
     def __call__(self, columns: Mapping[str, NDArray]) -> NDArray:
         """Return the value, (n,) float64; a column of one row counts as a constant."""
+        # No warning at a zero denominator: values that are not finite are counted and reported
+        # later.
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self._value(self._tree, columns), dtype=float)
 
@@ -98,4 +102,5 @@ _EXPECTED = (
 
 
 def _is_number(value: Any) -> bool:
+    # By type, as True is an int, too. Above LARGEST are infinity and integers that overflow.
     return type(value) in (int, float) and value <= LARGEST

@@ -90,13 +90,19 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
         missing = np.isnat(values)
         return np.where(missing, np.nan, whole) if missing.any() else whole
     text = pd.Series(values).astype("string")
+    # ISO 8601 has the year first. It allows a comma before the fraction, which becomes a point.
     text = text.str.replace(DAYS_FIRST, r"\3-\2-\1", regex=True).str.replace(",", ".", regex=False)
+    # In UTC, so that stamps with different offsets can be compared, as across a change to summer
+    # time.
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
+    # Times of day alone: any date does, because only differences of stamps count.
     if dates.isna().all():
         dates = pd.to_datetime(
             "1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True
         )
     stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
+    # Integers where none is missing: at 1.7e18 ns since 1970, neighbours in float64 are 256 ns
+    # apart.
     if dates.notna().all():
         return stamps.to_numpy()
     return stamps.where(dates.notna()).to_numpy(dtype=float)

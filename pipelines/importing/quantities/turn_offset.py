@@ -38,7 +38,9 @@ class Beginnings:
             if not len(known):
                 continue
             begins = float(known[0])
+            # No log shows its own turn, so the first one is the reference of all others.
             first, first_log = self._first.setdefault(name, (begins, log))
+            # Less than half a turn may be motion between two logs.
             away = round((begins - first) / turn)
             if away:
                 seen = (

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipelines.importing.finding import Note, counted, unnoted
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 
+# Every width, as encoders also have 12, 14 or 17 bits, and wrap at their own modulus.
 REGISTERS = tuple(2.0**bits for bits in range(8, 33))
 """Moduli of counters of whole numbers."""
 
@@ -73,8 +74,10 @@ def unwrapped(values: NDArray, modulus: float, note: Note = unnoted, near: float
     if not known.any():
         return values
     first = values[known][0]
+    # Right while the joint moves by less than half the modulus from row to row.
     turns = -np.round(np.diff(values[known], prepend=first) / modulus)
     wraps = int(np.count_nonzero(turns))
+    # No reading shows the first turn. The cumulative sum carries this choice to all rows.
     turns[0] = -np.round((first - near) / modulus)
     unwrapped_values = values.copy()
     unwrapped_values[known] = values[known] + modulus * np.cumsum(turns)
@@ -109,12 +112,15 @@ def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
     """
     known = values[np.isfinite(values)]
     steps = np.abs(np.diff(known))
+    # A wraparound crosses nearly the whole range of readings, motion from row to row does not.
     far = steps > 0.5 * np.ptp(known) if len(known) else np.zeros(0, dtype=bool)
     if not far.any() or far.all():
         return None
     moved = 1.5 * float(np.max(steps[~far]))
     whole = bool(np.all(known == np.round(known)))
     for modulus in sorted((*turns, *(REGISTERS if whole else ()))):
+        # Motion must be slow against the modulus, or its own steps look like wraparounds. The
+        # median tolerates single outliers.
         if moved < 0.25 * modulus and np.median(np.abs(steps[far] - modulus)) <= moved:
             return modulus
     return None

@@ -17,6 +17,7 @@ Metadata = Mapping[str, Mapping[str, Any]]
 
 def outdated(imported: Metadata, current: Collection[str]) -> list[str]:
     """Return the files of the same logs as the current recordings, but from an earlier map."""
+    # By the hash of the log, as names of recordings change with the map.
     logs = {sha for name in current for sha in imported[name]["imported"]["sha256"]}
     return [
         f"{name}.parquet"
@@ -39,6 +40,7 @@ def missing_for_verdict(
     imported: Metadata, current: Collection[str], map_path: Path
 ) -> Iterator[str]:
     """Yield a message for each reason why the recordings in a folder give no verdict."""
+    # Of all recordings in the folder: training may come from one import, validation from another.
     purposes = {metadata["purpose"] for metadata in imported.values()}
     for purpose, use in NEEDED.items():
         if purpose not in purposes:

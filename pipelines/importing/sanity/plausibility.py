@@ -81,6 +81,7 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
     """Report single readings far from nearly all others."""
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
+        # Median and quantile: an outlier must not widen the range that it is judged by.
         some = _every_kth(columns[name])
         middle = float(np.median(some))
         usual = float(np.quantile(np.abs(some - middle), 0.99))
@@ -146,6 +147,7 @@ def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> I
         )
         for joint in joints
     ]
+    # Over all joints, because one joint's motion can drive another one's motor.
     mean, size = (sum(values) for values in zip(*powers, strict=True))
     if mean < -gives_back * size:
         seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"

@@ -67,6 +67,7 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         raise InputError(
             f"source.encoding: found {encoding!r}, expected one such as utf-8"
         ) from error
+    # The limit of bytes may have cut the last line in two.
     lines = lines if whole else lines[:-1]
     skipped = settings.skip_rows or 0
     guesses = _tables(
@@ -78,6 +79,7 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         )
     if not guesses:
         raise InputError(_no_table(lines, settings))
+    # A wrong delimiter leaves several numbers in one field, which is then none.
     table = max(guesses, key=lambda guess: guess.fields_of_numbers)
     names = settings.columns or table.header(lines[skipped:])
     if len(names) != table.width:
@@ -124,6 +126,7 @@ def _encoding(start: bytes) -> str:
     try:
         start[:-4].decode("utf-8")  # the last character may be cut in two
     except UnicodeDecodeError:
+        # The usual encoding of Windows in Western Europe, where ° and µ are single bytes.
         return "cp1252"
     return "utf-8"
 
@@ -170,6 +173,7 @@ class _Table:
         if settings.decimal:
             decimals = [settings.decimal]
         else:
+            # A comma cannot separate fields and be the decimal point, too.
             decimals = ["."] if delimiter == "," else [".", ","]
         tables = [cls._with(lines, delimiter, decimal) for decimal in decimals]
         return max(filter(None, tables), key=lambda table: table.fields_of_numbers, default=None)
@@ -197,6 +201,7 @@ class _Table:
 
         If that line holds units, they are appended to the names in the line before.
         """
+        # Many tools write the header as a comment, so its mark is removed.
         above = [
             _fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter)
             for line in lines[: self.first]

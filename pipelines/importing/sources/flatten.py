@@ -51,6 +51,7 @@ def _filled(values: list) -> list:
 
 def _array(content: Any) -> np.ndarray:
     try:
+        # Objects are numbers with missing values among them, or text.
         array = np.atleast_1d(np.asarray(content))
         return array.astype(float) if array.dtype == object else array
     except (ValueError, TypeError):  # text among numbers, or rows of different lengths
@@ -65,6 +66,7 @@ def _numbered(array: np.ndarray, name: str) -> Iterator[tuple[str, np.ndarray]]:
         return
     if array.dtype.kind not in "biufOUS":
         return
+    # A vector in any orientation: MATLAB's are matrices with one row or one column.
     if max(array.shape) == array.size:
         yield name, array.reshape(-1)
         return

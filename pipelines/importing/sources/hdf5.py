@@ -92,4 +92,5 @@ def _values(data: Any, sample: bool = False) -> np.ndarray:
     """Return a data set's values, a few rows for a sample; axes of MATLAB's are transposed."""
     if "MATLAB_class" in data.attrs and data.ndim > 1:
         return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
+    # Names follow from shape and type, so a sample needs no values; an empty array costs nothing.
     return np.empty(data.shape, dtype=data.dtype) if sample else data[()]

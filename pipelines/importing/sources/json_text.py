@@ -39,6 +39,7 @@ def _content(path: Path) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
+        # Not one document: perhaps one record a line, as loggers append them.
         lines = [line for line in text.splitlines() if line.strip()]
         try:
             return [json.loads(line) for line in lines]
@@ -61,6 +62,7 @@ def _flattened(content: Any, table: str | None) -> Columns:
             known = [str(known) for known in below] if isinstance(below, Mapping) else []
             raise InputError(f"has no {key!r}, which source.table names; {suggestion(key, known)}")
         below = below[key]
+    # Constants next to the table stay available to expressions, such as a gain.
     constants = {name: values for name, values in flattened(content).items() if len(values) == 1}
     return flattened(below, "" if _has_keys(below) else table) | constants
 

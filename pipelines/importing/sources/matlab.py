@@ -32,6 +32,7 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
         raise InputError(
             f"is a damaged .mat file ({type(error).__name__}: {error}); save it again"
         ) from error
+    # Names with two underscores are scipy's own: header, version, globals.
     variables = {name: value for name, value in content.items() if not name.startswith("__")}
     if settings.table is not None:
         if settings.table not in variables:

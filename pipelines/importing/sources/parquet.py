@@ -29,6 +29,7 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
     _refuse_twins(schema.names)
     empty = _unnested(schema.empty_table())
     _refuse_twins(empty.column_names)
+    # Columns of a list are numbered by its length, which only the values show.
     if any(pa.types.is_nested(field.type) for field in empty.schema):
         with _damage_reported():
             columns = flattened(_opened(path).read().to_pydict())

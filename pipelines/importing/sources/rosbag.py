@@ -75,10 +75,12 @@ def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
         received.append(time)
         stamps.append(10**9 * message.header.stamp.sec + message.header.stamp.nanosec)
         for quantity in QUANTITIES:
+            # A JointState may leave velocity or effort empty.
             for joint, value in zip(message.name, getattr(message, quantity), strict=False):
                 values.setdefault(f"{joint}.{quantity}", {})[row] = value
     columns: Columns = {"stamp": np.array(stamps), "log_time": np.array(received)}
     for name, known in values.items():
+        # NaN where a message lacks the joint, so that all columns have a row a message.
         columns[name] = np.full(len(stamps), np.nan)
         columns[name][list(known)] = list(known.values())
     return columns

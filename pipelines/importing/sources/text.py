@@ -60,6 +60,8 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
             encoding_errors="replace",
             chunksize=chunk,
             skipinitialspace=True,
+            # Otherwise pandas takes the first columns for an index where rows have more fields than
+            # names.
             index_col=False,
             low_memory=False,
         )
@@ -72,6 +74,7 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
                 parts.append({name: part[name].to_numpy().copy() for name in wanted})
     except (pd.errors.ParserError, ValueError) as error:
         raise InputError(_parse_error(str(error), dialect)) from error
+    # Removed from the chunks as they are joined, so that no column is in memory twice for long.
     return {name: _joined([part.pop(name) for part in parts]) for name in wanted}
 
 

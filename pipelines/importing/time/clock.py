@@ -200,6 +200,7 @@ def seconds(values: NDArray, origin: float, settings: TimeSettings, note: Note) 
     """
     unit = unit_named(settings.unit)
     assert unit is not None, "the map checks its units"
+    # Subtracted as integers first, because float64 cannot hold every nanosecond since 1970.
     since = (values - origin).astype(float)
     if settings.wraps_at is not None:
         since = _unwrapped(since, settings.wraps_at, note)
@@ -267,6 +268,7 @@ def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     if len(rows) < len(time_s):
         note(f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out")
     _refuse_backwards(time_s[rows])
+    # Outliers first: one stamp far ahead would look like a clock that starts over after it.
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
     for k in begins[1:]:
@@ -325,6 +327,7 @@ def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
 
 def _begins(time: NDArray) -> list[int]:
     """Return the first row, and each row at which the clock starts over."""
+    # Two kinds of restart: a step far back, then, between those, a small one that lasts.
     far = max(RESTART_S, RESTART_PERIODS * _period(time))
     cuts = [0, *(np.flatnonzero(np.diff(time) < -far) + 1), len(time)]
     begins = []
@@ -382,6 +385,7 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
     time = time_s[rows]
     back = np.count_nonzero(np.diff(time) < 0.0)
     if back:
+        # Stable, so that of rows with one stamp the first in the file stays the first.
         order = np.argsort(time, kind="stable")
         rows, time = rows[order], time[order]
         note(f"goes back a little, {counted(int(back), 'time')}", "rows put in order")
@@ -441,6 +445,7 @@ class Sampling:
         median = float(np.median(steps))
         longest = 1.5 * max(median, float(np.quantile(steps, 0.95)))
         regular = steps[steps <= longest]
+        # The mean, as stamps of few digits round the median.
         period = float(np.mean(regular))
         kept = np.diff(kept_s)
         gaps = [

@@ -51,6 +51,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     ]
     if not moving:
         return None
+    # Rows without gaps in any joint, then a uniform grid, as the correlation needs one.
     time_s, *moving = whole_rows(time_s, *moving)
     if len(time_s) < 40:
         return None
@@ -68,9 +69,11 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     best = min((difference for _, difference in near), default=np.inf)
     if best > repeats:
         return None
+    # The shortest that is nearly as good, because every multiple of a period repeats, too.
     lag, least = min(
         (lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, equal)
     )
+    # Periods are planned as round numbers; noise moves only the last digits.
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
     limit = max(as_round * least, equal)
     as_good = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
@@ -94,6 +97,8 @@ def _mean_differences(columns: NDArray) -> NDArray:
     lags = np.arange(n // 2 + 1)
     worst = np.zeros(len(lags))
     for column in columns.T:
+        # The square of a difference is two energies less twice the correlation. By FFT and
+        # cumulative sums all lags cost n log n instead of n².
         together = correlate(column, column, method="fft")[n - 1 : n + len(lags) - 1]
         power = np.concatenate([[0.0], np.cumsum(column**2)])
         both = power[n - lags] + power[n] - power[lags]
@@ -105,9 +110,11 @@ def _candidates(differences: NDArray) -> list[float]:
     """Return the lags of minima below SIMILAR after the first above DIFFERENT, the best first."""
     # Greatest number of lags that are refined.
     most_lags = 100
+    # A smooth motion resembles itself at short lags, without any period.
     different = np.flatnonzero(differences > DIFFERENT)
     if not len(different):
         return []
+    # Infinity after the last lag, so that a period of half the run can be a minimum.
     (lags,) = argrelmin(np.append(differences, np.inf))
     lags = lags[(lags > different[0]) & (differences[lags] < SIMILAR)]
     return [float(lag) for lag in lags[np.argsort(differences[lags])[:most_lags]]]
@@ -129,6 +136,7 @@ def _median_difference(columns: NDArray, lag: float) -> float:
     # Share of the variance below which a period has too little motion to be compared.
     at_rest = 0.01
     n, length = len(columns), int(lag)
+    # The small number keeps a whole number of periods whole, in spite of rounding.
     count = int(n / lag + 1e-6)
     begins = 0.5 * (n - count * lag) + lag * np.arange(count)
     at = begins[:, np.newaxis] + np.arange(length)

@@ -21,6 +21,8 @@ class Segment:
     @property
     def rms(self) -> float:
         """Root mean square, with the sign of the share."""
+        # Mean squares add up, rms values do not: bars are laid in the former, numbers given in the
+        # latter.
         return float(np.copysign(np.sqrt(abs(self.share)), self.share))
 
 
@@ -71,4 +73,5 @@ class Fall:
     @property
     def highest(self) -> float:
         """The largest of error before, error after and floor."""
+        # The floor, too, because it may lie above every error.
         return max(self.before, self.after or 0.0, self.floor)

@@ -89,6 +89,7 @@ class Chart:
         """
         if len(self.x) <= rows:
             return self
+        # One choice of rows for all curves, because they share x.
         kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)
         panels = tuple(
             replace(panel, series=tuple(replace(s, values=s.values[kept]) for s in panel.series))
@@ -107,6 +108,7 @@ def thinned_alike(charts: Sequence[Chart], values: int) -> list[Chart]:
     values : int
         Greatest number of values of all charts.
     """
+    # Bisection for the largest common number of rows: short charts stay whole, long ones share.
     low, high = 1, max((len(chart.x) for chart in charts), default=1)
     while low < high:
         rows = (low + high + 1) // 2

@@ -28,6 +28,7 @@ def extremes(columns: NDArray, rows: int) -> NDArray[np.intp]:
     n, k = columns.shape
     if n <= rows:
         return np.arange(n)
+    # The first and the last row are always kept.
     stretches = max(1, (rows - 2) // (each * k))
     kept = _of_stretches(columns, stretches)
     # Extremes of smooth curves share rows, which leaves room for more stretches.

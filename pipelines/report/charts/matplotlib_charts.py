@@ -38,6 +38,7 @@ def chart_figure(chart: Chart) -> Figure:
     for axis, panel in zip(axes, chart.panels, strict=True):
         _draw(axis, chart, panel)
     axes[-1].set_xlabel(chart.x_label)
+    # matplotlib marks lines without a legend by an underscore.
     lines = [line for axis in axes for line in axis.get_lines() if line.get_label()[0] != "_"]
     figure.suptitle(_sentence(chart.title), x=0.01, ha="left", fontsize=9, fontweight="bold")
     _legend(figure, {line.get_label(): line for line in lines}, 8)
@@ -73,10 +74,12 @@ def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
     colour, label = COLOURS[series.role], series.label or "_"
     x, values = chart.x, series.values
     if series.mark is Mark.DOTS:
+        # Rasterized, as thousands of dots as vectors make a PDF slow to open.
         dots: dict[str, Any] = {"ms": 1.6, "mew": 0, "alpha": 0.5, "rasterized": True}
         axis.plot(x, values, ".", color=colour, label=label, **dots)
         return
     if series.mark is Mark.MEAN:
+        # Means stand between rows of dots, over which the line must go on.
         known = ~np.isnan(values)
         x, values = x[known], values[known]
     width = 1.8 if series.mark is Mark.MEAN else WIDTHS[series.role]

@@ -47,6 +47,7 @@ class Change:
     @property
     def is_beyond(self) -> bool | None:
         """Whether the difference's interval excludes zero; None without an interval."""
+        # A half width of zero is of assumed values, about which the data say nothing.
         return None if not self.half else abs(self.difference) > self.half
 
 
@@ -95,6 +96,7 @@ def titles_of(first: Session, second: Session) -> tuple[str, str]:
     """Return the names of the sessions' folders, with as many parents as make them differ."""
     paths = [session.folders[0].resolve() for session in (first, second)]
     names = [path.name for path in paths]
+    # Parents are added until the names differ, as in a/diagnosed and b/diagnosed.
     for path_a, path_b in zip(*(path.parents for path in paths), strict=False):
         if names[0] != names[1]:
             break
@@ -181,6 +183,7 @@ class ErrorAndFloor:
     @property
     def words(self) -> str:
         """Errors and floors in one line."""
+        # Also in floors, since the floors of two sessions may differ with their sensors.
         parts = [
             f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
             for v, f in zip(self.values, self.floors, strict=True)
@@ -201,6 +204,7 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
         unit = torque_unit(first, joint)
         floors = (first.noise_floor_nm[joint], second.noise_floor_nm[joint])
         for words, key in kinds:
+            # The refusal of different machines guarantees that both have this joint.
             errors = (getattr(first, key)[joint], getattr(second, key)[joint])
             rows.append(ErrorAndFloor(joint, words, unit, errors, floors))
     return rows
@@ -215,6 +219,7 @@ def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str,
         If they differ.
     """
     descriptions = {"": lambda session: in_words(session.joints), "mechanism ": _mechanism}
+    # Equal joints are not enough: a leg that lies level has other parameters than one that hangs.
     for prefix, description in descriptions.items():
         one, other = map(description, pair)
         if one and other and one != other:
@@ -289,6 +294,7 @@ def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
         in_each = [causes.get(label) for causes in named]
         words = dict.fromkeys(cause_in_words(cause) for cause in in_each if cause)
         cells = [_cause_cell(*one) for one in zip(pair, in_each, strict=True)]
+        # A cause of one label may be worded differently, where only one session has it per run.
         rows.append({"words": " / ".join(words), "cells": cells})
     return rows
 

@@ -65,6 +65,8 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
     values = VALUES
     page = _page(session, title, output, values)
     while len(page.encode()) > LARGEST_BYTES and values > fewest_values:
+        # The words of a page have a length of their own, so the room for numbers is found by
+        # trying.
         values //= 2
         page = _page(session, title, output, values)
     return page

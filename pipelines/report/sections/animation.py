@@ -81,10 +81,13 @@ def _frames(time: NDArray, error: NDArray) -> NDArray:
     """Return the rows to show, at ``FRAMES_HZ``, of the stretch with the largest error."""
     begin = time[0]
     if time[-1] - begin > LONGEST_S:
+        # The sum over any stretch is a difference of two cumulative sums.
         total = np.concatenate([[0.0], np.cumsum(error**2)])
         ends = np.searchsorted(time, time + LONGEST_S)
+        # Only stretches inside the run; a shorter one at its end is part of the last.
         whole = time + LONGEST_S <= time[-1]
         begin = time[np.argmax(np.where(whole, total[ends] - total[:-1], -1.0))]
+    # The nearest later rows: positions are not interpolated, because windows end in jumps.
     wanted = np.arange(begin, min(begin + LONGEST_S, time[-1]), 1.0 / FRAMES_HZ)
     return np.unique(np.clip(np.searchsorted(time, wanted), 0, len(time) - 1))
 

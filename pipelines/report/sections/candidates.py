@@ -34,6 +34,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     for row in rows:
         extra = _beyond(row, named)
         known = words if row["verdict"] in ("named", "indistinguishable") else {}
+        # A set that contains the named one is shown by what it adds, in words and in gain.
         if extra is None or named is None:
             gain = _total_gain(row)
         else:

@@ -39,6 +39,7 @@ def commands(
     if output:
         page += ["-o", str(output)]
     results = [command for command in stages if command] + [(page, False)]
+    # One command makes several files, so its line comes up more than once.
     lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in results)
     return [Command(line, needs) for line, needs in lines]
 
@@ -52,6 +53,7 @@ def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Wo
     if session.config:
         return ["--config", str(session.config)], False
     defaults = Experiment()
+    # Files state their settings, so equal defaults make the same result without exoid.toml.
     usual = all(
         value == getattr(defaults, name).model_dump(mode="json")
         for name, value in resolved(artifact).items()
@@ -92,6 +94,7 @@ def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str
     """Return the words that import a log, by its path in these folders or in the first import."""
     given = artifact.metadata["imported"].get("given") or {}
     stated = zip(inputs, artifact.inputs, strict=True)
+    # A bare name: the folders lack a file with these bytes.
     absent = [name for name, one in stated if name == one["name"]]
     maps = [name for name in inputs if name.endswith(".toml")]
     sources = [name for name in inputs if name not in maps]
@@ -111,6 +114,7 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
     if artifact is session.extended:
         return None  # The diagnosis writes it.
     config, needs = _config(session, artifact)
+    # Among the inputs, but given by an option of its own.
     causes = [_path_of(session, artifact.causes)] if artifact.causes else []
     runs = [path for path in _inputs(session, artifact) if path not in causes]
     words = [word for path in causes for word in ("--causes", path)]
@@ -138,6 +142,7 @@ def _simulate(session: Session, artifact: Artifact) -> Words | None:
     if kind == "windows":
         words = ["simulate", inputs[0], "--replay", inputs[-1], *config]
         return [*words, "-o", str(artifact.path)], needs
+    # The model is the first input, and a reference, if any, the second.
     reference = ["--reference", inputs[1]] if len(inputs) > 1 else []
     run = artifact.metadata.get("plant", {}).get("run", "with_human")
     option = [] if run == "with_human" else ["--run", run]

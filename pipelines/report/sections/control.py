@@ -83,6 +83,7 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
     first = next(iter(tables.values()))
     angles, errors, torques, worst = [], [], [], 0.0
     for model, frame in tables.items():
+        # A loop of another length cannot share the chart's time.
         if len(frame) != len(first):
             continue
         role, words = MODELS[model]
@@ -101,6 +102,7 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
         x=first["time_s"].to_numpy(),
         panels=(
             Panel(f"angle, {unit}", tuple(angles)),
+            # A height of zero is no range, so it becomes None.
             Panel(f"error, m{unit}", tuple(errors), reach=LIMIT * worst or None),
             Panel(f"torque, {joint.unit('torque')}", tuple(torques)),
         ),
@@ -122,6 +124,7 @@ def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     for joint in session.joints:
         curves = []
         for model, table in tables.items():
+            # Curves share x, so both sweeps must have the same gains.
             if table[GAIN].equals(first[GAIN]):
                 role, words = MODELS[model]
                 errors = 1e3 * table[joint.column("error")].to_numpy(dtype=float)

@@ -77,6 +77,7 @@ def _split(verdict: Verdict, one: Shares) -> Split:
 
 
 def _end_to_end(shares: list[tuple[str, str, float]]) -> tuple[Part, ...]:
+    # The page draws each part from its own start, so that it needs no sums.
     parts, low = [], 0.0
     for words, tone, share in shares:
         parts.append(Part(words, tone, low, share))

@@ -40,6 +40,7 @@ def budget(verdict: Verdict) -> list[Bar]:
     bars = []
     words_of = shares_in_words(verdict.causes)
     for joint, shares in verdict.error_budget.items():
+        # Two ends grow apart: parts of the error right of zero, causes that raise it left.
         low = high = 0.0
         segments = []
         causes = [key for key in shares if key not in SHARES]
@@ -47,6 +48,7 @@ def budget(verdict: Verdict) -> list[Bar]:
             start = high if share >= 0 else low
             tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
             words = SHARES.get(key) or words_of.get(key) or any_label_in_words(key)
+            # The verdict counts no more noise than there is error, which may be below the floor.
             if key == "noise_floor" and share < 0.999 * verdict.noise_floor_nm[joint] ** 2:
                 words = "noise, all of it below the floor"
             end = start + share

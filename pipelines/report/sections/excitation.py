@@ -42,6 +42,7 @@ def _excitation(session: Session, artifact: Artifact) -> Excitation:
     about = artifact.metadata
     known = {key: words for key, words in NUMBERS.items() if about.get(key) is not None}
     facts = [f"{words} {digits(about[key])}" for key, words in known.items()]
+    # Only trajectories that are Fourier series have coefficients.
     if about.get("a") and about.get("omega_rad_s"):
         base_hz = about["omega_rad_s"] / (2 * pi)
         facts.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")

@@ -24,6 +24,7 @@ def run_names(session: Session) -> list[str]:
     if session.residuals is None:
         return []
     runs = session.residuals.frame[["file", "purpose"]].drop_duplicates("file")
+    # Descending, as train comes before validate in the alphabet; stable within each.
     return list(runs.sort_values("purpose", ascending=False, kind="stable")["file"])
 
 
@@ -52,9 +53,11 @@ def _torque_chart(
     torques, errors = [], []
     for model, (role, words) in models_of(session).items():
         rows = frame[frame["model"] == model]
+        # A model with other rows cannot share the chart's time.
         if len(rows) != len(first):
             continue
         torques.append(Series(words, rows[joint.column("predicted")].to_numpy(), role))
+        # NaN interrupts the line at reversals, which the error does not count.
         residual = rows[joint.column("residual")].where(rows["scored"]).to_numpy()
         errors.append(Series(words, residual, role))
     torques.append(Series("measured", first[joint.column("torque")].to_numpy(), Role.MEASURED))
@@ -91,6 +94,7 @@ def replayed(session: Session, kind: str = "windows") -> dict[str, dict[str, Art
     for model, replays in session.simulations_by_model(kind).items():
         for one in replays if model in drawn else ():
             source = session.recorded(one)
+            # The inputs of a replay are the model and, last, the recording.
             run = source.path.name if source else one.inputs[-1]["name"]
             results.setdefault(run, {}).setdefault(model, one)
     return results
@@ -151,6 +155,7 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     rows = rows[rows["file"] == run]
     floor = session.noise_floor(joint)
     grew_away_from_reversals = False
+    # In this order, as the second note depends on the first result.
     subsets = {"away from reversals": rows[rows["scored"]], "reversals included": rows}
     residual = joint.column("residual")
     for words, chosen in subsets.items():
@@ -177,8 +182,10 @@ def _while_moving(
         if frame is None or chosen is None or not len(chosen):
             values.append(None)
             continue
+        # mrad, or mm at a prismatic joint.
         values.append(1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2))))
         kept, of = chosen["window"].nunique(), frame["window"].nunique()
+    # If all windows count, or none, the row would repeat another or be empty.
     if 0 < kept < of:
         yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
 

@@ -42,6 +42,7 @@ def context(content: Content) -> dict[str, Any]:
 def machine(session: Session) -> str:
     """Return the joints, and the rig, subject and session of the recordings, in words."""
     joints = " and ".join(joint.name for joint in session.joints)
+    # Motions repeat the metadata of their recordings, which a folder may lack.
     origins = [origin(one) for one in session.of_kind("recording") or session.of_kind("motion")]
     about = list(dict.fromkeys(filter(None, origins)))
     return " · ".join(filter(None, (joints, "; ".join(about[:3]))))
@@ -51,6 +52,7 @@ def status(verdict: Verdict | None) -> dict[str, str]:
     """Return a verdict's status in words, and the tone of its badge."""
     if not verdict:
         return {"words": "not diagnosed", "tone": ""}
+    # Before the status, because no cause is sought in faulty recordings.
     if verdict.acquisition_at_fault:
         return {"words": "acquisition, not physics", "tone": "bad"}
     words, tone = STATUS.get(verdict.status, (verdict.status.replace("_", " "), ""))
@@ -66,6 +68,7 @@ def headline(session: Session) -> str:
         return "The recordings are at fault, not the model"
     if verdict.causes:
         return f"The simulation misses {causes_in_words(verdict.causes)}"
+    # The tree may know joint or family of what no listed cause explains.
     if verdict.status == "unknown_cause" and verdict.findings:
         missing = verdict.findings[0].words
         return f"The simulation misses {missing}, and no listed cause explains it"

@@ -55,6 +55,7 @@ def worst_joint(session: Session) -> Joint | None:
     verdict = session.verdict
     if not verdict:
         return None
+    # In units of the floor, as torques of different joints cannot be compared.
     before, floor = verdict.baseline_rmse_nm, verdict.noise_floor_nm
     if verdict.causes:
         name = verdict.causes[0].gain.joint
@@ -116,10 +117,12 @@ def _loop_tiles(session: Session) -> list[Tile]:
         replays = [models[name] for name in ("baseline", "extended") if name in models]
         stated = [replay.metadata.get(key, {}) for replay in replays]
         errors = [of_joints[joint.name] for of_joints in stated if joint.name in of_joints]
+        # Only runs that both models can follow show a gain.
         if len(errors) == 2:
             pairs.append(errors)
     if not pairs:
         return []
+    # One run for both numbers: a mean would mix motions of different size.
     before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
     is_worse = after > before
     small = "worse with the causes" if is_worse else f"rms error of the simulated {joint.effort}"

@@ -113,6 +113,7 @@ class Row:
     def span(self) -> tuple[float, float]:
         """The range that contains all intervals."""
         known = [e for e in self.estimates if e]
+        # The value, too, as a parameter without interval has no ends.
         ends = [value for e in known for value in (e.value, e.low, e.high) if value is not None]
         return min(ends), max(ends)
 
@@ -157,6 +158,7 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
         None if pd.isna(row[key]) else float(row[key])
         for key in ("ci95_low", "ci95_high", "std_error")
     )
+    # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     names = {key: row[key] for key in ("effect", "name", "symbol", "unit")}
     numbers: dict[str, Any] = {

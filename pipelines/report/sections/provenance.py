@@ -69,6 +69,7 @@ def _origins(session: Session) -> list[Origin]:
 def _input(session: Session, stated: dict[str, str]) -> Input:
     if session.file_of(stated["name"], stated["sha256"]):
         state = "found"
+    # The same name with other bytes: the input was made again after it was used.
     elif any(one.path.name == stated["name"] for one in session.artifacts):
         state = "changed"
     else:
@@ -99,6 +100,7 @@ def outside(session: Session) -> list[Outside]:
             digest = stated["sha256"]
             before = results.get(digest, Outside(name, role, digest, ()))
             files = (*before.made_of_it, session.shown(one.path))
+            # By its bytes: two logs of one name in different folders are two inputs.
             results[digest] = replace(before, made_of_it=files)
     return list(results.values())
 
@@ -174,6 +176,7 @@ def _changed_settings(session: Session) -> list[str]:
     for one in session.artifacts:
         for name, setting in resolved(one).items():
             is_now = getattr(now, name).model_dump(mode="json")
+            # A key that a file lacks is of a newer exoid and does not count as a change.
             if any(setting[key] != value for key, value in is_now.items() if key in setting):
                 by_value.setdefault(name, []).append(session.shown(one.path))
     return [

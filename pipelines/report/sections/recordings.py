@@ -72,6 +72,7 @@ def context(content: Content) -> dict[str, Any]:
 def _runs(session: Session) -> list[Run]:
     """Return every run of a session, in the order of their files."""
     recordings = session.of_kind("recording")
+    # A motion has the file name of its recording.
     filters = {one.path.name: one for one in session.of_kind("motion")}
     chosen = recordings or list(filters.values())
     return [_run(session, one, filters.get(one.path.name)) for one in chosen]
@@ -81,7 +82,9 @@ def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> Run:
     about, time = artifact.metadata, _time(artifact)
     step = np.diff(time)
     usual = float(np.median(step)) if len(step) else float("nan")
+    # Gaps are counted on their own, and are no jitter.
     near = step[step < 1.5 * usual] if len(step) else step
+    # Half of 98 %, so that a single late row does not count.
     jitter = float(np.subtract(*np.percentile(near, [99, 1]))) / 2 if len(near) else 0.0
     gaps = about.get("gaps") or []
     return Run(

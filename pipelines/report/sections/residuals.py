@@ -104,8 +104,10 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     if session.residuals is None:
         return
     frame = session.residuals.frame
+    # Runs that no fit has seen, without reversals: no model of speed predicts a standing joint.
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
     for joint in session.joints:
+        # One height for all charts of a joint, so that their errors can be compared.
         reach = _reach(judged, joint)
         for one in _against(session, joint):
             yield _chart(session, judged, joint, one, reach)
@@ -115,6 +117,7 @@ def _reach(frame: pd.DataFrame, joint: Joint) -> float | None:
     # Percentile of the residual's magnitude that a panel must show.
     reach_percentile = 99.5
     size = np.abs(frame[joint.column("residual")].to_numpy())
+    # A percentile with a margin, so that a few outliers do not flatten the cloud.
     return 1.1 * float(np.percentile(size, reach_percentile)) if len(size) else None
 
 
@@ -125,6 +128,8 @@ def _chart(
     rows = {model: frame[frame["model"] == model] for model in models_of(session)}
     rows = {model: table for model, table in rows.items() if len(table)}
     x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
+    # The columns of a chart share x. Dots and means are therefore rows of one table, each with NaN
+    # where the other has its places.
     step = max(1, len(x) // DOTS)
     middles = _mean_along(x, x)[0] if len(x) else x
     places = np.concatenate([x[::step], middles])
@@ -133,6 +138,7 @@ def _chart(
     for model, table in rows.items():
         role, words = MODELS[model]
         y = table[joint.column("residual")].to_numpy()
+        # A model with other rows cannot share x.
         if len(y) != len(x):
             continue
         dots, line = np.full((2, len(places)), np.nan)
@@ -173,6 +179,7 @@ def most_explained_variable(session: Session, joint: Joint) -> str:
     ranking = [one for one in session.dependences(joint) if one.variable in known]
     if verdict is None or not ranking:
         return "angle"
+    # Mean squares, because shares of different totals cannot be subtracted.
     before = verdict.baseline_rmse_nm[joint.name] ** 2
     remaining = verdict.extended_rmse_nm[joint.name] ** 2 if verdict.causes else 0.0
 

@@ -41,6 +41,7 @@ def _settings(session: Session) -> dict[str, list[str]]:
         config = artifact.metadata.get("config") or {}
         for section in sections:
             for name, value in _flat(section, config.get(section)):
+                # A dictionary as an ordered set: files of a session mostly agree.
                 by_setting.setdefault(name, {})[value] = None
     return {name: list(values) for name, values in by_setting.items()}
 

@@ -41,6 +41,7 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     span = max(1, round(over_s / float(np.median(np.diff(time)))))
     moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
     slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
+    # One slow stretch excludes its whole window, whose error lasts to the window's end.
     return ~np.isin(windows, windows[span:][within & slow])
 
 
@@ -67,6 +68,7 @@ def torque_error_grew(before: float | None, after: float | None = None, *, floor
     floor : float
         Noise floor, N·m.
     """
+    # Mean squares of independent parts add, so a growth below the noise's own says nothing.
     return before is not None and after is not None and after**2 - before**2 > floor**2
 
 
@@ -83,6 +85,7 @@ def _at(joint: Joint, verdict: Verdict) -> Iterator[str]:
         (getattr(verdict, f"baseline_{key}")[name], getattr(verdict, f"extended_{key}")[name])
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
+    # Effects that hold a standing joint raise its breakaway torque, which explains the growth.
     here = [cause.effect for cause in verdict.causes if cause.joint == name]
     holds = any(BY_NAME[effect].holds for effect in here if effect in BY_NAME)
     grew = torque_error_grew(all_before, all_after, floor=verdict.noise_floor_nm[name])

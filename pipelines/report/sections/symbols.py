@@ -50,6 +50,7 @@ def meaning(session: Session, effect: str, joint: str, name: str) -> str:
 
 def unit(session: Session, key: str) -> str:
     """Return the unit of a parameter by its key in a trajectory file, such as ``hip_viscous``."""
+    # Keys of a trajectory join joint and parameter; those without a joint are of the rigid body.
     joint = next((one for one in session.joints if key.startswith(f"{one.name}_")), None)
     if joint:
         named = _parameters_of(
@@ -85,5 +86,6 @@ def _bound(session: Session, name: str, joint: str | None) -> Effect | None:
 def _machine(joints: tuple[Joint, ...], session: Session) -> Machine:
     geometries = (one.metadata.get("geometry") for one in session.of_kind("parameters"))
     geometry = next((one for one in geometries if isinstance(one, dict)), {})
+    # Files may hold further keys, which Geometry does not take.
     known = {key: geometry[key] for key in ("thigh_length_m", "gravity_m_s2") if key in geometry}
     return machine_of(joints, Geometry(**known))

@@ -42,6 +42,7 @@ def _runs(content: Content) -> list[ShownRun]:
     models = tuple(words for _, words in models_of(session).values())
     names = dict.fromkeys([*run_names(session), *replays])
     runs = []
+    # Runs with a person first, by their usual names; the sort keeps all other order.
     for name in sorted(names, key=lambda name: "human" not in name):
         charts = tuple(chart for chart in content.charts.measured if chart.group == name)
         table = (models, tuple(scores(session, name)))
