@@ -152,10 +152,10 @@ class Log:
         steps = np.diff(time)
         # The definition of a gap in `Sampling.of`.
         gap = steps > 1.5 * np.quantile(steps, 0.95)
-        behind = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps) - 1)
+        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps))
         # A sample at the edge of a gap is known, although the interval behind it is not.
-        on_sample = time[behind] == at
-        interpolated[gap[behind] & ~on_sample] = np.nan
+        on_sample = time[before] == at
+        interpolated[np.append(gap, False)[before] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
         seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
         note(seen, "interpolated linearly, not across its gaps")

@@ -205,6 +205,30 @@ def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, t
     ) == (2, True)
 
 
+def test_a_channel_whose_clock_has_a_gap_before_its_last_row_keeps_that_row(
+    imported, pendulum, write_csv
+):
+    torque = np.where(np.arange(2000) % 2, pendulum.torque, np.nan)
+    torque[1900:1999] = np.nan
+    path = write_csv(pendulum.columns() | {"torque": torque})
+    text = MAP.replace('column = "torque"', 'column = "torque", time = "time"')
+    frame = imported(path, map_text=text).recording().frame
+    assert frame["time_s"].iloc[-1] == pendulum.time[-1]
+    assert frame["pivot_torque_nm"].iloc[-1] == pytest.approx(pendulum.torque[-1])
+    assert frame["time_s"].iloc[-2] == pendulum.time[1899]
+
+
+def test_an_infinite_value_of_a_channel_that_is_not_needed_is_left_empty(
+    imported, pendulum, write_csv
+):
+    velocity = pendulum.velocity.copy()
+    velocity[[7, 9]] = np.inf
+    outcome = imported(write_csv(pendulum.columns() | {"velocity": velocity}))
+    assert (outcome.code, outcome.err) == (0, "")
+    assert list(np.flatnonzero(outcome.recording().frame["pivot_velocity_rad_s"].isna())) == [7, 9]
+    assert "no value in 2 rows; left empty" in outcome.printed
+
+
 def test_rows_that_never_hold_both_need_to_be_interpolated(imported, pendulum, write_csv):
     """Two streams merged by time: each row has what one of them said."""
     torque = np.where(np.arange(2000) % 2, pendulum.torque, np.nan)

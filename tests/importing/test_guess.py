@@ -43,6 +43,12 @@ def swinging(pendulum):
     return {"time": pendulum.time, "angle": angle, "velocity": velocity, "torque": torque}
 
 
+def test_a_named_clock_that_counts_milliseconds_is_no_counter_of_rows(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    text, _ = guessed(write_csv({"time_ms": np.arange(2000)} | dict(list(columns.items())[1:])))
+    assert re.search(r'^column = "time_ms".*\nunit = "ms"', text, flags=re.MULTILINE), text
+
+
 @pytest.mark.parametrize(
     ("names", "factors"),
     [

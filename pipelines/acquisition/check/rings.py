@@ -51,7 +51,7 @@ async def _fault(
     drains = 40
     history, begun = SetPointHistory(), False
     stream = SampleStream(machine.rig, j, cycle_hz, history)
-    agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
+    agreement = RecordAgreement(machine.rig, j, cycle_hz * machine.rig.samples_per_cycle(cycle_hz))
     await empty_recorder(drive)
     for _ in range(drains):
         # In lockstep this advances the drives, which would record nothing otherwise.

@@ -76,7 +76,7 @@ def guess_time(
     TimeGuess or None
         None where no column is a clock.
     """
-    advancing = [m for m in meanings if _advances(columns[m.column])]
+    advancing = [m for m in meanings if _advances(columns[m.column], m.quantity == "time")]
     coarse = [
         m
         for m in meanings
@@ -202,12 +202,13 @@ def write_time(proposal: Proposal, guess: TimeGuess) -> None:
         proposal.key("restarts", "longest", why, sure=False)
 
 
-def _advances(values: NDArray) -> bool:
+def _advances(values: NDArray, is_named: bool) -> bool:
+    """Return whether a column (n,) may be a clock; a counter of rows is one only by its name."""
     if values.dtype.kind not in "iuf" or len(values) < 10:
         return False
     steps = np.diff(values.astype(float))
-    if np.all(steps == 1.0):
-        return False  # a counter of rows
+    if np.all(steps == 1.0) and not is_named:
+        return False
     return bool(np.mean(steps > 0) > ADVANCES)
 
 

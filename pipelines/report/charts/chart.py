@@ -49,7 +49,6 @@ class Panel:
     """Half the height of the noise floor's band about zero."""
     reach: float | None = None
     """Half the height shown; None for the height of all curves."""
-    title: str = ""
 
 
 @dataclass(frozen=True)

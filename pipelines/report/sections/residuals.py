@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ def _chart(
     x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
     # The columns of a chart share x. Dots and means are therefore rows of one table, each with NaN
     # where the other has its places.
-    step = max(1, len(x) // DOTS)
+    step = max(1, ceil(len(x) / DOTS))
     middles = _mean_along(x, x)[0] if len(x) else x
     places = np.concatenate([x[::step], middles])
     order = np.argsort(places, kind="stable")

@@ -75,7 +75,7 @@ class RingSettings(Settings):
             raise ValueError(
                 f"capacity: found {self.capacity}, but such a ring ends beyond address 65535"
             )
-        if self.address <= newest.address < end:
+        if self.address < newest.address + newest.registers and newest.address < end:
             raise ValueError(
                 f"newest: register {newest.address} is part of the ring itself; correct one address"
             )

@@ -211,6 +211,11 @@ def test_a_queue_of_short_reads_is_emptied_at_twenty_samples_a_set_point():
             "newest: register 1010 is part of the ring itself",
         ),
         (
+            "newest = { address = 120",
+            "newest = { address = 999",
+            "newest: register 999 is part of the ring itself",
+        ),
+        (
             "capacity = 2048",
             "fifo = 50",
             "expected newest, address and capacity (a ring that FC03 reads), or fifo",
