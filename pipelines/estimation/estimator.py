@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pipelines.estimation.long_run import Scores, long_run_covariance
 from pipelines.estimation.problem import Problem
+from pipelines.estimation.sandwich import sandwich
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def estimated(fit: Fit) -> Estimate:
         units.
     """
     S = long_run_covariance(fit.scores, len(fit.values))
-    covariance = fit.sensitivity @ S.covariance @ fit.sensitivity.T
+    covariance = sandwich(fit.sensitivity, S.covariance)
     return Estimate(**vars(fit), covariance=covariance, critical=S.critical)
 
 

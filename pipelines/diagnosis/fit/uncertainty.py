@@ -24,6 +24,7 @@ from pipelines.diagnosis.fit.joint_fit import (
     with_loads_of,
 )
 from pipelines.estimation.long_run import long_run_covariance
+from pipelines.estimation.sandwich import sandwich
 
 RECURRENCE_S = 10.0
 """Time after which a motion without a period is assumed to pass through the same states again,
@@ -135,7 +136,7 @@ def uncertainty(
         gram[at, at] += 12.0 / (high - low) ** 2
         filling[at, at] += 12.0 / (high - low) ** 2
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
-    covariance = inverse @ filling @ inverse
+    covariance = sandwich(inverse, filling)
     # An effect's own approximations remain, however many data there are.
     for at, (number, i, r) in enumerate(places, start=len(fit.values)):
         if i == 0:
