@@ -11,6 +11,7 @@ from pipelines.dynamics.rbf_loop import Encoder, RbfController, follow_with_rbf
 from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.joint_elasticity import JointElasticity
+from pipelines.effects.mass_off_axis import MassOffAxis
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG
@@ -148,7 +149,16 @@ def test_a_leg_that_hardly_has_mass_at_some_pose_is_refused_before_the_memory_is
 def test_mobility_is_the_inverse_of_the_mass_where_joints_are_rigid():
     mass, mobility = masses(assemble(body(), GEOMETRY))
     assert_allclose(mass @ mobility, np.broadcast_to(np.eye(2), mass.shape), atol=1e-12)
-    assert_allclose(mass[0], LEG.mass_matrix(np.zeros(2), X, GEOMETRY))
+    straight = mass[len(mass) // 2]
+    assert_allclose(straight, LEG.mass_matrix(np.zeros(2), X, GEOMETRY))
+
+
+def test_a_mass_off_the_shanks_axis_is_seen_at_either_bend_of_the_knee():
+    either_way = masses(assemble(body(), GEOMETRY))[0]
+    assert_allclose(either_way, either_way[::-1], atol=1e-9)
+    off_axis = Term(MassOffAxis("knee"), np.array([0.3]))
+    mass = masses(assemble(body(off_axis), GEOMETRY))[0]
+    assert np.abs(mass - mass[::-1]).max() > 0.1
 
 
 @pytest.mark.parametrize("substeps", [2, 4])
