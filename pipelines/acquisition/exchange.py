@@ -113,7 +113,3 @@ class Exchange:
         statuses = self.machine.drives[joint].statuses
         while statuses:
             self._supervisor.enable_states.update(joint, statuses.pop(0))
-
-    def sent_at(self, joint: int) -> float:
-        """Return when a drive was sent something last, or is being sent it."""
-        return self._supervisor.trackers[joint].sent_at

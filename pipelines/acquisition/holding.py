@@ -36,13 +36,13 @@ class Holding:
         """
         # Share of a sample between two looks whether a drive is sent nothing.
         look_pause = 0.25
-        drive = self._exchange.machine.drives[joint]
+        drive, tracker = self._exchange.machine.drives[joint], self._supervisor.trackers[joint]
         period = 1.0 / self._supervisor.rate
         # The plan itself sends one set-point a sample. This task steps in after two samples without
         # one.
         patience, look_at = SLACK_SAMPLES * period, 0.0
         while True:
-            sent_at = self._exchange.sent_at(joint)
+            sent_at = tracker.sent_at
             due = max(sent_at + patience, look_at)
             with suppress(TimeoutError):
                 async with asyncio.timeout(due - time.monotonic()):
@@ -51,7 +51,7 @@ class Holding:
             is_delayed = time.monotonic() - due > look_pause * period
             self._exchange.refuse_signals()
             self._supervisor.reason.refuse()
-            if self._exchange.sent_at(joint) != sent_at:  # no drive is awaited for long
+            if tracker.sent_at != sent_at:  # no drive is awaited for long
                 patience = SLACK_SAMPLES * period
             elif drive.device.awaited_s > period:  # it is the one that is awaited
                 look_at = time.monotonic() + look_pause * period

@@ -10,9 +10,9 @@ def sandwich(sensitivity: NDArray, filling: NDArray) -> NDArray:
     Parameters
     ----------
     sensitivity : (k, p) array
-        Change of the values by the sum of the scores.
+        Slopes of the values by the sums of scores, or by other values.
     filling : (p, p) array
-        Covariance of that sum.
+        Covariance of these.
 
     Returns
     -------

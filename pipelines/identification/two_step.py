@@ -25,6 +25,7 @@ from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.parameter_table import Row, table_of
 from pipelines.estimation.problem import Problem, Training
 from pipelines.estimation.regression import mask_in_words
+from pipelines.estimation.sandwich import sandwich
 from pipelines.identification.extension import Extension, refuse_unread
 from pipelines.identification.parameter_rows import rows
 from pipelines.identification.runs import Runs, checked
@@ -373,8 +374,7 @@ def _covariance(
     covariance[:p, :p] += of_linear
     # Rows know the shapes of the first run only; those of other runs are last, and end here.
     size = len(rows[0].slope)
-    slopes = np.array([row.slope for row in rows])
-    return slopes @ covariance[:size, :size] @ slopes.T
+    return sandwich(np.array([row.slope for row in rows]), covariance[:size, :size])
 
 
 def _critical(

@@ -150,8 +150,7 @@ class Log:
         at = run.began_s + run.time_s
         interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
         steps = np.diff(time)
-        # The definition of a gap in `Sampling.of`.
-        gap = steps > 1.5 * np.quantile(steps, 0.95)
+        gap = steps > clock.longest_step(steps)
         before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps))
         # A sample at the edge of a gap is known, although the interval behind it is not.
         on_sample = time[before] == at

@@ -162,11 +162,7 @@ def _recordings_of(
     sampling = Sampling.of(run.time_s, time)
     note = noting("time", findings)
     _note_sampling(sampling, note)
-    # An infinite value is as little known as one that is missing.
-    columns = {"time_s": time} | {
-        name: np.where(np.isfinite(values), values, np.nan)[whole]
-        for name, values in columns.items()
-    }
+    columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))
     _note_period(columns, settings, wanted, note)

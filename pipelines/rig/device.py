@@ -29,6 +29,9 @@ READ_WRITE = 23
 class Device(ABC):
     """Registers of one device, filled at each request with the sample that is latched then."""
 
+    ring: Ring | None = None
+    """Records of earlier samples, of a drive that keeps them."""
+
     def __init__(
         self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]
     ) -> None:
@@ -57,8 +60,9 @@ class Device(ABC):
         return SimDevice(self.unit, simdata=data, action=self._serve)
 
     def spans(self) -> tuple[range, ...]:
-        """Return the addresses of its registers, except those of its identity."""
-        return tuple(range(block.address, block.address + block.count) for block in self.blocks)
+        """Return the addresses of its registers and of its ring, except those of its identity."""
+        blocks = tuple(range(block.address, block.address + block.count) for block in self.blocks)
+        return blocks + (self.ring.spans if self.ring else ())
 
     async def _serve(
         self,
@@ -78,7 +82,8 @@ class Device(ABC):
         self.written |= written is not None
         if written is None:
             self.show(self.latched())
-            self._show_records(address, count)
+            if self.ring:
+                self.ring.show(self.registers, self.first, address, count)
             if function == READ_WRITE:
                 self.rig.exchanged(self)
         return None
@@ -94,9 +99,6 @@ class Device(ABC):
     @abstractmethod
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
-
-    def _show_records(self, address: int, count: int) -> None:  # noqa: B027 - an optional hook
-        """Put requested records of earlier samples into the registers; a device may have none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:
         start = block.address - self.first
@@ -120,10 +122,6 @@ class Drive(Device):
         self.clock: OwnClock | None = None
         self.sample: Samples | None = None
         """Latest sample by its own clock."""
-
-    def spans(self) -> tuple[range, ...]:
-        """Return the addresses of its registers and of its ring."""
-        return super().spans() + (self.ring.spans if self.ring else ())
 
     def takes(self, address: int, count: int) -> bool:
         """Return whether registers may be written; those that are only read may not."""
@@ -162,11 +160,6 @@ class Drive(Device):
         """Put a sample into the registers."""
         self.receive()
         self._put(self.read, self._values(sample))
-
-    def _show_records(self, address: int, count: int) -> None:
-        """Put the requested records of the ring into the registers."""
-        if self.ring:
-            self.ring.show(self.registers, self.first, address, count)
 
     def queue(self, address: int) -> list[int] | None:
         """Remove and return the oldest records of the queue at an address; None for no queue."""

@@ -18,6 +18,7 @@ from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run, observe
 from pipelines.estimation.long_run import long_run_covariance
 from pipelines.estimation.regression import by_segment
+from pipelines.estimation.sandwich import sandwich
 from pipelines.mechanics.mechanisms.single import PENDULUM
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import settings_of
@@ -78,5 +79,5 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
     scores = (torque - (columns @ values)[:, np.newaxis]) * columns
     segment = motion.segment[run.starts]
     covariance, critical, _ = long_run_covariance(lambda: by_segment(segment, scores), len(values))
-    spread = information @ inverse @ covariance @ inverse @ information.T
+    spread = sandwich(information @ inverse, covariance)
     return information @ values, critical * np.sqrt(np.diag(spread))

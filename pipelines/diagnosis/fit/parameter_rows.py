@@ -16,6 +16,7 @@ from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.effects import RUNS
 from pipelines.effects.baseline import ForceSensorZero, RigidBody
 from pipelines.estimation.parameter_table import Row, interval, rows_of, table_of
+from pipelines.estimation.sandwich import sandwich
 
 
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
@@ -57,8 +58,7 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
         effect = fit.causes[number].effect
         fitted, slopes = _in_run(fit, sure, number, first)
         rows += rows_of(effect, fitted, slopes, "extension", positive=effect.parameters)
-    T = np.array([row.slope for row in rows])
-    covariance = T @ sure.covariance @ T.T
+    covariance = sandwich(np.array([row.slope for row in rows]), sure.covariance)
     frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
     # An onset is not Gaussian, so its own interval replaces that of its variance.
     for row, ends in onsets.items():

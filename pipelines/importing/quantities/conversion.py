@@ -54,6 +54,8 @@ def quantity(
     # reading would count as a wraparound.
     if reading.range is not None:
         raw = _within(raw, reading.range, note)
+    # An infinite value, as of an expression that divides by zero, is as little known as none.
+    raw = np.where(np.isinf(raw), np.nan, raw)
     if reading.wraps_at is not None:
         # The joint's zero as a raw reading: most joints begin less than half a turn from it.
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at

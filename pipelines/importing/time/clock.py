@@ -430,9 +430,6 @@ class Sampling:
     def of(cls, clock_s: NDArray, kept_s: NDArray) -> "Sampling":
         """Measure rate, gaps and regularity.
 
-        A gap is a step more than 1.5 times as long as 95 % of all steps. The quantile allows for
-        clocks whose steps vary.
-
         Parameters
         ----------
         clock_s : (n,) array
@@ -443,7 +440,7 @@ class Sampling:
         # In a log of several rates only a few rows have all values, and these have their own rate.
         steps = np.diff(clock_s if 2 * len(kept_s) > len(clock_s) else kept_s)
         median = float(np.median(steps))
-        longest = 1.5 * max(median, float(np.quantile(steps, 0.95)))
+        longest = longest_step(steps)
         regular = steps[steps <= longest]
         # The mean, as stamps of few digits round the median.
         period = float(np.mean(regular))
@@ -460,6 +457,12 @@ class Sampling:
     def missing(self) -> int:
         """Samples missing in all gaps."""
         return sum(count for _, count in self.gaps)
+
+
+def longest_step(steps: NDArray) -> float:
+    """Return the longest step, s, that is no gap: 1.5 times that of 95 % of all steps (n,)."""
+    # The quantile allows for clocks whose steps vary.
+    return 1.5 * float(np.quantile(steps, 0.95))
 
 
 def _rounded(rate_hz: float, samples: int) -> float:

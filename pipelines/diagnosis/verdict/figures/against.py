@@ -63,14 +63,12 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
         if run.motion.run in kinds and (variable is None or knows(variable, [run], j))
     ]
     runs = [d.validate[i] for i in chosen]
-    residuals = [[e.residuals[i] for i in chosen] for e in (d.before, d.after)]
-    if variable is None:
+
+    def seen(i: int, residual: NDArray) -> NDArray:
         # A hum may lie above the cut-off that noisy angles require.
-        residuals = [
-            [run.with_fast(residual) for run, residual in zip(runs, each, strict=True)]
-            for each in residuals
-        ]
-    before, after = ([residual[:, j] for residual in each] for each in residuals)
+        return (d.validate[i].with_fast(residual) if variable is None else residual)[:, j]
+
+    before, after = ([seen(i, e.residuals[i]) for i in chosen] for e in (d.before, d.after))
     if variable is None:
         # With named causes, the tone is that of the torque which they explain.
         label, x = _along_tone(
