@@ -147,6 +147,8 @@ class Parameter:
     """Step of a search along an oscillating effect."""
     swept: bool = False
     """True for a position of the joint: a search then spans the motion's range, not ``typical``."""
+    swept_end: int = 0
+    """-1 or 1 for the lower or upper end of the motion's range: a fit holds it there."""
     of_joint: bool = True
     """False if its unit does not depend on the joint: a phase is an angle at a prismatic joint
     too."""

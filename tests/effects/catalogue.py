@@ -14,7 +14,7 @@ SIZES = {
     "viscous_asymmetry": (1.5,),
     "load_dependent_friction": (0.15, 0.5),
     "quadratic_drag": (2.0,),
-    "position_dependent_friction": (1.5, 2.0),
+    "position_dependent_friction": (1.5, 2.0, 0.4, -0.3, -1.4, -0.5),
     "presliding_hysteresis": (3.0, 0.03, 1.0),
     "friction_warmup": (3.0, 1.5, 10.0),
     "friction_temperature": (-0.3, -0.2),
@@ -42,6 +42,7 @@ SIZES = {
     "cuff_compliance": (600.0,),
 }
 AT_THE_HIP = {
+    "position_dependent_friction": (1.5, 2.0, 0.4, -0.3, 0.1, 0.8),
     "end_stop": (40.0, 0.6, 1.0, 1.5),
     "passive_joint_torque": (15.0, 0.3, 0.25),
     "spasticity": (5.0, 0.15, 1.0),
