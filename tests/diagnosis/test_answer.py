@@ -57,6 +57,15 @@ def test_a_likely_cause_is_named_and_a_rival_that_is_not_far_behind_is_tied():
     ]
 
 
+def test_ties_are_named_that_are_likely_together_though_each_is_less_probable_than_nothing():
+    (named,) = answer_of(weighed(_=0.3, _2=0.28, _3=0.25, _0=0.17)).named
+    assert named.element.label == "quadratic_drag@hip"
+    assert dict(named.ties).keys() == {"stribeck_friction@hip", "parallel_spring@knee"}
+    assert (named.probability, named.alone) == (pytest.approx(0.7), pytest.approx(0.28))
+    assert answer_of(weighed(_=0.55, _2=0.2, _3=0.15, _0=0.1)).named == ()
+    assert answer_of(weighed(_=0.3, _4=0.3, _2=0.28, _5=0.12)).named == ()
+
+
 def test_a_third_cause_next_to_the_named_one_is_no_tie():
     posterior = weighed(_2=0.5, _02=0.4, _=0.1)
     (named,) = answer_of(posterior).named

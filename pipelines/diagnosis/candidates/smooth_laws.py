@@ -73,6 +73,9 @@ class Spans:
 
     middle: NDArray
     half_range: NDArray
+    sum_middle: float
+    """Of the sum of all angles."""
+    sum_half_range: float
     speed: NDArray
     acceleration: NDArray
     torque: NDArray
@@ -95,10 +98,13 @@ class Spans:
             np.sqrt(np.mean(np.concatenate([run.state[k] for run in runs]) ** 2, axis=0))
             for k in (1, 2)
         )
+        sums = np.concatenate([run.state[0].sum(axis=1) for run in runs])
         tiny = np.finfo(float).tiny
         return cls(
             0.5 * (low + high),
             np.maximum(0.5 * (high - low), tiny),
+            0.5 * float(sums.min() + sums.max()),
+            max(0.5 * float(np.ptp(sums)), tiny),
             np.maximum(speed, tiny),
             np.maximum(acceleration, tiny),
             np.maximum(torque, tiny),
@@ -139,6 +145,12 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
 def _scaled_angle(run: Run, spans: Spans) -> NDArray:
     """Return the angles (m, J), scaled to lie between -1 and 1 on the searched runs."""
     return np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
+
+
+def _scaled_sum(run: Run, spans: Spans) -> NDArray:
+    """Return the sum of all angles (m,), scaled in the same way."""
+    sums = run.state[0].sum(axis=1)
+    return np.clip((sums - spans.sum_middle) / spans.sum_half_range, -1.5, 1.5)
 
 
 def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
@@ -195,7 +207,7 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
         if o == j:
             continue
         yield from _polynomials("other_angle", q[:, o], range(1, 6))
-        yield from _polynomials("both_angles", 0.5 * (q[:, j] + q[:, o]), range(1, 6))
+        yield from _polynomials("both_angles", _scaled_sum(run, spans), range(1, 6))
         yield "both_angles", 2, q[:, j] * q[:, o]
         yield "both_angles", 3, q[:, j] ** 2 * q[:, o]
         yield "both_angles", 3, q[:, j] * q[:, o] ** 2

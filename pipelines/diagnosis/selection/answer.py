@@ -101,9 +101,12 @@ def _best(posterior: Posterior) -> Set:
     and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
-    has_all = [labels for labels in posterior.by_labels if likely <= labels]
+    # Rivals share the probability that something is missing, and each may have less than nothing.
+    missing = 1.0 - posterior.nothing >= CRITERIA.likely
+    sets = [labels for labels in posterior.by_labels if labels or not missing]
     # Labels may be likely each by itself, and never occur in one set.
-    labels = max(has_all or posterior.by_labels, key=lambda key: posterior.by_labels[key])
+    has_all = [labels for labels in sets if likely <= labels]
+    labels = max(has_all or sets, key=lambda key: posterior.by_labels[key])
     return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
 
 

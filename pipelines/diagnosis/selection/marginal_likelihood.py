@@ -306,10 +306,15 @@ def _shown(element: Element, c: Criteria) -> float:
         variance = phases * share**2 / (2.0 * ratio)
         of_cause = [_line(ratio, variance, phases, size) for size in c.amplitudes]
         of_rig = [0.0, _line(ratio, variance, phases, c.background_line)]
-        odds.append(float(logsumexp(of_cause)) - np.log(len(of_cause)) - float(logsumexp(of_rig)))
-    # Further lines may be of another origin, so none of them counts against the cause.
+        odds.append(_log_mean(of_cause) - _log_mean(of_rig))
+    # Each further line is as likely of another origin, and then no evidence.
     first, *others = sorted(odds, reverse=True)
-    return first + float(sum(np.logaddexp(0.0, others)))
+    return first + sum(_log_mean([0.0, other]) for other in others)
+
+
+def _log_mean(logarithms: Sequence[float]) -> float:
+    """Return the logarithm of the mean of equally likely likelihoods."""
+    return float(logsumexp(logarithms)) - float(np.log(len(logarithms)))
 
 
 def _line(ratio: float, variance: float, phases: int, share: float) -> float:
