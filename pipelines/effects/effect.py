@@ -74,6 +74,7 @@ LAWS = (
     "friction_over_time",
     "time",
     "hum",
+    "bursts",
     "across_joints",
     "quantisation",
 )
@@ -91,6 +92,7 @@ gain_over_time          a share of the whole torque that changes slowly with tim
 friction_over_time      friction that changes slowly with time
 time                    a torque that wanders with time, in each run in its own way
 hum                     a line at a fixed frequency
+bursts                  knocks at moments of their own, each of which fades within a second
 across_joints           torques of both joints, the slopes of one elastic energy of both angles
 quantisation            error of a measured torque that is rounded to coarse steps
 ======================= ==========================================================================

@@ -34,9 +34,7 @@ class PositionDependentFriction(Effect):
     linear = (
         Parameter("slope", "N·m/rad", "growth of the Coulomb level with angle", "c1", (-4.0, 4.0)),
         Parameter("curvature", "N·m/rad²", "growth of the slope with angle", "c2", (-6.0, 6.0)),
-        Parameter(
-            "cubic", "N·m", "size of the third polynomial", "c3", (-2.0, 2.0), default=0.0
-        ),
+        Parameter("cubic", "N·m", "size of the third polynomial", "c3", (-2.0, 2.0), default=0.0),
         Parameter(
             "quartic", "N·m", "size of the fourth polynomial", "c4", (-2.0, 2.0), default=0.0
         ),

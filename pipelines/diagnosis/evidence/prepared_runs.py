@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
+from pipelines.diagnosis.evidence.bursts import bursts
 from pipelines.diagnosis.evidence.decision_band import DecisionBand
 from pipelines.diagnosis.evidence.gram import solve, weights_under
 from pipelines.diagnosis.evidence.model_error import varying_torque
@@ -37,6 +38,8 @@ class PreparedRuns:
     """(n, J) N·m of each run: the baseline's prediction at the full sampling rate."""
     lines: tuple[JointLines, ...]
     """Of each joint's residual at the full sampling rate."""
+    bursts: NDArray
+    """(J,) log Bayes factor of bursts in the torque."""
 
     @property
     def slow_rms(self) -> NDArray:
@@ -81,7 +84,16 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
     )
     torque = varying_torque(runs)
     return PreparedRuns(
-        loaded, baseline, columns, values, weights, noise, torque, predicted, tuple(lines)
+        loaded,
+        baseline,
+        columns,
+        values,
+        weights,
+        noise,
+        torque,
+        predicted,
+        tuple(lines),
+        bursts(loaded, residuals),
     )
 
 

@@ -18,7 +18,7 @@ from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.quantisation import STEPS_TRIED
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
-from pipelines.diagnosis.candidates.smooth_laws import HUM, QUANTISATION, TIME, LawColumn
+from pipelines.diagnosis.candidates.smooth_laws import BURSTS, HUM, QUANTISATION, TIME, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
@@ -67,7 +67,7 @@ class Element:
     place: int = -1
     """Of a cause: its number in the library."""
     log_prior: float = 0.0
-    """Of a cause: the part of the log odds from its shape and form."""
+    """Of a cause: the part of the log odds from its shape and form; of bursts: their evidence."""
     log_searched: float = 0.0
     """The log number of values that the search for its waves, tones, onsets or steps tried."""
     shown: list[Shown] = field(default_factory=list)
@@ -319,6 +319,20 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         )
         for (kind, j, wearer), own in laws.items()
         if wearer != "cuffs"
+    ]
+    elements += [
+        Element(
+            label=law_label(BURSTS, joint),
+            name=BURSTS,
+            joint=joint,
+            family=FAMILIES[BURSTS],
+            is_law=True,
+            columns=[],
+            variance=[],
+            repeats=False,
+            log_prior=float(ratio),
+        )
+        for joint, ratio in zip(names, library.prepared.bursts, strict=True)
     ]
     effects = [cause.candidate.effect for cause in library.causes]
     return _in_any_form(

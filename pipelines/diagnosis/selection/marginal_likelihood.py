@@ -105,10 +105,9 @@ class MarginalLikelihood:
         except np.linalg.LinAlgError:
             return -np.inf
         # The sizes are equally likely, so one of them has its share of the prior for each element.
+        sized = sum(bool(element.columns) for element in elements)
         return (
-            value
-            - len(chosen) * float(np.log(len(amplitudes)))
-            + float(self.apart[list(chosen)].sum())
+            value - sized * float(np.log(len(amplitudes))) + float(self.apart[list(chosen)].sum())
         )
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
@@ -284,6 +283,8 @@ def _without(
 
 def _forward(lower: NDArray, right: NDArray) -> NDArray:
     """Solve a lower triangular system by LAPACK directly, as a posterior solves thousands."""
+    if not len(lower):
+        return right  # LAPACK refuses a system without unknowns
     return np.asarray(dtrtrs(lower, right, lower=1)[0])
 
 
@@ -306,15 +307,11 @@ def _shown(element: Element, c: Criteria) -> float:
         variance = phases * share**2 / (2.0 * ratio)
         of_cause = [_line(ratio, variance, phases, size) for size in c.amplitudes]
         of_rig = [0.0, _line(ratio, variance, phases, c.background_line)]
-        odds.append(_log_mean(of_cause) - _log_mean(of_rig))
+        # Sizes are equally likely, and so is a rig with the line and one without.
+        odds.append(float(logsumexp(of_cause, b=1.0 / len(of_cause)) - logsumexp(of_rig, b=0.5)))
     # Each further line is as likely of another origin, and then no evidence.
     first, *others = sorted(odds, reverse=True)
-    return first + sum(_log_mean([0.0, other]) for other in others)
-
-
-def _log_mean(logarithms: Sequence[float]) -> float:
-    """Return the logarithm of the mean of equally likely likelihoods."""
-    return float(logsumexp(logarithms)) - float(np.log(len(logarithms)))
+    return first + sum(float(logsumexp([0.0, other], b=0.5)) for other in others)
 
 
 def _line(ratio: float, variance: float, phases: int, share: float) -> float:
