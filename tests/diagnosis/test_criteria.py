@@ -108,8 +108,8 @@ SESSIONS: Mapping[str, tuple[Session, float]] = {
     "amplitudes": (Session(), 0.03472),
     "shape_sd": (Session(along_its_shape=True), 0.04243),
     "background_cause": (Session(on_a_good_rig=True), 0.03637),
-    "background_line": (Session(lines=2e6), 0.02263),
-    "lines": (Session(lines=2e6), 0.02263),
+    "background_line": (Session(lines=2e6), 0.02207),
+    "lines": (Session(lines=2e6), 0.02207),
 }
 """For each criterion of the posterior a session that it decides, and its least share."""
 LOG_ODDS = ("cause", "law", "further", "each_run", "worn", "base_rate")

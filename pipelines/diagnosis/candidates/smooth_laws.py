@@ -249,9 +249,7 @@ def _speed_laws(v: NDArray, way: NDArray) -> Iterator[tuple[str, int, NDArray]]:
 
 
 def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
-    """Return cosines over a run, and the prior variance of their coefficients.
-
-    Together they are a torque that wanders in time with a share of one.
+    """Return cosines over a run, and the relative prior variance of their coefficients.
 
     Parameters
     ----------
@@ -271,4 +269,4 @@ def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
     curves = np.cos(np.pi * np.outer(elapsed / duration, k))
     # A random walk's power falls with the square of the frequency above the corner.
     variance = 1.0 / (1.0 + (k / (2.0 * duration * WANDER_CORNER_HZ)) ** 2)
-    return curves, 2.0 * variance / variance.sum()
+    return curves, variance / variance.sum()

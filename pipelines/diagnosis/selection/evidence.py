@@ -375,6 +375,10 @@ def _laws_by_kind(laws: Sequence[LawColumn], places: NDArray) -> Laws:
 
 
 def _normalised(variance: Sequence[float]) -> list[float]:
+    """Return variances that add up to one: a law's squared coefficients do so, as a cause's do.
+
+    A wandering torque and a hum have coefficients of their own in each run, and these add up too.
+    """
     total = sum(variance)
     return [v / total for v in variance]
 
