@@ -27,8 +27,10 @@ class SetPoints:
 
     def __getitem__(self, index: int) -> NDArray:
         if not self._begin <= index < self._begin + len(self._block):
-            # Set-points come due in order, so the next ones are computed with this one.
-            self._begin, self._block = index, self.between(index, min(index + BLOCK, len(self)))
+            # Set-points come due in order, and the last ones are asked for once more: both are
+            # computed with this one.
+            self._begin = max(index - BLOCK // 4, 0)
+            self._block = self.between(self._begin, min(self._begin + BLOCK, len(self)))
         return self._block[index - self._begin]
 
     def __array__(self, dtype: type | None = None, copy: bool | None = None) -> NDArray:

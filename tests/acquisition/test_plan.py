@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipelines.acquisition.plan import make_plan
+from pipelines.acquisition.set_points import SetPoints
 from pipelines.errors import InputError
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.sampled_trajectory import SampledTrajectory
@@ -128,3 +129,18 @@ def test_the_plan_of_an_hour_takes_no_more_memory_than_that_of_a_minute(rig_file
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.5 * peaks[0]
+
+
+def test_set_points_are_computed_once_though_the_last_one_is_asked_for_again():
+    """While the leg moves no cycle may wait for what an earlier one computed already."""
+    computed = []
+
+    def run(begin, end):
+        computed.append(end - begin)
+        return np.arange(begin, end, dtype=float)[:, np.newaxis]
+
+    points = SetPoints(np.zeros((0, 1)), run, 5000, np.zeros((0, 1)))
+    for k in range(4999):
+        asked = (max(k - 1, 0), k, k + 1)
+        assert tuple(points[i][0] for i in asked) == asked
+    assert sum(computed) < 2 * 5000

@@ -24,6 +24,7 @@ class PlanProgress:
         """Follow a plan from where the leg stood when it was made, (J,) rad."""
         self._plan, self._start, self._rate_hz = plan, start, rate_hz
         self._length = len(plan.reference)
+        self._end: list[float] = self._at(self._length).tolist()
         self._first_cycle = 0
         self.cycle, self.followed_at = 0, 0.0
         """The cycle at which the plan was followed last, and when."""
@@ -81,7 +82,7 @@ class PlanProgress:
                 f"the motion is {longest_return_s:g} s late and still not finished: too many"
                 " samples are lost; check the line, and the drives' sample counters"
             )
-        pairs = zip(trackers, self._at(self._length).tolist(), strict=True)
+        pairs = zip(trackers, self._end, strict=True)
         at_end = [abs(tracker.sent - angle) <= tracker.resolution for tracker, angle in pairs]
         return cycles_past_end > 0 and all(at_end)
 
