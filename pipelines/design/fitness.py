@@ -1,8 +1,9 @@
 """Compute the fitness of an excitation, compiled: repair, regressor, Gram matrix, criterion.
 
-A motion takes about 15 us. A candidate is a vector: sine coordinates of hip and knee, cosine
-coordinates of hip and knee, and the two mean angles if they are searched too. Coordinates times
-``basis`` are the Fourier coefficients.
+A motion takes about 15 us. Arithmetic on whole arrays would take numba seconds to compile, so loops
+stand for it. A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip
+and knee, and the two mean angles if they are searched too. Coordinates times ``basis`` are the
+Fourier coefficients.
 """
 
 import math
@@ -154,10 +155,13 @@ def cost(candidate, problem, work):
         return -_log_determinant(gram)
     if problem.criterion == SCALED_CONDITION:
         # Columns have different units; at unit norm, the condition shows the motion alone.
-        size = np.sqrt(np.diag(gram))
-        if size.min() <= 0.0:
-            return np.inf
-        gram /= np.outer(size, size)
+        for i in range(PARAMETERS):
+            size = math.sqrt(gram[i, i])
+            if size <= 0.0:
+                return np.inf
+            for j in range(PARAMETERS):
+                gram[i, j] /= size
+                gram[j, i] /= size
     return _condition_number(gram)
 
 
@@ -266,9 +270,11 @@ def repair(candidate, problem, work):
         if scale < 1.0:
             for part in range(2):
                 start = (2 * part + joint) * free
-                candidate[start : start + free] *= scale
+                for f in range(start, start + free):
+                    candidate[f] *= scale
             for quantity in range(3):
-                work.motion[2 * quantity + joint] *= scale
+                for i in range(samples):
+                    work.motion[2 * quantity + joint, i] *= scale
         # The mean angle comes last, because only the motion about it shrinks.
         for i in range(samples):
             work.motion[joint, i] += theta0

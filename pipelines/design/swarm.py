@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.design.fitness import cost, costs, workspace
+from pipelines.design.fitness import Problem, cost, costs, workspace
 
 # Constriction makes the swarm contract (Clerc and Kennedy, 2002, IEEE Trans. Evol. Comput. 6(1)).
 INERTIA = 0.7298
@@ -25,8 +25,7 @@ class Swarm(NamedTuple):
     """(P,)."""
 
 
-@njit(cache=True)
-def assess(swarm, problem):
+def assess(swarm: Swarm, problem: Problem) -> None:
     """Repair and evaluate every particle at its position.
 
     Parameters
@@ -78,7 +77,8 @@ def fly(swarm, problem, ring, iterations, rng):
             value = cost(x, problem, work)
             if value < swarm.best_cost[i]:
                 swarm.best_cost[i] = value
-                swarm.best_position[i] = x
+                for d in range(dimensions):
+                    swarm.best_position[i, d] = x[d]
                 # Without a ring, a better particle leads from now on, within the same sweep.
                 if value < swarm.best_cost[leader]:
                     leader = i
