@@ -1,6 +1,7 @@
 """From rest to enabled drives: the leg must stand where the plan begins until all have enabled."""
 
 from collections.abc import Sequence
+from math import inf
 
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.safety.enable_state import EnableStates
@@ -32,6 +33,8 @@ class Enabling:
         self._reason = reason
         self._start: list[float] = []
         """Where the leg stood when the plan was made, (J,) rad."""
+        self._silent_from_s = inf
+        """Since when some drive has not answered, s after the begin of enabling."""
 
     def start_at(self, angles: Sequence[float]) -> None:
         """Enable the drives where the leg stands.
@@ -88,7 +91,8 @@ class Enabling:
         self._enable_states.update_all(answers)
         # Within the watchdog's time a lost reply is no reason to stop, as the leg is at rest.
         silent = [answer for answer in answers.drives if isinstance(answer, Unanswered)]
-        if silent and waited_s > self._rig.safety.watchdog_s:
+        self._silent_from_s = min(self._silent_from_s, waited_s) if silent else inf
+        if silent and waited_s - self._silent_from_s > self._rig.safety.watchdog_s:
             raise silent[0]
         idle = self._enable_states.idle
         if idle and waited_s > self._rig.safety.control_s:

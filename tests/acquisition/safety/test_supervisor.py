@@ -121,6 +121,23 @@ def test_the_drive_that_is_silent_for_too_long_is_named_though_the_other_one_ans
         )
 
 
+def test_while_drives_are_enabled_only_silence_longer_than_the_watchdogs_time_ends_it(supervisor):
+    """At rest one lost reply is no reason to stop, however long enabling has taken before."""
+    enabling, longest_s = supervisor.enabling, supervisor.rig.safety.watchdog_s
+    enabling.start_at([0.0, 0.0])
+    idle = replace(row(100).drives[0], enabled=False)
+    answered = Answers((idle, idle), row(100).forces, None)
+    lost = Answers((idle, LOST), row(100).forces, None)
+    late_s = supervisor.rig.safety.control_s - 1.2 * longest_s
+    assert late_s > 2.0 * longest_s
+    for waited_s in (0.0, late_s):
+        assert enabling.check(answered, waited_s) is None
+        assert enabling.check(lost, waited_s) is None
+    assert enabling.check(lost, late_s + 0.9 * longest_s) is None
+    with pytest.raises(Unanswered, match="drive knee: did not answer"):
+        enabling.check(lost, late_s + 1.1 * longest_s)
+
+
 def test_a_state_cannot_be_skipped(supervisor):
     with pytest.raises(AssertionError, match="there is no way from check to run"):
         supervisor._go(State.RUN)
