@@ -1,5 +1,6 @@
 """Sessions that no diagnosis can be made of are refused in one line that says what to do."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from pipelines.diagnosis.data_faults import excluding, find_faults
 from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.errors import InputError
+from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
@@ -129,6 +132,22 @@ def test_joints_that_take_turns_are_never_scored_and_refused(motions):
     ]
     with pytest.raises(InputError, match=r"hip and knee move at once for 0.0 s"):
         diagnose(taking_turns)
+
+
+@pytest.mark.parametrize(("together_s", "refused"), [(1.5, True), (2.5, False)])
+def test_a_few_seconds_in_which_all_joints_move_at_once_suffice(motions, together_s, refused):
+    """Simulated sessions with two to five of them had right verdicts or none, and no wrong one."""
+    turns = []
+    for motion in motions:
+        moving = (away_from_reversals(motion) & motion.valid[:, np.newaxis]).all(axis=1)
+        # Once both have moved for so long, each stands still for every other second.
+        later = np.cumsum(moving) > together_s * motion.sample_rate_hz
+        odd = np.floor(motion.time) % 2 == 1
+        still = np.column_stack([later & odd, later & ~odd])
+        turns.append(replace(motion, dq=np.where(still, 0.0, motion.dq)))
+    expected = pytest.raises(InputError, match="move at once for 1") if refused else nullcontext()
+    with expected:
+        refuse_unfit(turns)
 
 
 def test_mechanisms_that_exoid_does_not_know_are_refused(motions):

@@ -22,6 +22,8 @@ last count."""
 LEAST_S = 5.0
 """Least motion of an exoskeleton, s, all runs of a kind and purpose together. Less does not
 separate gravity, inertia and friction."""
+TOGETHER_S = 2.0
+"""Least time for which all joints of an exoskeleton move at once, s: errors are scored there."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
@@ -118,6 +120,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
                 f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
+    least = machine.lasting(TOGETHER_S)
     lasts = _seconds(motions, [m.all(axis=1) for m in moving])
     if lasts < least:
         raise InputError(
