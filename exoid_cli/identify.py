@@ -135,7 +135,7 @@ def _extension(
     from pipelines.contracts import PARAMETERS
     from pipelines.identification.extension import Extension, chosen, named
 
-    by_label = chosen(labels, runs[0].machine)
+    by_label = chosen(labels, runs[0].machine, runs)
     of_diagnosis = named(PARAMETERS.read(causes), runs, files) if causes else Extension()
     if causes and not of_diagnosis.terms:
         console.say(f"{causes}: names nothing in addition to rigid body and friction.")

@@ -26,9 +26,11 @@ class SetPoints:
         return self.stop + len(self._lead_out)
 
     def __getitem__(self, index: int) -> NDArray:
+        if index < 0:
+            raise IndexError(f"set-point {index}: the first one is 0")
         if not self._begin <= index < self._begin + len(self._block):
-            # Set-points come due in order, and the last ones are asked for once more: both are
-            # computed with this one.
+            # Set-points come due in order, and each cycle asks for the last ones too: so a block
+            # begins a little before the index.
             self._begin = max(index - BLOCK // 4, 0)
             self._block = self.between(self._begin, min(self._begin + BLOCK, len(self)))
         return self._block[index - self._begin]

@@ -1,7 +1,7 @@
 """Compute the fitness of an excitation, compiled: repair, regressor, Gram matrix, criterion.
 
-A motion takes about 15 us. Arithmetic on whole arrays would take numba seconds to compile, so loops
-stand for it. A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip
+A motion takes about 15 us. Loops are written out, because numba takes seconds to compile array
+expressions. A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip
 and knee, and the two mean angles if they are searched too. Coordinates times ``basis`` are the
 Fourier coefficients.
 """

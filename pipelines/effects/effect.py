@@ -92,7 +92,7 @@ gain_over_time          a share of the whole torque that changes slowly with tim
 friction_over_time      friction that changes slowly with time
 time                    a torque that wanders with time, in each run in its own way
 hum                     a line at a fixed frequency
-bursts                  knocks at moments of their own, each of which fades within a second
+bursts                  knocks at random times, each of which fades within a second
 across_joints           torques of both joints, the slopes of one elastic energy of both angles
 quantisation            error of a measured torque that is rounded to coarse steps
 ======================= ==========================================================================
@@ -150,7 +150,8 @@ class Parameter:
     swept: bool = False
     """True for a position of the joint: a search then spans the motion's range, not ``typical``."""
     swept_end: int = 0
-    """-1 or 1 for the lower or upper end of the motion's range: a fit holds it there."""
+    """-1 or 1 for the lower or upper end of the joint's positions in the training runs, at which
+    every fit holds it; 0 if it is neither."""
     of_joint: bool = True
     """False if its unit does not depend on the joint: a phase is an angle at a prismatic joint
     too."""

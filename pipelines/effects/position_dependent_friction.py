@@ -1,7 +1,5 @@
 """Dry friction that depends on the joint's position."""
 
-from math import pi
-
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
@@ -9,8 +7,8 @@ from pipelines.effects.kernel import reaction
 class PositionDependentFriction(Effect):
     """A Coulomb level that changes with position, due to misaligned bearings or a worn gear.
 
-    The baseline's Coulomb friction is added to it. Beyond the positions of the runs from which it
-    was fitted the level does not change, as a polynomial would soon become absurd there.
+    In the middle of the swept positions the level is the baseline's Coulomb friction. Beyond their
+    ends it stays the same, as a polynomial would soon become absurd there.
     """
 
     name = "position_dependent_friction"
@@ -22,8 +20,8 @@ class PositionDependentFriction(Effect):
     forms_differ = "a real level may have a peak at one angle, and change the viscous friction too"
     holds = True
     equation = (
-        "tau = (c1 d + c2 d² + c3 P3(d / h) + c4 P4(d / h)) sgn(v), d = q - (q1 + q2) / 2 with q"
-        " limited to q1 ... q2, h = (q2 - q1) / 2, P Legendre polynomials"
+        "tau = (c1 d + c2 d² + c3 (d / h)³ + c4 (d / h)⁴) sgn(v), d = q limited to q1 ... q2, less"
+        " their mean; h = (q2 - q1) / 2. Without ends d = q and h = 1"
     )
     source = "Armstrong (1988), ICRA: friction, experimental determination, modeling, compensation"
     looks_like = "residual against angle: two branches, forward and back, whose distance changes"
@@ -34,19 +32,17 @@ class PositionDependentFriction(Effect):
     linear = (
         Parameter("slope", "N·m/rad", "growth of the Coulomb level with angle", "c1", (-4.0, 4.0)),
         Parameter("curvature", "N·m/rad²", "growth of the slope with angle", "c2", (-6.0, 6.0)),
-        Parameter("cubic", "N·m", "size of the third polynomial", "c3", (-2.0, 2.0), default=0.0),
-        Parameter(
-            "quartic", "N·m", "size of the fourth polynomial", "c4", (-2.0, 2.0), default=0.0
-        ),
+        Parameter("cubic", "N·m", "third-order part at the end", "c3", (-2.0, 2.0), default=0.0),
+        Parameter("quartic", "N·m", "fourth-order part there", "c4", (-2.0, 2.0), default=0.0),
     )
     shape = (
         Parameter(
             "lowest_angle",
             "rad",
-            "angle below which the level stays the same",
+            "angle below which the level stays the same; equal to q2 for none",
             "q1",
             (-1.6, 0.0),
-            default=-pi,
+            default=0.0,
             swept_end=-1,
         ),
         Parameter(
@@ -55,7 +51,7 @@ class PositionDependentFriction(Effect):
             "angle above which the level stays the same",
             "q2",
             (0.0, 1.6),
-            default=pi,
+            default=0.0,
             swept_end=1,
         ),
     )
@@ -65,8 +61,9 @@ class PositionDependentFriction(Effect):
     def reaction(at, state, values, geometry, joint, out):
         """Add the level times sgn v at the joint."""
         low, high = values[4], values[5]
-        d = min(max(at.q[joint], low), high) - 0.5 * (low + high)
-        x = 2.0 * d / (high - low)
-        cubic, quartic = 0.5 * (5.0 * x**2 - 3.0) * x, 0.125 * ((35.0 * x**2 - 30.0) * x**2 + 3.0)
-        level = (values[0] + values[1] * d) * d + values[2] * cubic + values[3] * quartic
+        d, x = at.q[joint], at.q[joint]
+        if low < high:
+            d = min(max(d, low), high) - 0.5 * (low + high)
+            x = 2.0 * d / (high - low)
+        level = (values[0] + values[1] * d) * d + (values[2] + values[3] * x) * x**3
         out[joint] += level * at.direction[joint]

@@ -17,7 +17,7 @@ class VoluntaryTorque(Effect):
     title = "Voluntary torque"
     side = Side.HUMAN
     family = Family.PERSON
-    resembles = ("time", "hum")
+    resembles = ("time", "hum", "bursts")
     forms_differ = "a real rhythm drifts in frequency and size, and starts and stops"
     equation = "tau = A sin(2 pi f t) + B cos(2 pi f t) + c"
     source = "Hogan, Sternad (2007), Experimental Brain Research 181: rhythmic movement"

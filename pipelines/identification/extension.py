@@ -78,8 +78,17 @@ class Extension:
         )
 
 
-def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
+def chosen(labels: Iterable[str], machine: Machine, runs: Sequence[Run] = ()) -> tuple[Term, ...]:
     """Return the effects of some labels, ``rotor_inertia@knee``, without amplitudes.
+
+    Parameters
+    ----------
+    labels : iterable of str
+        Labels.
+    machine : Machine
+        The machine of the runs.
+    runs : sequence of Run, optional
+        Runs whose training positions have the ends at which some shapes are held.
 
     Raises
     ------
@@ -88,7 +97,27 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     """
     unique = dict.fromkeys(labels)
     effects = [effect_at(label, machine, _has_no_shape, "--effect", REASON) for label in unique]
-    return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
+    return tuple(Term(effect, _without_amplitudes(effect, runs)) for effect in effects)
+
+
+def _without_amplitudes(effect: Effect, runs: Sequence[Run]) -> NDArray:
+    """Return an effect's values: amplitudes are zero, shapes at their defaults or at an end."""
+    values = effect.completed(np.zeros(len(effect.linear)))
+    ends = [
+        (i, parameter.swept_end) for i, parameter in enumerate(effect.fitted) if parameter.swept_end
+    ]
+    train = [run for run in runs if run.purpose == "train" and effect.acts(run.run)]
+    if not ends or not train:
+        return values
+    motions = [piece.motion for run in train for piece in run.pieces(0)]
+    angles = [m.q[m.valid, effect.column(m)] for m in motions if m.valid.any()]
+    low, high = (
+        min(float(q.min()) for q in angles),
+        max(float(q.max()) for q in angles),
+    )
+    for i, end in ends:
+        values[i] = low if end < 0 else high
+    return values
 
 
 def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:

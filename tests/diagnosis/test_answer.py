@@ -66,6 +66,17 @@ def test_ties_are_named_that_are_likely_together_though_each_is_less_probable_th
     assert answer_of(weighed(_=0.3, _4=0.3, _2=0.28, _5=0.12)).named == ()
 
 
+def test_ties_that_are_likely_next_to_a_sure_cause_or_law_are_named_too():
+    beside_law = answer_of(weighed(_4=0.3, _24=0.28, _34=0.25, _04=0.17)).named
+    assert [one.members for one in beside_law] == [
+        {"quadratic_drag@hip", "stribeck_friction@hip", "parallel_spring@knee"}
+    ]
+    drag, second = answer_of(weighed(_2=0.3, _02=0.27, _12=0.26, _=0.17)).named
+    assert drag.members == {"quadratic_drag@hip"}
+    assert second.members == {"parallel_spring@knee", "end_stop@knee"}
+    assert second.probability == pytest.approx(0.53)
+
+
 def test_a_third_cause_next_to_the_named_one_is_no_tie():
     posterior = weighed(_2=0.5, _02=0.4, _=0.1)
     (named,) = answer_of(posterior).named
@@ -354,6 +365,6 @@ def test_equals_that_a_third_cause_may_join_stay_equals():
 
 
 def test_a_rival_is_held_against_all_that_speaks_for_the_named_cause():
-    (named,) = answer_of(weighed(_2=0.3, _02=0.25, _12=0.25, _3=0.04, _=0.16)).named
+    (named,) = answer_of(weighed(_2=0.36, _02=0.22, _12=0.22, _3=0.04, _=0.16)).named
     assert named.ties == ()
     assert named.probability == pytest.approx(0.8)

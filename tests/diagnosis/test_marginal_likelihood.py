@@ -203,3 +203,21 @@ def test_evidence_survives_being_packed():
     assert again.background == evidence.background
     ours, theirs = posterior(evidence, CRITERIA), posterior(again, CRITERIA)
     assert ours.nothing == pytest.approx(theirs.nothing, rel=1e-3)
+
+
+def test_bursts_explain_no_rows_and_multiply_the_odds_of_every_set():
+    _, _, plain = problem(strength=0.2)
+    own = 4.0
+    knocks = Element("law:bursts@hip", "bursts", "hip", "time", True, [], [], log_prior=own)
+    evidence = replace(plain, elements=(*plain.elements, knocks))
+    weigh, number = MarginalLikelihood(evidence, CRITERIA), len(plain.elements)
+    assert weigh.log_evidence((number,)) == own
+    assert weigh.log_evidence((0, number)) == pytest.approx(weigh.log_evidence((0,)) + own)
+    without, with_them = posterior(plain, CRITERIA), posterior(evidence, CRITERIA)
+    odds = dict(zip(with_them.sets, with_them.log_odds, strict=True))
+    assert len(odds) == 2 * len(without.sets)
+    for chosen, value in zip(without.sets, without.log_odds, strict=True):
+        assert odds[chosen] == pytest.approx(value)
+        further = CRITERIA.further if chosen else CRITERIA.base_rate
+        together = odds[(*chosen, number)] - odds[chosen]
+        assert together == pytest.approx(own + CRITERIA.law + further)

@@ -70,3 +70,15 @@ def test_a_spring_of_one_joint_is_none():
     )
     assert outcome["causes"][0]["effect"] == "parallel_spring"
     assert outcome["posterior"]["laws"].get(LABEL, 0.0) < 0.05
+
+
+def test_a_law_of_both_angles_holds_any_smooth_torque_of_their_sum(prepared):
+    """As gravity on the shank: its angle to the ground is the sum, whatever each joint's range."""
+    run, spans = prepared.runs[0], Spans.of(prepared.runs, prepared.torque[:2])
+    assert np.ptp(spans.half_range) > 0.05
+    laws, columns = smooth_laws(run, spans, np.zeros_like(run.state[0]))
+    for joint in range(2):
+        own = [law.kind == "both_angles" and law.joint == joint for law in laws]
+        wanted = np.sin(run.state[0].sum(axis=1))
+        found = np.linalg.lstsq(columns[:, joint, own], wanted - wanted.mean(), rcond=None)[1]
+        assert np.sqrt(found / len(wanted)) < 0.01 * np.std(wanted)

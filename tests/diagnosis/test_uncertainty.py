@@ -7,8 +7,9 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.joint_fit import fit
-from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
+from pipelines.diagnosis.fit.uncertainty import Uncertainty, _shapes, uncertainty
 from pipelines.effects import ParallelSpring
+from pipelines.effects.position_dependent_friction import PositionDependentFriction
 from tests.diagnosis.sessions import session
 
 NOISE = np.array([0.3, 0.2])
@@ -53,3 +54,9 @@ def test_a_joint_region_includes_zero_95_times_in_100_where_the_truth_is_zero(cr
     assert share == pytest.approx(0.95, abs=0.012)
     assert not known.includes_zero(np.array([0.0, 0.0, 9.0]), slice(2, 3))
     assert not known.includes_zero(values[0], slice(1, 1))
+
+
+def test_ends_of_the_motion_are_known_and_widen_no_interval():
+    effect = PositionDependentFriction("knee")
+    cause = Candidate(effect, ((-1.4, -0.5),))
+    assert _shapes([cause], 1, fitted=False) == _shapes([cause], 1, fitted=True) == []

@@ -100,6 +100,17 @@ def test_the_truth_of_an_extension_lies_in_its_intervals_95_times_in_100(hidden,
     assert 0.90 <= np.mean(inside) <= 0.99
 
 
+def test_friction_by_angle_ends_where_the_training_runs_end(hidden):
+    label = "position_dependent_friction@hip"
+    (term,) = chosen([label], THE_LEG, hidden)
+    train = [run.q[run.valid, 0] for run in hidden if run.purpose == "train"]
+    ends = min(q.min() for q in train), max(q.max() for q in train)
+    assert term.shape == pytest.approx(ends)
+    assert np.abs(term.values[:4]).max() == 0.0
+    # Without runs its level has no ends.
+    assert chosen([label], THE_LEG)[0].shape == pytest.approx((0.0, 0.0))
+
+
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_every_method_finds_what_is_named(estimator):
     """A torque sensor that is not zeroed, on a joint without gravity's help: 0.4 N·m."""

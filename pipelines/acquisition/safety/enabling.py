@@ -33,8 +33,8 @@ class Enabling:
         self._reason = reason
         self._start: list[float] = []
         """Where the leg stood when the plan was made, (J,) rad."""
-        self._silent_from_s = inf
-        """Since when some drive has not answered, s after the begin of enabling."""
+        self._silent_from_s: list[float] = []
+        """Since when each drive has not answered, s after the begin of enabling."""
 
     def start_at(self, angles: Sequence[float]) -> None:
         """Enable the drives where the leg stands.
@@ -44,7 +44,7 @@ class Enabling:
         angles : (J,) sequence of float
             rad.
         """
-        self._start = list(angles)
+        self._start, self._silent_from_s = list(angles), [inf] * len(angles)
         for tracker, angle in zip(self._trackers, angles, strict=True):
             tracker.start_at(angle)
 
@@ -90,10 +90,13 @@ class Enabling:
         """
         self._enable_states.update_all(answers)
         # Within the watchdog's time a lost reply is no reason to stop, as the leg is at rest.
-        silent = [answer for answer in answers.drives if isinstance(answer, Unanswered)]
-        self._silent_from_s = min(self._silent_from_s, waited_s) if silent else inf
-        if silent and waited_s - self._silent_from_s > self._rig.safety.watchdog_s:
-            raise silent[0]
+        for j, answer in enumerate(answers.drives):
+            if not isinstance(answer, Unanswered):
+                self._silent_from_s[j] = inf
+                continue
+            self._silent_from_s[j] = min(self._silent_from_s[j], waited_s)
+            if waited_s - self._silent_from_s[j] > self._rig.safety.watchdog_s:
+                raise answer
         idle = self._enable_states.idle
         if idle and waited_s > self._rig.safety.control_s:
             raise DeviceError(

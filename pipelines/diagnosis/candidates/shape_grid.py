@@ -157,7 +157,8 @@ def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[R
     if effect.joint is None or not (parameter.swept or parameter.swept_end):
         return values_of(parameter, count)
     j = runs[0].motion.joint_index(effect.joint)
-    angles = np.concatenate([run.state[0][:, j] for run in runs])
+    # Values of unusable samples, such as glitches, are no positions.
+    angles = np.concatenate([run.state[0][run.valid, j] for run in runs])
     if parameter.swept_end:
         return np.array([np.min(angles) if parameter.swept_end < 0 else np.max(angles)])
     return np.linspace(np.min(angles), np.max(angles), count + 2)[1:-1]

@@ -32,7 +32,7 @@ TIME = "time"
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
 BURSTS = "bursts"
-"""The law of knocks at moments of their own. It has no columns: its evidence is in the scatter."""
+"""The law of knocks at random times. It has no columns: its evidence is in the scatter."""
 QUANTISATION = "quantisation"
 """The law of a torque that is reported in coarse steps: its column is the rounding error."""
 ACROSS = "across_joints"
@@ -205,11 +205,12 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     for k in range(1, 4):
         yield "friction_over_time", k, way * np.cos(k * phase)
         yield "friction_over_time", k, here * np.cos(k * phase)
+    if q.shape[1] > 1:
+        yield from _polynomials("both_angles", _scaled_sum(run, spans), range(1, 6))
     for o in range(q.shape[1]):
         if o == j:
             continue
         yield from _polynomials("other_angle", q[:, o], range(1, 6))
-        yield from _polynomials("both_angles", _scaled_sum(run, spans), range(1, 6))
         yield "both_angles", 2, q[:, j] * q[:, o]
         yield "both_angles", 3, q[:, j] ** 2 * q[:, o]
         yield "both_angles", 3, q[:, j] * q[:, o] ** 2

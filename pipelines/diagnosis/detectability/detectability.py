@@ -494,7 +494,9 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
 
 def _companions(effect: Effect) -> list[int]:
     """Return the amplitudes that may have either sign and only accompany the first one."""
-    return [i for i, p in enumerate(effect.linear) if i and p.typical[0] < 0]
+    # One that is zero by default refines the form, and no effect needs it to show.
+    refines = [p.default is not None for p in effect.linear]
+    return [i for i, p in enumerate(effect.linear) if i and p.typical[0] < 0 and not refines[i]]
 
 
 def _levels(effect: Effect) -> list[int]:

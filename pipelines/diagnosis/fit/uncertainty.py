@@ -205,6 +205,10 @@ def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[
         (number, i, run)
         for number, cause in enumerate(causes)
         for i, parameter in enumerate(cause.effect.shape)
-        if cause.is_free(i) == fitted and not parameter.forms and i != cause.onset
+        if cause.is_free(i) == fitted
+        and not parameter.forms
+        and i != cause.onset
+        # Ends of the motion are known.
+        and not parameter.swept_end
         for run in (range(runs) if parameter.per_run else (-1,))
     ]

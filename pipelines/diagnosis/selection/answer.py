@@ -101,12 +101,14 @@ def _best(posterior: Posterior) -> Set:
     and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
-    # Rivals share the probability that something is missing, and each may have less than nothing.
-    missing = 1.0 - posterior.nothing >= CRITERIA.likely
-    sets = [labels for labels in posterior.by_labels if labels or not missing]
     # Labels may be likely each by itself, and never occur in one set.
-    has_all = [labels for labels in sets if likely <= labels]
-    labels = max(has_all or sets, key=lambda key: posterior.by_labels[key])
+    sets = [own for own in posterior.by_labels if likely <= own] or list(posterior.by_labels)
+    # Rivals share the probability that there is one more cause, and each may have less than none.
+    listed = {e.label for e in posterior.elements if not e.is_law}
+    with_more = [own for own in sets if (own - likely) & listed]
+    if sum(posterior.by_labels[own] for own in with_more) >= CRITERIA.likely:
+        sets = with_more
+    labels = max(sets, key=lambda own: posterior.by_labels[own])
     return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
 
 

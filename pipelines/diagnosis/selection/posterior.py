@@ -5,7 +5,7 @@ full; triples extend the best pairs. Marginals are reported: of nothing missing,
 something unlisted, of each family at each joint.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -164,7 +164,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
     # A shape refined in a set counts in that set only: otherwise the cause would count twice.
-    odds |= {(i,): float(v) for i, v in enumerate(weigh.alone) if evidence.elements[i].context < 0}
+    odds |= {(i,): float(weigh.alone[i]) for i, e in enumerate(evidence.elements) if _explains(e)}
     for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
@@ -172,8 +172,26 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     # If one cause of the best set is refuted, the others remain.
     best = max(odds, key=lambda chosen: odds[chosen])
     odds |= {chosen: weigh(chosen) for chosen in combinations(best, 2) if chosen not in odds}
+    odds |= dict(_with_bursts(weigh, odds))
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
     return Posterior(evidence.elements, tuple(sets), np.array([odds[chosen] for chosen in sets]))
+
+
+def _explains(element: Element) -> bool:
+    """Return whether an element explains rows in any set, and not only in its own."""
+    return element.context < 0 and bool(element.columns)
+
+
+def _with_bursts(
+    weigh: MarginalLikelihood, odds: Mapping[Set, float]
+) -> Iterator[tuple[Set, float]]:
+    """Yield each set with bursts at a joint: they explain no rows, so their evidence multiplies."""
+    elements = weigh.evidence.elements
+    for i in (i for i, element in enumerate(elements) if not element.columns):
+        own = float(weigh.apart[i])
+        for chosen, value in odds.items():
+            together = (*chosen, i)
+            yield together, value + own + weigh.prior(together) - weigh.prior(chosen)
 
 
 def _ordered(chosen: Sequence[int]) -> Set:
@@ -181,16 +199,20 @@ def _ordered(chosen: Sequence[int]) -> Set:
 
 
 def likely_contexts(weighed: Posterior) -> list[Context]:
-    """Return sets of several elements that are more probable than nothing, to refine together."""
+    """Return sets of several elements to refine together.
+
+    The sets are more probable than nothing, unless it is likely that something is missing.
+    """
     contexts: dict[frozenset[str], Context] = {}
     for chosen in weighed.sets:
-        elements = [weighed.elements[i] for i in chosen]
+        # A law without columns leaves a cause's shape as it is.
+        elements = [e for e in (weighed.elements[i] for i in chosen) if e.columns]
         causes = tuple(e.place for e in elements if not e.is_law)
         if len(elements) > 1 and causes:
             laws = tuple(e.variant for e in elements if e.is_law)
             contexts.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
         # Sets come by falling probability: all after the empty one are less likely than nothing.
-        if not chosen or len(contexts) == CONTEXTS:
+        if len(contexts) == CONTEXTS or (not chosen and weighed.nothing > CRITERIA.likely):
             break
     return list(contexts.values())
 
@@ -203,7 +225,7 @@ def strongest(weighed: Posterior) -> list[int]:
     causes: dict[str, int] = {}
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
-        if not chosen or len(causes) == STRONGEST:
+        if len(causes) == STRONGEST or (not chosen and weighed.nothing > CRITERIA.likely):
             break
         if element is not None and not element.is_law:
             causes.setdefault(element.label, element.place)
@@ -215,7 +237,7 @@ def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[i
     elements = weigh.evidence.elements
     shapes: dict[str, list[int]] = {}
     for i in np.argsort(-weigh.alone):
-        if elements[i].context < 0:  # others count in their own set only
+        if _explains(elements[i]):
             shapes.setdefault(elements[i].variant, []).append(int(i))
     # Screening sees few columns of an element, and a wandering torque has dozens. So it is paired
     # with the best elements instead.

@@ -130,7 +130,11 @@ def test_while_drives_are_enabled_only_silence_longer_than_the_watchdogs_time_en
     lost = Answers((idle, LOST), row(100).forces, None)
     late_s = supervisor.rig.safety.control_s - 1.2 * longest_s
     assert late_s > 2.0 * longest_s
-    for waited_s in (0.0, late_s):
+    other = Answers((LOST, idle), row(100).forces, None)
+    for k in range(5):
+        # One after the other loses a reply, and each has answered just before.
+        assert enabling.check((lost, other)[k % 2], k * 0.6 * longest_s) is None
+    for waited_s in (3.0 * longest_s, late_s):
         assert enabling.check(answered, waited_s) is None
         assert enabling.check(lost, waited_s) is None
     assert enabling.check(lost, late_s + 0.9 * longest_s) is None
