@@ -32,8 +32,10 @@ class PositionDependentFriction(Effect):
     linear = (
         Parameter("slope", "N·m/rad", "growth of the Coulomb level with angle", "c1", (-4.0, 4.0)),
         Parameter("curvature", "N·m/rad²", "growth of the slope with angle", "c2", (-6.0, 6.0)),
-        Parameter("cubic", "N·m", "third-order part at the end", "c3", (-2.0, 2.0), default=0.0),
-        Parameter("quartic", "N·m", "fourth-order part there", "c4", (-2.0, 2.0), default=0.0),
+        Parameter("cubic", "N·m", "third-order part of it at q2", "c3", (-2.0, 2.0), default=0.0),
+        Parameter(
+            "quartic", "N·m", "fourth-order part of it at q2", "c4", (-2.0, 2.0), default=0.0
+        ),
     )
     shape = (
         Parameter(

@@ -82,5 +82,5 @@ def test_a_law_of_both_angles_holds_any_smooth_torque_of_their_sum(prepared):
         wanted = np.sin(run.state[0].sum(axis=1))
         # A constant torque is another law's.
         parts = np.column_stack([columns[:, joint, own], np.ones(len(wanted))])
-        left_over = wanted - parts @ np.linalg.lstsq(parts, wanted, rcond=None)[0]
-        assert np.std(left_over) < 0.01 * np.std(wanted)
+        rest = wanted - parts @ np.linalg.lstsq(parts, wanted, rcond=None)[0]
+        assert np.std(rest) < 0.01 * np.std(wanted)

@@ -29,10 +29,10 @@ def test_a_level_that_waves_is_followed_and_stays_within_reason_beyond(with_huma
     torque = np.sin(2.0 * np.pi * waves * x + phase) * way
     inside = (x > 0.1) & (x < 0.9)
     columns, values = _fit(with_human, inside, torque)
-    left = torque - columns @ values
-    assert np.std(left[inside]) < 0.25 * np.std(torque[inside])
+    rest = torque - columns @ values
+    assert np.std(rest[inside]) < 0.25 * np.std(torque[inside])
     # Continued by the polynomial, it would be wrong by several times the whole level.
-    assert np.abs(left[~inside]).max() < 1.5
+    assert np.abs(rest[~inside]).max() < 1.5
 
 
 def test_beyond_its_ends_the_level_stays_the_same(with_human):
