@@ -25,7 +25,7 @@ LAWS = {
     "friction_over_time": ("time", "friction of {joint} that changes with time"),
     "time": ("time", "a torque of {joint} that wanders in time and does not repeat"),
     "hum": ("time", "a tone at {joint} that does not follow the motion"),
-    "bursts": ("time", "a torque of {joint} that comes in bursts and does not repeat"),
+    "bursts": ("time", "a torque at {joint} that comes in bursts and does not repeat"),
     "across_joints": ("angle", "an elastic torque across both joints"),
     "quantisation": ("sensor", "a torque of {joint} that is reported in coarse steps"),
 }
