@@ -5,8 +5,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 # Graph of the experiment: once, there; `exoid init` gives the same file to every new experiment.
-EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk \
+EXPERIMENT = $(MAKE) --no-print-directory $(JOBS) -f datasets/experiments/experiment.mk \
 	EXOID=$(BIN)/exoid CONFIG=datasets/experiments/default.toml OUT=build/default
+# Two steps at a time where the user says nothing else, each with its output in one piece.
+JOBS = $(if $(filter -j%,$(MAKEFLAGS)),,-j2 --output-sync=target)
 
 # What blind examinations left, for `make blind-page`.
 LEGS = $(wildcard build/blind/report.json build/blind-full/report.json)

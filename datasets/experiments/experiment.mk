@@ -1,5 +1,6 @@
 # One experiment: `make` brings every result up to date and does nothing where nothing changed.
 # A setting counts, not the time of exoid.toml: touching one re-runs only what depends on it.
+# `make -j2` does two steps at a time, but one at a time where a rig moves in real time.
 
 EXOID ?= exoid
 CONFIG ?= exoid.toml

@@ -12,11 +12,17 @@ from typing import Any
 from pipelines.contracts.atomic import write_text
 from pipelines.contracts.provenance import sha256
 from pipelines.settings.experiment import Experiment
+from pipelines.settings.rig import load_rig
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
 
 INCOMPLETE = "incomplete"
 """The phony prerequisite of a step that lacks one of its files."""
+ONE_AT_A_TIME = (
+    "# A rig makes one run at a time, and in real time no other step may delay its samples.",
+    ".NOTPARALLEL:",
+)
+"""Rules by which `make -j` does one step at a time."""
 
 
 def split(experiment: Experiment, folder: Path) -> None:
@@ -28,14 +34,25 @@ def split(experiment: Experiment, folder: Path) -> None:
     sections = experiment.sections(
         "mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate"
     )
-    if any(step.stage == "acquire" for step in steps):
+    records = any(step.stage == "acquire" for step in steps)
+    if records:
         experiment.refuse_missing_files()
         _add_what_is_recorded(experiment, sections)
     for name, content in sections.items():
         path, text = folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n"
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             write_text(path, text)
-    write_text(folder / "graph.mk", "\n".join(_rules(steps)) + "\n")
+    rules = list(_rules(steps))
+    if records and not _may_share_the_machine(experiment):
+        rules += ["", *ONE_AT_A_TIME]
+    write_text(folder / "graph.mk", "\n".join(rules) + "\n")
+
+
+def _may_share_the_machine(experiment: Experiment) -> bool:
+    """Return whether runs may be recorded beside other steps, each on a virtual rig of its own."""
+    rig = load_rig(experiment.file(experiment.acquire.rig))
+    # In lockstep no time passes while the computer does something else.
+    return rig.embedded and rig.clock == "lockstep"
 
 
 def _add_what_is_recorded(experiment: Experiment, sections: dict[str, Any]) -> None:

@@ -25,6 +25,22 @@ echo "$@" >> "$LOG"
 case "$*" in
   *simulated/extended*) [ -e impossible ] && exit 2 ;;
 esac
+# With `pairs`, a recording waits for a second one at the same time; with `alone`, two steps at the
+# same time are noted.
+if [ "$1" = acquire ] && [ -e pairs ]; then
+  touch "recording.$$"
+  for try in $(seq 200); do
+    [ "$(ls recording.* | wc -l)" -ge 2 ] && touch paired
+    [ -e paired ] && break
+    sleep 0.05
+  done
+  rm "recording.$$"
+fi
+if [ -e alone ]; then
+  mkdir busy || touch overlapped
+  sleep 0.02
+  rmdir busy
+fi
 for last in "$@"; do :; done
 case "$last" in
   identified/|diagnosed/|./identified/|./diagnosed/) mkdir -p "$last"
@@ -216,6 +232,20 @@ def test_clean_keeps_the_recordings(make):
         "recordings",
         "rigs",
     }
+
+
+def test_two_virtual_rigs_record_at_the_same_time(make):
+    (make.folder / "pairs").touch()
+    make("-j2")
+    assert (make.folder / "paired").is_file()
+
+
+@pytest.mark.parametrize("rig", ["lab", "real_time"])
+def test_a_rig_in_real_time_has_the_computer_to_itself(make, rig):
+    make.change("rigs/default.toml", f"rigs/{rig}.toml")
+    (make.folder / "alone").touch()
+    assert sorted(make("-j4")) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
+    assert not (make.folder / "overlapped").exists()
 
 
 def test_init_overwrites_nothing(make):

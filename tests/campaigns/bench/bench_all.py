@@ -30,7 +30,7 @@ def seconds(folder: str, environment: dict[str, str]) -> float:
     """Return the wall time of one ``make all`` into a folder."""
     experiments = datasets() / "experiments"
     exoid = Path(sys.executable).with_name("exoid")
-    command = ["make", "-f", experiments / "experiment.mk", f"EXOID={exoid}"]
+    command = ["make", "-j2", "-f", experiments / "experiment.mk", f"EXOID={exoid}"]
     began = time.monotonic()
     subprocess.run(
         [*command, f"CONFIG={experiments / 'default.toml'}", f"OUT={folder}/out", "all"],
