@@ -209,15 +209,16 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         from pipelines.simulation.figures import draw_replay
 
         with console.working("drawing"):
-            title = f"{recording.stem}, simulated again"
-            draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), title)
+            draw_replay(
+                open_loop, closed_loop, plant.joints, output.with_suffix(""), recording.stem
+            )
     console.emit(result | ({"no_closed_loop": no_closed_loop} if no_closed_loop else {}))
     _report_replay(result, plant.joints)
     if no_closed_loop:
         console.warn(f"no closed loop for {recording}: {no_closed_loop}")
     written = [output.name, *([] if no_closed_loop else [closed_loop_file.name])]
     if settings.simulate.figures:
-        written.append(output.with_suffix(".png").name)
+        written += [Path(name).with_suffix(".png").name for name in written]
     console.wrote(output.parent, *written)
     for guess in plant.guesses:
         console.warn(f"{guess}. The errors contain the difference")

@@ -1,4 +1,4 @@
-"""The figures of an identification: predicted torque and residuals."""
+"""The figures of an identification: predicted torque and residuals of each validation run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,20 +7,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows
-from pipelines.plotting.style import BLUE as RESIDUAL
-from pipelines.plotting.style import GREY as MEASURED
-from pipelines.plotting.style import ORANGE as PREDICTED
+from pipelines.identification.charts import residual_panel, residual_reach, torque_panels
+from pipelines.plotting.chart import Chart, DrawnTable, Role, named
+from pipelines.plotting.matplotlib_charts import chart_figure, grid_figure
 from pipelines.plotting.style import STYLE, save
 
-BINS = 25
-"""Bins of the running mean of a residual."""
-FEWEST = 8
-"""Fewest samples of a bin with a mean."""
 MOST = 20_000
 """Most rows drawn of a run; of a longer run every second, fourth, ... row is drawn."""
 
@@ -69,10 +63,12 @@ def draw(residuals: Rows, folder: Path) -> None:
     """
     joints = residuals.joints
     with plt.rc_context(STYLE):
-        for name, run in _validation_runs(residuals).items():
-            stem = Path(name).stem
-            save(_prediction(run, joints, stem), folder / f"torque-{stem}")
-            save(_residuals(run, joints, stem), folder / f"residual-{stem}")
+        for file, run in _validation_runs(residuals).items():
+            name = Path(file).stem
+            save(chart_figure(_torque(run, joints, name)), folder / f"torque-{name}")
+            grid = [_residuals(run, joint) for joint in joints]
+            title = f"residual of {name} against time, angle and velocity"
+            save(grid_figure(title, grid), folder / f"residual-{name}")
 
 
 def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
@@ -86,81 +82,35 @@ def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
     return runs
 
 
-def _prediction(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
-    """Draw measured and predicted torque over time, with the residual on the same scale."""
-    frame = run.frame
-    size, heights = (9, 3.2 * len(joints)), [3, 1.3] * len(joints)
-    figure, axes = plt.subplots(
-        2 * len(joints), 1, figsize=size, sharex=True, height_ratios=heights
-    )
-    for j, joint in enumerate(joints):
-        torque, residual = axes[2 * j], axes[2 * j + 1]
-        time, measured = frame["time_s"], frame[joint.column("torque")]
-        torque.plot(time, measured, color=MEASURED, lw=2.2, label="measured")
-        predicted = frame[joint.column("predicted")]
-        torque.plot(time, predicted, color=PREDICTED, lw=0.9, label="predicted")
-        torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
-        torque.set_title(f"{joint.name}: {_error(run, joint)}", loc="left", fontsize=9)
-        _residual_over(residual, time, frame, joint)
-        residual.set_ylabel(f"residual, {joint.unit('torque')}")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
-    axes[-1].set_xlabel("time, s")
-    figure.suptitle(f"{title}: torque of a validation run", x=0.02, ha="left", fontweight="bold")
-    figure.align_ylabels()
-    figure.tight_layout()
-    return figure
+def _torque(run: _RunData, joints: Sequence[Joint], name: str) -> Chart:
+    """Return measured and predicted torque over time, and the residual, of every joint."""
+    model = DrawnTable("predicted", Role.AFTER, run.frame)
+    panels = [
+        named(joint, panel)
+        for joint in joints
+        for panel in torque_panels(joint, run.frame, [model])
+    ]
+    title = f"torque of {name}: {'; '.join(_error(run, joint) for joint in joints)}"
+    return Chart("torque", title, "", "time, s", run.frame["time_s"].to_numpy(), tuple(panels))
 
 
-def _residuals(run: _RunData, joints: tuple[Joint, ...], title: str) -> Figure:
-    """Draw the residual against time, angle and speed; noise shows no pattern in any of them."""
-    frame = run.frame
-    figure, axes = plt.subplots(
-        len(joints), 3, figsize=(10, 2.7 * len(joints)), squeeze=False, sharey="row"
-    )
-    for row, joint in zip(axes, joints, strict=True):
-        against = {"time, s": "time_s"}
-        for quantity in ("angle", "velocity"):
-            label = f"{joint.name} {quantity}, {joint.unit(quantity)}"
-            against[label] = joint.column(quantity)
-        for axis, (label, column) in zip(row, against.items(), strict=True):
-            _residual_over(axis, frame[column], frame, joint, dots=True)
-            axis.set_xlabel(label)
-        row[0].set_ylabel(f"{joint.name} residual, {joint.unit('torque')}")
-        row[0].set_title(_error(run, joint), loc="left", fontsize=9)
-    figure.legend(
-        *axes[0, -1].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4
-    )
-    figure.suptitle(f"{title}: residual", x=0.02, ha="left", fontweight="bold")
-    figure.tight_layout()
-    return figure
-
-
-def _residual_over(
-    axis: Axes, x: pd.Series, frame: pd.DataFrame, joint: Joint, dots: bool = False
-) -> None:
-    residual, scored = frame[joint.column("residual")].to_numpy(), frame["scored"].to_numpy()
-    if not dots:
-        # NaN breaks the line near reversals, where sticking joints would set the scale.
-        axis.plot(x, np.where(scored, residual, np.nan), color=RESIDUAL, lw=0.7)
-        return
-    left_out, label = ~scored, "near a reversal"
-    axis.plot(x[left_out], residual[left_out], ".", ms=1.2, color=MEASURED, alpha=0.5, label=label)
-    axis.plot(x[scored], residual[scored], ".", ms=1.2, color=RESIDUAL, alpha=0.6, label="scored")
-    axis.axhline(0, color="black", lw=0.6)
-    if not scored.any():
-        return
-    groups = frame.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)
-    bins = groups[joint.column("residual")]
-    mean = bins.mean().where(bins.count() >= FEWEST)
-    axis.plot([b.mid for b in mean.index], mean, color=PREDICTED, lw=1.6, label="mean")
-    # Residuals of a sticking joint are ten times the others and are cut off.
-    height = 6 * residual[scored].std()
-    if height > 0.0:
-        axis.set_ylim(-height, height)
+def _residuals(run: _RunData, joint: Joint) -> list[Chart]:
+    """Return a joint's residual against time, angle and speed; noise has no shape in any."""
+    scored = run.frame[run.frame["scored"]]
+    model, reach = DrawnTable("running mean", Role.AFTER, scored), residual_reach(scored, joint)
+    against = {"time, s": "time_s"} | {
+        f"{joint.name} {quantity}, {joint.unit(quantity)}": joint.column(quantity)
+        for quantity in ("angle", "velocity")
+    }
+    charts = []
+    for label, column in against.items():
+        x, panel = residual_panel(joint, column, [model], reach)
+        charts.append(Chart("residual", "", "", label, x, (panel,)))
+    return charts
 
 
 def _error(run: _RunData, joint: Joint) -> str:
     if not run.scored:
-        return "no sample away from reversals to score"
+        return f"{joint.name} never moves, so that nothing is scored"
     residual, torque = (run.rms(joint.column(name)) for name in ("residual", "torque"))
-    return f"RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"
+    return f"{joint.name} RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"

@@ -7,8 +7,9 @@ from pathlib import Path
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
+from pipelines.plotting.matplotlib_charts import chart_figure
 from pipelines.plotting.style import STYLE, save
-from pipelines.report.charts.matplotlib_charts import budget_figure, chart_figure, falls_figure
+from pipelines.report.bar_figures import budget_figure, falls_figure
 from pipelines.report.sections.error_budget import budget, falls
 from pipelines.report.session import Session
 from pipelines.report.session_charts import charts
@@ -35,8 +36,5 @@ def draw(
     dpi = 200
     with plt.rc_context(STYLE | {"savefig.dpi": dpi}):
         for number, name in enumerate(names):
-            figure = drawings[name]()
-            # Computes the layout, which `save` measures.
-            figure.draw_without_rendering()
-            save(figure, folder / name)
+            save(drawings[name](), folder / name)
             report(number + 1)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pipelines.report.charts.chart import Chart, thinned_alike
+from pipelines.plotting.chart import Chart, thinned_alike
 from pipelines.report.sections.control import control_charts
 from pipelines.report.sections.fit_quality import angle_charts, torque_charts
 from pipelines.report.sections.key_figures import worst_joint

@@ -49,7 +49,7 @@ def split(experiment: Experiment, folder: Path) -> None:
 
 
 def _may_share_the_machine(experiment: Experiment) -> bool:
-    """Return whether runs may be recorded beside other steps, each on a virtual rig of its own."""
+    """Return whether other steps may run during a recording, each run on a rig of its own."""
     rig = load_rig(experiment.file(experiment.acquire.rig))
     # In lockstep no time passes while the computer does something else.
     return rig.embedded and rig.clock == "lockstep"

@@ -127,7 +127,8 @@ def test_replay_of_the_true_model_stays_on_the_recording(
     closed = SIMULATION.read(tmp_path / "replay-closed-loop.parquet").frame
     difference = closed["knee_torque_nm"] - closed["knee_torque_measured_nm"]
     assert np.sqrt(np.mean(difference[100:-100] ** 2)) < 0.1
-    assert (tmp_path / "replay.png").read_bytes().startswith(b"\x89PNG")
+    for figure in ("replay.png", "replay-closed-loop.png"):
+        assert (tmp_path / figure).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pipelines import __version__
 from pipelines.contracts import describe
 from pipelines.contracts.provenance import sha256
-from pipelines.report.charts.chart import Chart, Series
+from pipelines.plotting.chart import Chart, Series
 from pipelines.report.numbers import digits, digits_for
 from pipelines.report.sections.animation import Animation
 from pipelines.report.session import Artifact

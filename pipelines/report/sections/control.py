@@ -4,20 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Verdict
-from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
-from pipelines.report.sections.fit_quality import MODELS, models_of
+from pipelines.plotting.chart import Chart
+from pipelines.report.sections.fit_quality import drawn, models_of
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
+from pipelines.simulation.charts import GAIN, loop_panels, sweep_panel
 from pipelines.workflow.graph import SWEEP
-
-GAIN = "feedback_gain_nm_s_rad"
-LIMIT = 4.0
-"""Height of a panel in largest settled errors; the start from rest exceeds it."""
 
 
 def context(content: Content) -> dict[str, Any]:
@@ -80,32 +76,14 @@ def control_charts(session: Session) -> Iterator[Chart]:
 
 
 def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -> Chart:
-    first = next(iter(tables.values()))
-    angles, errors, torques, worst = [], [], [], 0.0
-    for model, frame in tables.items():
-        # A loop of another length cannot share the chart's time.
-        if len(frame) != len(first):
-            continue
-        role, words = MODELS[model]
-        error = 1e3 * frame[joint.column("error")].to_numpy()
-        worst = max(worst, float(np.abs(error[frame["time_s"] >= settled]).max(initial=0.0)))
-        angles.append(Series(words, frame[joint.column("angle")].to_numpy(), role))
-        errors.append(Series(words, error, role))
-        torques.append(Series(words, frame[joint.column("torque")].to_numpy(), role))
-    angles.append(Series("wanted", first[joint.column("reference")].to_numpy(), Role.WANTED))
-    unit = joint.unit("angle")
+    loops = [drawn(model, table) for model, table in tables.items()]
     return Chart(
         key=f"control-{joint.name}",
         title=f"{joint.name} under adaptive RBF control",
         caption=f"From rest; errors count from {settled:g} s on, when the network has adapted.",
         x_label="time, s",
-        x=first["time_s"].to_numpy(),
-        panels=(
-            Panel(f"angle, {unit}", tuple(angles)),
-            # A height of zero is no range, so it becomes None.
-            Panel(f"error, m{unit}", tuple(errors), reach=LIMIT * worst or None),
-            Panel(f"torque, {joint.unit('torque')}", tuple(torques)),
-        ),
+        x=loops[0].rows["time_s"].to_numpy(),
+        panels=loop_panels(joint, loops, settled),
         group="control",
     )
 
@@ -120,21 +98,17 @@ def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     if not tables:
         return None
     first = next(iter(tables.values()))
-    panels = []
-    for joint in session.joints:
-        curves = []
-        for model, table in tables.items():
-            # Curves share x, so both sweeps must have the same gains.
-            if table[GAIN].equals(first[GAIN]):
-                role, words = MODELS[model]
-                errors = 1e3 * table[joint.column("error")].to_numpy(dtype=float)
-                curves.append(Series(words, errors, role, Mark.MEAN))
-        panels.append(Panel(f"{joint.name}, m{joint.unit('angle')}", tuple(curves)))
+    sweeps = [
+        drawn(model, table)
+        for model, table in tables.items()
+        # Curves share x, so all sweeps must have the same gains.
+        if table[GAIN].equals(first[GAIN])
+    ]
     return Chart(
         key="kv-sweep",
         title="Largest settled error against the feedback gain",
         caption="One simulation per gain.",
         x_label="feedback gain Kv, N·m·s/rad",
         x=first[GAIN].to_numpy(dtype=float),
-        panels=tuple(panels),
+        panels=tuple(sweep_panel(joint, sweeps) for joint in session.joints),
     )

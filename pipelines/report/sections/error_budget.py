@@ -3,7 +3,7 @@
 from typing import Any
 
 from pipelines.contracts.verdict import Verdict
-from pipelines.report.charts.bars import Bar, Fall, Segment
+from pipelines.report.bars import Bar, Fall, Segment
 from pipelines.report.sections.section import Content
 from pipelines.wording.causes import any_label_in_words, shares_in_words
 from pipelines.wording.label import SHARES

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.report.charts.chart import Chart, Panel, Role, Series
+from pipelines.identification.charts import torque_panels
+from pipelines.plotting.chart import Chart, DrawnTable, Role
 from pipelines.report.sections.standstill import moving, simulation_error_grew, torque_error_grew
 from pipelines.report.session import Artifact, Session
+from pipelines.simulation.charts import window_panels
 
 MODELS = {
     "baseline": (Role.BEFORE, "rigid body and friction"),
@@ -34,6 +35,12 @@ def models_of(session: Session) -> dict[str, tuple[Role, str]]:
     return {name: title for name, title in MODELS.items() if named or name == "baseline"}
 
 
+def drawn(model: str, rows: pd.DataFrame) -> DrawnTable:
+    """Return rows of a model, to be drawn in its role."""
+    role, words = MODELS[model]
+    return DrawnTable(words, role, rows)
+
+
 def torque_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each run and joint: torque, and the residual of each model."""
     if session.residuals is None:
@@ -48,33 +55,19 @@ def torque_charts(session: Session) -> Iterator[Chart]:
 def _torque_chart(
     session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None
 ) -> Chart:
-    quantity, unit = joint.effort, joint.unit("torque")
-    first = frame[frame["model"] == frame["model"].iloc[0]]
-    torques, errors = [], []
-    for model, (role, words) in models_of(session).items():
-        rows = frame[frame["model"] == model]
-        # A model with other rows cannot share the chart's time.
-        if len(rows) != len(first):
-            continue
-        torques.append(Series(words, rows[joint.column("predicted")].to_numpy(), role))
-        # NaN interrupts the line at reversals, which the error does not count.
-        residual = rows[joint.column("residual")].where(rows["scored"]).to_numpy()
-        errors.append(Series(words, residual, role))
-    torques.append(Series("measured", first[joint.column("torque")].to_numpy(), Role.MEASURED))
+    measured = frame[frame["model"] == frame["model"].iloc[0]]
+    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
     return Chart(
         key=f"torque-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {quantity}",
+        title=f"{joint.name} {joint.effort}",
         caption=(
             "Measured and computed from the motion, in the blocks that were fitted; below, each"
             " model's error away from reversals"
             f"{', on the band of the noise floor' if floor else ''}."
         ),
         x_label="time, s",
-        x=first["time_s"].to_numpy(),
-        panels=(
-            Panel(f"{quantity}, {unit}", tuple(torques)),
-            Panel(f"error, {unit}", tuple(errors), band=floor),
-        ),
+        x=measured["time_s"].to_numpy(),
+        panels=torque_panels(joint, measured, models, floor),
         group=run,
     )
 
@@ -192,34 +185,19 @@ def _while_moving(
 
 def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
     first = next(iter(tables.values()))
-    where, drive = joint.place, joint.effort
-    angles, errors = [], []
-    for model, frame in tables.items():
-        if len(frame) != len(first):
-            continue
-        role, words = MODELS[model]
-        angles.append(Series(words, _broken(frame, joint.column("angle")), role))
-        errors.append(Series(words, 1e3 * _broken(frame, joint.column("error")), role))
-    angles.append(Series("measured", first[joint.column("reference")].to_numpy(), Role.MEASURED))
-    unit = joint.unit("angle")
+    replays = [drawn(model, table) for model, table in tables.items()]
     return Chart(
         key=f"angle-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {where} in simulations of one second",
+        title=f"{joint.name} {joint.place} in simulations of one second",
         caption=(
             f"Each second the model starts from the measured state and receives the recorded"
-            f" {drive}; below, its error."
+            f" {joint.effort}; below, its error."
         ),
         x_label="time, s",
         x=first["time_s"].to_numpy(),
-        panels=(Panel(f"{where}, {unit}", tuple(angles)), Panel(f"error, m{unit}", tuple(errors))),
+        panels=window_panels(joint, replays),
         group=run,
     )
-
-
-def _broken(frame: pd.DataFrame, column: str) -> NDArray:
-    """Return a column (n,) with NaN where a window begins, so that no line joins two windows."""
-    begins = frame["window"].diff().fillna(0) != 0
-    return frame[column].where(~begins, np.nan).to_numpy()
 
 
 def _stem(run: str) -> str:

@@ -2,23 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Dependence
-from pipelines.report.charts.chart import Chart, Mark, Panel, Series
-from pipelines.report.sections.fit_quality import MODELS, models_of
+from pipelines.identification.charts import residual_panel, residual_reach
+from pipelines.plotting.chart import Chart
+from pipelines.report.sections.fit_quality import drawn, models_of
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
-from pipelines.signals.binned_mean import FEWEST, binned_mean
+from pipelines.signals.binned_mean import FEWEST
 
-DOTS = 2500
-"""Most dots of a chart; more would hide the shape of the cloud."""
 DEPENDENCES = {
     "angle": "angle",
     "velocity": "speed",
@@ -109,46 +105,16 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
     for joint in session.joints:
         # One height for all charts of a joint, so that their errors can be compared.
-        reach = _reach(judged, joint)
+        reach = residual_reach(judged, joint)
         for one in _against(session, joint):
             yield _chart(session, judged, joint, one, reach)
-
-
-def _reach(frame: pd.DataFrame, joint: Joint) -> float | None:
-    # Percentile of the residual's magnitude that a panel must show.
-    reach_percentile = 99.5
-    size = np.abs(frame[joint.column("residual")].to_numpy())
-    # A percentile with a margin, so that a few outliers do not flatten the cloud.
-    return 1.1 * float(np.percentile(size, reach_percentile)) if len(size) else None
 
 
 def _chart(
     session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None
 ) -> Chart:
-    """Return dots and running means; all models share x, because the motion is the same."""
-    rows = {model: frame[frame["model"] == model] for model in models_of(session)}
-    rows = {model: table for model, table in rows.items() if len(table)}
-    x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
-    # The columns of a chart share x. Dots and means are therefore rows of one table, each with NaN
-    # where the other has its places.
-    step = max(1, ceil(len(x) / DOTS))
-    middles = _mean_along(x, x)[0] if len(x) else x
-    places = np.concatenate([x[::step], middles])
-    order = np.argsort(places, kind="stable")
-    clouds, means = [], []
-    for model, table in rows.items():
-        role, words = MODELS[model]
-        y = table[joint.column("residual")].to_numpy()
-        # A model with other rows cannot share x.
-        if len(y) != len(x):
-            continue
-        dots, line = np.full((2, len(places)), np.nan)
-        dots[: len(places) - len(middles)] = y[::step]
-        line[len(places) - len(middles) :] = _mean_along(x, y)[1]
-        clouds.append(Series("", dots[order], role, Mark.DOTS))
-        means.append(Series(words, line[order], role, Mark.MEAN))
-    label = f"{joint.name} {joint.effort} error, {joint.unit('torque')}"
-    floor = session.noise_floor(joint)
+    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
+    x, panel = residual_panel(joint, one.column, models, reach, session.noise_floor(joint))
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
         title=f"{joint.name} error against {one.title}",
@@ -157,16 +123,9 @@ def _chart(
             f" each of {FEWEST} blocks or more; the band is the noise floor."
         ),
         x_label=one.label,
-        x=places[order],
-        panels=(Panel(label, (*clouds, *means), floor, reach),),
+        x=x,
+        panels=(panel,),
     )
-
-
-def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """Return a running mean of y (n,) along x (n,): places and means, (k,) each."""
-    # The outermost bins would hold too few points for a mean.
-    low, high = np.percentile(x, [0.5, 99.5])
-    return binned_mean(x, y, low, high + 1e-12)
 
 
 def most_explained_variable(session: Session, joint: Joint) -> str:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.contracts.verdict import Verdict
-from pipelines.report.charts.chart import Chart
+from pipelines.plotting.chart import Chart
 from pipelines.report.session import Session
 
 

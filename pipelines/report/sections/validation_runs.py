@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.report.charts.chart import Chart
+from pipelines.plotting.chart import Chart
 from pipelines.report.numbers import digits
 from pipelines.report.sections.fit_quality import Score, models_of, replayed, run_names, scores
 from pipelines.report.sections.not_simulated import lacks_causes, refusal

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.report.charts.chart import Chart, Panel, Role, Series, thinned_alike
-from pipelines.report.charts.downsampling import extremes
+from pipelines.plotting.chart import Chart, Panel, Role, Series, thinned_alike
+from pipelines.plotting.downsampling import extremes
 
 ROWS = 2000
 

@@ -5,9 +5,11 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.report.charts.downsampling import extremes
+from pipelines.contracts.joints import Joint
+from pipelines.plotting.downsampling import extremes
 
 
 class Role(StrEnum):
@@ -26,6 +28,16 @@ class Mark(StrEnum):
     DOTS = "dots"
     MEAN = "mean"
     """A thick line through few points, across rows without a value."""
+
+
+@dataclass(frozen=True)
+class DrawnTable:
+    """A table whose columns are drawn as curves of one role."""
+
+    words: str
+    """Words of the legend."""
+    role: Role
+    rows: pd.DataFrame
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,11 @@ class Panel:
     """Half the height of the noise floor's band about zero."""
     reach: float | None = None
     """Half the height shown; None for the height of all curves."""
+
+
+def named(joint: Joint, panel: Panel) -> Panel:
+    """Return a panel whose label begins with the name of its joint."""
+    return replace(panel, label=f"{joint.name} {panel.label}")
 
 
 @dataclass(frozen=True)
