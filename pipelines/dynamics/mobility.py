@@ -3,7 +3,6 @@
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import (
@@ -49,6 +48,9 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
 
 def _poses(joints: int) -> NDArray:
     """Return joint angles, (k, J) rad; no mass matrix depends on the first joint's."""
+    # Only here: to import all of scipy.stats takes a third of a second.
+    from scipy.stats import qmc
+
     # Number of poses of a machine of more than two joints.
     more_poses = 500
     poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else more_poses, joints))

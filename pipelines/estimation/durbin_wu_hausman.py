@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f
+from scipy.special import fdtrc
 
 from pipelines.estimation.estimator import Fit
 from pipelines.estimation.long_run import long_run_covariance
@@ -100,5 +100,5 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
     return DurbinWuHausman(
-        difference, error, statistic, (float(k), rest), float(f.sf(statistic, k, rest))
+        difference, error, statistic, (float(k), rest), float(fdtrc(k, rest, statistic))
     )

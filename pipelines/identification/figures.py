@@ -10,9 +10,9 @@ from matplotlib import pyplot as plt
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows
-from pipelines.identification.charts import residual_panel, residual_reach, torque_panels
 from pipelines.plotting.chart import Chart, DrawnTable, Role, named
 from pipelines.plotting.matplotlib_charts import chart_figure, grid_figure
+from pipelines.plotting.residual_panels import residual_panel, residual_reach, torque_panels
 from pipelines.plotting.style import STYLE, save
 
 MOST = 20_000

@@ -31,9 +31,10 @@ STYLE: dict[Any, Any] = {
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> None:
     """Write a figure as ``stem``.png and ``stem``.pdf, or the one of them, and close it."""
-    # A layout is else computed only when the figure is drawn, which would be after its measurement.
+    # Laid out once, before the figure is measured: else each file would lay it out again.
     if figure.get_layout_engine():
         figure.draw_without_rendering()
+        figure.set_layout_engine("none")
     # Measured once for both: bbox_inches="tight" would lay out and measure every text again for
     # each.
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])

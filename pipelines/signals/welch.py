@@ -5,7 +5,6 @@ Source: Welch (1967), IEEE Trans. Audio 15(2).
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 
 class Welch:
@@ -40,6 +39,9 @@ class Welch:
         x : (n, channels) array
             They follow those of the call before.
         """
+        # Only here, as in `low_pass`: importing scipy.signal takes half a second.
+        from scipy.signal import welch
+
         x = x if self._rest is None else np.concatenate([self._rest, x])
         windows = max(0, (len(x) - self._length) // self._hop + 1)
         # Whole windows only: the rest waits for the next piece.

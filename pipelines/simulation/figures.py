@@ -11,8 +11,7 @@ from matplotlib import pyplot as plt
 from pipelines.contracts import Joint
 from pipelines.plotting.chart import Chart, DrawnTable, Panel, Role, Series, named
 from pipelines.plotting.matplotlib_charts import chart_figure
-from pipelines.plotting.style import STYLE, save
-from pipelines.simulation.charts import (
+from pipelines.plotting.simulation_panels import (
     GAIN,
     loop_panels,
     settled_error,
@@ -20,6 +19,7 @@ from pipelines.simulation.charts import (
     torque_panels,
     window_panels,
 )
+from pipelines.plotting.style import STYLE, save
 
 
 def draw_tracking(

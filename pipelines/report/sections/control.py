@@ -9,10 +9,10 @@ import pandas as pd
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Verdict
 from pipelines.plotting.chart import Chart
+from pipelines.plotting.simulation_panels import GAIN, loop_panels, sweep_panel
 from pipelines.report.sections.fit_quality import drawn, models_of
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
-from pipelines.simulation.charts import GAIN, loop_panels, sweep_panel
 from pipelines.workflow.graph import SWEEP
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 
 from pipelines.contracts import Joint
-from pipelines.identification.charts import torque_panels
 from pipelines.plotting.chart import Chart, DrawnTable, Role
+from pipelines.plotting.residual_panels import torque_panels
+from pipelines.plotting.simulation_panels import window_panels
 from pipelines.report.sections.standstill import moving, simulation_error_grew, torque_error_grew
 from pipelines.report.session import Artifact, Session
-from pipelines.simulation.charts import window_panels
 
 MODELS = {
     "baseline": (Role.BEFORE, "rigid body and friction"),

@@ -8,8 +8,8 @@ import pandas as pd
 
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Dependence
-from pipelines.identification.charts import residual_panel, residual_reach
 from pipelines.plotting.chart import Chart
+from pipelines.plotting.residual_panels import residual_panel, residual_reach
 from pipelines.report.sections.fit_quality import drawn, models_of
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
