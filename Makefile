@@ -103,6 +103,7 @@ sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion ma
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
 	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
+	$(BIN)/python -m pipelines.settings.rig_reference > docs/rig-keys.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
 	$(BIN)/python -m pipelines.export.reference docs/export.md
 	$(BIN)/python -m pipelines.diagnosis.reference docs/criteria.md

@@ -45,6 +45,23 @@ UNITS = {
 """Units that depend on the kind of joint; s, Hz, 1 and °C do not."""
 
 
+def refuse_unknown_unit(name: str, unit: str) -> None:
+    """Refuse a parameter's unit that depends on the kind of joint in an unknown way.
+
+    Raises
+    ------
+    ValueError
+        Names the parameter, its unit and the known ones.
+    """
+    # Lengths, masses and forces are the same at all joints: only their products with angles differ.
+    of_joint = [part for part in ("N·m", "rad", "turn") if part in unit]
+    if of_joint and unit not in UNITS:
+        raise ValueError(
+            f"{name}: found the unit {unit}, expected one without {' and '.join(of_joint)}, or one"
+            f" of {', '.join(UNITS)}; add it to UNITS in pipelines/contracts/joint_units.py"
+        )
+
+
 class Scale(NamedTuple):
     """Ratios of a joint's torque, speed and travel to an exoskeleton's."""
 

@@ -127,7 +127,7 @@ def known_temperature(motion: Motion) -> NDArray:
     (n, J) array
         °C.
     """
-    return np.nan_to_num(motion.motor_temperature, nan=REFERENCE_C)
+    return np.nan_to_num(motion.interpolated_temperature, nan=REFERENCE_C)
 
 
 def _stretches(motion: Motion) -> Iterator[slice]:

@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joint_units import Scale, unit_at
+from pipelines.contracts.joint_units import Scale, refuse_unknown_unit, unit_at
 from pipelines.effects.element import Element
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
 from pipelines.effects.tie import Tie
@@ -155,6 +155,10 @@ class Parameter:
     of_joint: bool = True
     """False if its unit does not depend on the joint: a phase is an angle at a prismatic joint
     too."""
+
+    def __post_init__(self) -> None:
+        if self.of_joint:
+            refuse_unknown_unit(self.name, self.unit)
 
     @property
     def neutral(self) -> float:
@@ -437,7 +441,7 @@ class Effect(ABC):
     def explains(self, motion: Motion) -> bool:
         """Return whether the effect acts in this run, with all measurements that it depends on."""
         known = not self.needs_temperature or bool(
-            np.isfinite(motion.motor_temperature[:, self.column(motion)]).all()
+            np.isfinite(motion.interpolated_temperature[:, self.column(motion)]).all()
         )
         return known and self.acts(motion.run)
 
@@ -454,7 +458,7 @@ class Effect(ABC):
         # Least change of a motor's temperature, °C, from which a dependence on it can be fitted.
         least_warming_c = 1.0
         # Over all runs together: each may be steady, one cold and another warm.
-        read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
+        read = [motion.interpolated_temperature[:, self.column(motion)] for motion in motions]
         ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
         # Missing temperatures are NaN, and the comparison is then false.
         return len(ends) > 0 and bool(np.ptp(ends) >= least_warming_c)
@@ -602,7 +606,8 @@ class Effect(ABC):
     def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
         # Only few equations read the load; for all others its smoothing would be wasted.
         load = motion.transmitted[0] if self.reads_load else np.zeros_like(motion.q)
-        of_motion = motion.time, motion.q, motion.dq, motion.ddq, load, motion.motor_temperature
+        temperature = motion.interpolated_temperature
+        of_motion = motion.time, motion.q, motion.dq, motion.ddq, load, temperature
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:
@@ -689,7 +694,7 @@ class Effect(ABC):
         out = np.empty_like(torque)
         joint = self.column(motion)
         time, temperature = (
-            np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature)
+            np.ascontiguousarray(x) for x in (motion.time, motion.interpolated_temperature)
         )
         # A sensor's memory does not reach across a gap.
         for stretch in motion.segments():

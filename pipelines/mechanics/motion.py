@@ -20,7 +20,7 @@ from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
-KEPT = ("transmitted", "motor_temperature", "held_forces")
+KEPT = ("transmitted", "interpolated_temperature", "held_forces")
 """Cached properties that do not depend on the kinematics, and are costly to compute."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
@@ -140,10 +140,10 @@ class Motion:
         return forces
 
     @cached_property
-    def motor_temperature(self) -> NDArray:
-        """Temperature of each joint's motor at every sample, (n, J) °C, linear between readings.
+    def interpolated_temperature(self) -> NDArray:
+        """Temperature of each joint's drive or motor at every sample, (n, J) °C.
 
-        NaN at a joint without readings.
+        Linear between readings; NaN at a joint without any.
         """
         measured = self.temperature
         read = np.full(self.q.shape, np.nan) if measured is None else measured.copy()

@@ -5,17 +5,7 @@ from collections.abc import Mapping, Sequence
 from operator import itemgetter
 
 from pipelines.settings.rig import Register
-
-_FORMAT = {
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float32": "f",
-    "float64": "d",
-}
+from pipelines.settings.rig.register import STRUCT_CODES
 
 # Step of a slice: a little-endian order is the standard's big-endian one, reversed.
 _STEP = {"big": 1, "little": -1}
@@ -34,7 +24,7 @@ class Block:
         self._pick = itemgetter(*self._places)
         self._words_format = struct.Struct(f">{self.count}H")
         self._values_format = struct.Struct(
-            ">" + "".join(_FORMAT[r.type] for r in registers.values())
+            ">" + "".join(STRUCT_CODES[r.type] for r in registers.values())
         )
         self._scales = [r.si for r in registers.values()]
         self._ranges = [r.counts for r in registers.values()]

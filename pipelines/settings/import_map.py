@@ -195,9 +195,9 @@ class JointSettings(Settings):
 
     def readings(self) -> Iterator[tuple[str, JointReadingSettings]]:
         """Yield the quantities that the log has, and their readings."""
-        for quantity in transmission.LOGGED:
+        for quantity in type(self).model_fields:
             reading = getattr(self, quantity)
-            if reading is not None:
+            if isinstance(reading, JointReadingSettings):
                 yield quantity, reading
 
     @property

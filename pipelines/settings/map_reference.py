@@ -1,9 +1,7 @@
 """The page docs/import-map.md from the map's settings themselves; `make docs` writes it."""
 
-from pydantic import BaseModel
-
 from pipelines.settings.import_map import ImportMap
-from pipelines.settings.reference import rows_of, sections_of
+from pipelines.settings.reference import grouped_sections
 from pipelines.settings.transmission import GEARED, paths
 from pipelines.settings.units import ALIASES, UNITS
 
@@ -15,19 +13,12 @@ how to write a map.
 
 `rig`, the name of the machine, is outside of all tables.
 """
-HEAD = "| key | default | meaning |\n|---|---|---|\n"
 
 
 def reference() -> str:
     """Return the page as Markdown."""
-    headings: dict[type[BaseModel], list[str]] = {}
-    for heading, model in sections_of(ImportMap):
-        headings.setdefault(model, []).append(f"`{heading}`")
-    sections = [
-        f"## {', '.join(names)}\n\n{model.__doc__}\n\n{HEAD}" + "\n".join(rows_of(model))
-        for model, names in headings.items()
-    ]
-    return "\n\n".join([INTRODUCTION.rstrip(), *sections, _units(), _drive_trains()]) + "\n"
+    sections = [*grouped_sections(ImportMap), _units(), _drive_trains()]
+    return "\n\n".join([INTRODUCTION.rstrip(), *sections]) + "\n"
 
 
 def _units() -> str:

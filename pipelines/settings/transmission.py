@@ -8,9 +8,6 @@ from pipelines.contracts.joint_units import Kind, unit_at
 from pipelines.contracts.joints import QUANTITIES
 from pipelines.settings.units import UNITS
 
-LOGGED = ("angle", "reference", "velocity", "torque", "current", "temperature")
-"""Quantities of a joint that a log may hold."""
-
 
 def dimension_at(kind: Kind, quantity: str) -> str:
     """Return the dimension of a quantity at a kind of joint: an angle, or a length."""

@@ -47,9 +47,9 @@ def test_the_shipped_template_records_a_run_where_a_virtual_rig_plays_it(tmp_pat
     embedded = template.replace(
         'name = "lab"\n', 'name = "lab"\nembedded = true\nclock = "lockstep"\n'
     )
-    path.write_text(
-        f"{embedded}\n[plant]\n{plant}".replace("watchdog_s = 0.1 ", "watchdog_s = 20.0 ")
-    )
+    assert "watchdog_s = 0.1 " in embedded
+    patient = embedded.replace("watchdog_s = 0.1 ", "watchdog_s = 20.0 ")
+    path.write_text(f"{patient}\n[plant]\n{plant}")
     excitation.write_text(
         'unit = "rad"\nomega_rad_s = 6.283185307179586\ntheta0_rad = [0.2, -0.4]\n'
         "a = [[0.02], [0.02]]\nb = [[0.0], [0.0]]\n"

@@ -152,7 +152,7 @@ def test_forward_dynamics_undo_inverse_dynamics(term, with_human):
     for k in range(3, len(with_human), 97):
         q, dq = with_human.q[k], with_human.dq[k]
         state = np.array([q, dq, q, dq])
-        a.temperature[:] = with_human.motor_temperature[k]
+        a.temperature[:] = with_human.interpolated_temperature[k]
         accelerations(
             a, w, with_human.time[k], state, memory, np.sign(dq), load[k], torque[k], rates
         )

@@ -35,7 +35,10 @@ def warm_and_cold():
     """A session whose second recording was made with the drives 15 °C warmer."""
     motions = session(seconds=15.0)
     warmer = {"run_2.parquet": 15.0}
-    return [replace(m, temperature=m.motor_temperature + warmer.get(m.file, 0.0)) for m in motions]
+    return [
+        replace(m, temperature=m.interpolated_temperature + warmer.get(m.file, 0.0))
+        for m in motions
+    ]
 
 
 def test_friction_that_falls_with_temperature_is_recovered_across_runs(with_human):
@@ -83,7 +86,9 @@ def test_readings_that_are_far_apart_are_joined_by_straight_lines(with_human):
     sparse = np.full(with_human.q.shape, np.nan)
     sparse[::100] = with_human.temperature[::100]
     motion = replace(with_human, temperature=sparse)
-    assert_allclose(motion.motor_temperature[:-100], with_human.temperature[:-100], atol=1e-9)
+    assert_allclose(
+        motion.interpolated_temperature[:-100], with_human.temperature[:-100], atol=1e-9
+    )
     values = PER_DEGREE
     full = FrictionTemperature("knee").torque(with_human, values)
     assert_allclose(FrictionTemperature("knee").torque(motion, values)[:-100], full[:-100])

@@ -12,7 +12,6 @@ import pytest
 
 from exoid_cli.app import run
 from pipelines.contracts import RECORDING
-from pipelines.settings.map_reference import reference
 from pipelines.settings.transmission import gain
 from tests.importing.conftest import MAP
 
@@ -523,11 +522,6 @@ def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp
         "have 800 rows of log.csv in common, expected none: validation needs data that no fit"
         in outcome.err
     )
-
-
-def test_the_map_page_is_up_to_date(request):
-    page = request.config.rootpath / "docs" / "import-map.md"
-    assert page.read_text(encoding="utf-8") == reference(), "run `make docs`"
 
 
 def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):

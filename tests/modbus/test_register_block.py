@@ -11,7 +11,21 @@ from pipelines.settings.rig.register import REGISTERS
 from pipelines.settings.rig.register_map import SensorMap
 
 patient = settings(deadline=None)  # a busy computer is no fault of a block's
+ENDS = {
+    "int16": (1, -32768, 32767),
+    "uint16": (1, 0, 65535),
+    "int32": (2, -2147483648, 2147483647),
+    "uint32": (2, 0, 4294967295),
+    "int64": (4, -9223372036854775808, 9223372036854775807),
+    "uint64": (4, 0, 18446744073709551615),
+}
+"""Registers, and least and greatest count, of each integer."""
 INTEGERS = [name for name in REGISTERS if not name.startswith("float")]
+
+
+def test_each_integer_has_the_size_and_the_ends_of_its_name():
+    registers = {kind: Register(address=0, type=kind) for kind in INTEGERS}
+    assert {kind: (one.registers, *one.counts) for kind, one in registers.items()} == ENDS
 
 
 @pytest.mark.parametrize(

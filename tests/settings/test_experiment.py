@@ -7,15 +7,16 @@ import pytest
 
 from pipelines.contracts.inspection import inspect
 from pipelines.errors import SettingsError
-from pipelines.settings import Experiment, datasets
+from pipelines.settings import Experiment, datasets, map_reference, reference, rig_reference
 from pipelines.settings.base import models_in
 from pipelines.settings.design import Bounds
-from pipelines.settings.reference import reference, sections_of
+from pipelines.settings.rig import RigSettings
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = datasets() / "experiments" / "default.toml"
 RUN = '[[run]]\nname = "a"\nrun = "exo_alone"\npurpose = "train"\n'
-TABLES = list(sections_of(Experiment))
+TABLES = list(reference.sections_of(Experiment))
+PAGES = {"settings": reference, "import-map": map_reference, "rig-keys": rig_reference}
 
 
 def test_the_default_file_says_what_the_defaults_are():
@@ -59,10 +60,20 @@ def test_every_key_stands_in_the_default_file_and_is_described(heading, model):
     assert all(field.description for field in model.model_fields.values())
 
 
-def test_the_settings_page_is_current():
-    assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == reference(), (
-        "run `make docs`"
-    )
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_of_keys_is_current(page):
+    written = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert written == PAGES[page].reference(), "run `make docs`"
+
+
+def test_every_key_of_a_rig_file_has_a_description():
+    tables = {RigSettings, *(model for _, model in reference.sections_of(RigSettings))}
+    fields = {
+        f"{model.__name__}.{name}": field.description
+        for model in tables
+        for name, field in model.model_fields.items()
+    }
+    assert [name for name, description in fields.items() if not description] == []
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,29 @@
 """A rig file whose limits are too wide to protect a wearer is refused."""
 
 import re
+from pathlib import Path
 
 import pytest
 
 from pipelines.errors import SettingsError
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.devices import HumanDriveSettings
+from pipelines.settings.rig.safety import HumanSafetySettings
+from pipelines.settings.rig.safety_bounds import DRIVE, SAFETY
 
+ROOT = Path(__file__).parents[2]
 LAB = (datasets() / "rigs" / "lab.toml").read_text()
+
+
+def test_every_limit_that_stops_a_run_is_bounded_and_on_the_rigs_page():
+    of_safety = {*HumanSafetySettings.model_fields, "watchdog_s"}
+    of_drives = set(HumanDriveSettings.model_fields) - {"angle_rad"}  # a turn bounds angles
+    assert (of_safety - set(SAFETY), of_drives - set(DRIVE)) == (set(), set())
+    page = (ROOT / "docs" / "rig.md").read_text(encoding="utf-8").partition("### Stops")[2]
+    stops = page.partition("### ")[0]
+    keys = [*(f"safety.{name}" for name in of_safety), *of_drives, "angle_rad"]
+    assert [key for key in keys if f"`{key}`" not in stops] == []
 
 
 def loaded(tmp_path, key, value, text=LAB):

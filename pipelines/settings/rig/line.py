@@ -68,20 +68,20 @@ class NetworkLine(Line):
 class TcpLine(NetworkLine):
     """Modbus TCP."""
 
-    transport: Literal["tcp"] = "tcp"
+    transport: Literal["tcp"] = Field("tcp", description="tcp, or nothing.")
 
 
 class RtuOverTcpLine(NetworkLine):
     """RTU frames through a TCP connection, as of a serial device server."""
 
     has_transaction_ids = False
-    transport: Literal["rtu_over_tcp"]
+    transport: Literal["rtu_over_tcp"] = Field(description="rtu_over_tcp, nothing else.")
 
 
 class TlsLine(NetworkLine):
     """Modbus TCP Security: encrypted frames between peers with certificates."""
 
-    transport: Literal["tls"]
+    transport: Literal["tls"] = Field(description="tls, nothing else.")
     port: int = Field(802, ge=1, le=65535, description="TCP port; an embedded rig chooses its own.")
     ca: Path | None = Field(None, description="Checks the device's certificate; else the system.")
     certificate: Path | None = Field(None, description="exoid's, for devices that ask for one.")
@@ -120,7 +120,7 @@ class RtuLine(Line):
     """Modbus RTU on a serial port."""
 
     has_transaction_ids = False
-    transport: Literal["rtu"]
+    transport: Literal["rtu"] = Field(description="rtu, nothing else.")
     serial_port: str = Field(min_length=1, description="Its path, best below /dev/serial/by-id.")
     baud_rate: int = Field(19200, ge=300, description="Bits a second.")
     parity: Literal["even", "odd", "none"] = Field("even", description="Parity bit.")

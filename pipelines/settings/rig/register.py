@@ -1,5 +1,6 @@
 """A register: where a value lies in a device, and how its bits are read."""
 
+import struct
 from math import inf
 from typing import Literal, Self, get_args
 
@@ -11,16 +12,18 @@ from pipelines.settings.base import Settings
 RegisterType = Literal[
     "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
 ]
-REGISTERS = {
-    "int16": 1,
-    "uint16": 1,
-    "int32": 2,
-    "uint32": 2,
-    "int64": 4,
-    "uint64": 4,
-    "float32": 2,
-    "float64": 4,
+STRUCT_CODES: dict[RegisterType, str] = {
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
 }
+"""Code of each type in Python's ``struct``; size, sign and range follow from it."""
+REGISTERS = {kind: struct.calcsize(f">{code}") // 2 for kind, code in STRUCT_CODES.items()}
 """Registers of 16 bits that a value takes."""
 
 Unit = Literal[
@@ -92,12 +95,17 @@ class Register(Settings):
     @property
     def is_float(self) -> bool:
         """Whether the bits are those of a floating-point number."""
-        return self.type.startswith("float")
+        return STRUCT_CODES[self.type] in "fd"
 
     @property
     def is_plain_count(self) -> bool:
         """Whether it is an unsigned integer without scale and offset."""
-        return self.type.startswith("u") and (self.scale, self.offset) == (1.0, 0.0)
+        return self._is_unsigned and (self.scale, self.offset) == (1.0, 0.0)
+
+    @property
+    def _is_unsigned(self) -> bool:
+        # Codes of unsigned integers are capital letters.
+        return STRUCT_CODES[self.type].isupper()
 
     @property
     def counts(self) -> tuple[int, int] | None:
@@ -105,7 +113,7 @@ class Register(Settings):
         if self.is_float:
             return None
         bits = 16 * self.registers
-        if self.type.startswith("u"):
+        if self._is_unsigned:
             return 0, 2**bits - 1
         return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
 
