@@ -17,7 +17,7 @@ from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.diagnosis.verdict.error_budget import error_budget
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.summary import finding_in_words, floor_from, summary
-from pipelines.diagnosis.verdict.ties import tie_between
+from pipelines.diagnosis.verdict.tie_reasons import tie_between
 from pipelines.diagnosis.verdict.unexplained import unexplained
 from pipelines.effects import Effect
 from pipelines.estimation.angle_noise import CUTOFF_HZ
