@@ -251,7 +251,7 @@ class Effect(ABC):
     cuff_coherence: ClassVar[str] = ""
     """Sentence on the coherence of cuff forces and drive torques, if that is evidence for it."""
     reversal_travel: ClassVar[str] = ""
-    """Name of what takes up a travel while friction changes sign at a reversal; empty if nothing
+    """What takes up a travel while friction changes sign at a reversal, in words; empty if nothing
     does."""
     order_tracked: ClassVar[bool] = False
     """True if order tracking finds its lines over the joint's angle. Each of its shapes is then the

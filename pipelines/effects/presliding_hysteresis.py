@@ -21,7 +21,7 @@ class PreslidingHysteresis(Effect):
         "move the empty joint to and fro by a few hundredths of its travel and plot torque against"
         " position"
     )
-    reversal_travel = name
+    reversal_travel = "friction that builds up before the surfaces slide"
     linear = (Parameter("friction_torque", "N·m", "friction torque once sliding", "F", (0.5, 8.0)),)
     shape = (
         Parameter(

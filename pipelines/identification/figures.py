@@ -111,6 +111,6 @@ def _residuals(run: _RunData, joint: Joint) -> list[Chart]:
 
 def _error(run: _RunData, joint: Joint) -> str:
     if not run.scored:
-        return f"{joint.name} never moves, so that nothing is scored"
+        return f"{joint.name} is not scored, as not all joints move at once"
     residual, torque = (run.rms(joint.column(name)) for name in ("residual", "torque"))
     return f"{joint.name} RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"

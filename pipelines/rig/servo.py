@@ -113,6 +113,7 @@ class Servo:
         cycles = floor(waited + EARLY)
         if cycles != floor(waited - LATE):
             return cycles
+        # Between n + LATE and n + 1 - EARLY, the speed of the set-points decides: n or n + 1.
         return min(
             max(floor(waited), 0),
             ceil(waited),
@@ -161,5 +162,4 @@ class Servo:
             slower = max(abs(self._step) - self._slowing, 0.0)
             reference = self._last + (slower if self._step > 0 else -slower)
         low, high = self._limits
-        # Between n + LATE and n + 1 - EARLY, the speed of the set-points decides: n or n + 1.
         return min(max(reference, low), high)

@@ -59,7 +59,7 @@ def law_label(kind: str, joint: str | None, wearer: str = "all") -> str:
 
 def kind_and_joint(label: str) -> tuple[str, str | None]:
     """Return a law's kind, and its joint; None where it is of no single joint."""
-    kind, _, joint = label.removeprefix(LAW).partition("@")
+    kind, _, joint = label.removeprefix(LAW).partition("/")[0].partition("@")
     return kind, joint or None
 
 

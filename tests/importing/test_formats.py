@@ -52,6 +52,18 @@ def test_comments_among_the_rows_are_no_rows(imported, pendulum, write_csv):
     assert_is_the_pendulum(imported(path), pendulum)
 
 
+@pytest.mark.parametrize("mark", ["#", "!", "*"])
+def test_a_mark_of_the_maps_own_is_no_row_and_may_hold_the_header(
+    imported, pendulum, write_csv, mark
+):
+    path = write_csv(pendulum.columns())
+    header, rest = path.read_text().split("\n", 1)
+    # More numbers than a row of data has names: only the mark tells that they are none.
+    path.write_text(f"{mark} 1, 2, 3, 4\n{mark} 5, 6, 7, 8\n{mark} {header}\n{rest}")
+    text = f'[source]\ncomment = "{mark}"\n{MAP}'
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+
+
 @pytest.mark.parametrize("units", ["[s],[rad],[rad/s],[Nm]", "sec,radians,rad/sec,Nm"])
 def test_a_row_of_units_below_the_header_belongs_to_the_names(imported, pendulum, write_csv, units):
     path = write_csv(pendulum.columns())

@@ -162,6 +162,7 @@ class _Table:
 
     delimiter: str
     decimal: str
+    comment_marks: tuple[str, ...]
     first: int
     """Line of the first row."""
     width: int
@@ -175,13 +176,19 @@ class _Table:
         else:
             # A comma cannot separate fields and be the decimal point, too.
             decimals = ["."] if delimiter == "," else [".", ","]
-        tables = [cls._with(lines, delimiter, decimal) for decimal in decimals]
+        # A line that begins with the map's own mark is no row, and may hold the header.
+        marks = (settings.comment,) if settings.comment else COMMENTS
+        tables = [cls._with(lines, delimiter, decimal, marks) for decimal in decimals]
         return max(filter(None, tables), key=lambda table: table.fields_of_numbers, default=None)
 
     @classmethod
-    def _with(cls, lines: Sequence[str], delimiter: str, decimal: str) -> "_Table | None":
+    def _with(
+        cls, lines: Sequence[str], delimiter: str, decimal: str, marks: tuple[str, ...]
+    ) -> "_Table | None":
         rows = [
-            (k, _fields(line, delimiter)) for k, line in enumerate(lines) if not _is_comment(line)
+            (k, _fields(line, delimiter))
+            for k, line in enumerate(lines)
+            if not line.lstrip().startswith(marks)
         ]
         data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
         if not data:
@@ -189,7 +196,8 @@ class _Table:
         width = Counter(len(fields) for _, fields in data).most_common(1)[0][0]
         data = [(k, fields) for k, fields in data if len(fields) == width]
         numbers = sum(_is_number(field, decimal) for _, fields in data for field in fields)
-        return cls(delimiter, decimal, data[0][0], width, numbers) if width > 1 else None
+        table = cls(delimiter, decimal, marks, data[0][0], width, numbers)
+        return table if width > 1 else None
 
     @property
     def numbered(self) -> tuple[str, ...]:
@@ -203,7 +211,7 @@ class _Table:
         """
         # Many tools write the header as a comment, so its mark is removed.
         above = [
-            _fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter)
+            _fields(line.lstrip("".join(self.comment_marks) + " "), self.delimiter)
             for line in lines[: self.first]
         ]
         fitting = [fields for fields in above if len(fields) == self.width and any(fields)]
@@ -226,10 +234,6 @@ def _fields(line: str, delimiter: str) -> list[str]:
         field.strip()
         for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
     ]
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith(COMMENTS)
 
 
 def _are_numbers(fields: list[str], decimal: str) -> bool:
