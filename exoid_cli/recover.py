@@ -23,7 +23,8 @@ def recover(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The recording to write, of one.")
+        Path | None,
+        typer.Option("--output", "-o", help="The recording of one JOURNAL."),
     ] = None,
 ) -> None:
     """Make a recording of a killed run's journal, and say what is missing.
@@ -77,7 +78,9 @@ def _in_words(recording: "Recovery") -> str:
     text += f"; {gaps}"
     if summary.damaged:
         text += "; the journal is damaged or cut off, and is kept: check the disk"
-    return f"{text}; {summary.abort or 'the run had ended, only its recording was not written'}"
+    return (
+        f"{text}; {summary.abort or 'the run was complete, but its recording had not been written'}"
+    )
 
 
 def _as_json(recording: "Recovery") -> dict:

@@ -111,7 +111,7 @@ def _show(report: "RigReport") -> None:
             (a.joint, f"{a.gain:.3f}", f"{a.delay_s * 1e3:.0f}", f"{a.torque_with_speed:.2f}")
             for a in report.answers
         ]
-        headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
+        headings = ("joint", "angle per set-point", "delay ms", "torque-velocity correlation")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
         console.note(
             "No movement shows the scale of the torque. Hold a known weight, see docs/rig-check.md."

@@ -30,9 +30,9 @@ class Holding:
         self._ended.set()
 
     async def _hold(self, joint: int) -> None:
-        """Send a drive set-points for as long as others are awaited.
+        """Send one drive set-points while the plan waits for another one.
 
-        Raise as soon as something is wrong, for whoever awaits does not see it.
+        Errors are raised here: the plan, which waits, cannot see them.
         """
         # Share of a sample between two looks whether a drive is sent nothing.
         look_pause = 0.25
@@ -51,12 +51,14 @@ class Holding:
             is_delayed = time.monotonic() - due > look_pause * period
             self._exchange.refuse_signals()
             self._supervisor.reason.refuse()
-            if tracker.sent_at != sent_at:  # no drive is awaited for long
+            if tracker.sent_at != sent_at:
+                # The plan, or another task, has sent a set-point meanwhile.
                 patience = SLACK_SAMPLES * period
-            elif drive.device.awaited_s > period:  # it is the one that is awaited
+            elif drive.device.awaited_s > period:
+                # The plan waits for this very drive.
                 look_at = time.monotonic() + look_pause * period
-            # This computer was late, and so with the plan: following it goes first.
             elif is_delayed and due > look_at:
+                # This computer was late: first the plan catches up.
                 look_at = time.monotonic() + period
             else:
                 await self._send(joint)

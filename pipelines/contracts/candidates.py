@@ -26,7 +26,7 @@ CANDIDATES = Contract(
         Column(
             "gain_nm",
             "N·m",
-            "what the causes take together of the baseline's RMSE, where most",
+            "largest reduction of the baseline's RMSE by all causes, over the joints",
             nullable=True,
         ),
         Column("gain_low_nm", "N·m", "lower end of its 95 % interval", nullable=True),
@@ -35,7 +35,7 @@ CANDIDATES = Contract(
         Column(
             "verdict",
             "",
-            "what became of it",
+            "decision on this set",
             dtype=TEXT,
             choices=("named", "indistinguishable", "unlisted", "absorbed", "rejected"),
         ),

@@ -15,7 +15,7 @@ from pipelines.mechanics.machine import THE_LEG
 
 CONFIRM_A_SLIDES = (
     "remove the drive, or switch it off, and hold the joint at several positions with a spring"
-    " balance: the force of a spring grows along the way, that of a weight is constant"
+    " balance: the force of a spring grows with the travel, that of a weight is constant"
 )
 
 CONFIRM_WITHOUT_GRAVITY = (
@@ -42,17 +42,18 @@ class ParallelSpring(Effect):
         " friction"
     )
     confirm = (
-        "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
+        "lay the machine on its side, so that gravity does not act, and hold the joint at several"
+        " angles"
     )
     element = Element.SPRING
     ties: ClassVar = {
         "torque_offset": Tie(
-            "a soft spring that is far wound up adds little but a constant torque",
+            "a soft spring with a large preload adds little but a constant torque",
             "let the joint rest with the drive off, and unhook the spring: an offset of the sensor"
             " stays",
         ),
         "coulomb_asymmetry": Tie(
-            "a soft spring that is far wound up adds little but a constant torque. While the joint"
+            "a soft spring with a large preload adds little but a constant torque. While the joint"
             " always moves, friction that differs with direction does the same",
             "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
         ),

@@ -30,8 +30,7 @@ def link_behind_motor(
 
 def rotor_among_links(motion: Motion, joint: str) -> float:
     """Return the rotor's inertia that the rigid body's parameters include in the links, kg·m²."""
-    # Inertia of a rotor that the rigid body's parameters include, kg·m²: the middle of the typical
-    # range.
+    # Middle of a rotor's typical range, kg·m².
     rotor_inertia = 0.17
     counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
     return rotor_inertia if counted else 0.0

@@ -93,9 +93,9 @@ def estimated(fit: Fit) -> Estimate:
     return Estimate(**vars(fit), covariance=covariance, critical=S.critical)
 
 
-def distrust(settled: bool, after: str) -> tuple[str, ...]:
+def convergence_remark(settled: bool, after: str) -> tuple[str, ...]:
     """Return a remark on a search that did not converge; empty if it did."""
-    return () if settled else (f"did not settle in {after}; distrust its values",)
+    return () if settled else (f"did not converge in {after}; do not rely on its values",)
 
 
 def carry_of(problem: Problem, sensitivity: NDArray, slope: NDArray) -> NDArray:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.closed_loop import closed_loop
 from pipelines.estimation.durbin_wu_hausman import DurbinWuHausman, durbin_wu_hausman
-from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust, estimated
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark, estimated
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -76,7 +76,7 @@ class InstrumentalVariables(Estimator):
         settled = bool(change.max() < SETTLED)
         about = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
         remarks = (
-            *distrust(settled, f"{ITERATIONS} iterations"),
+            *convergence_remark(settled, f"{ITERATIONS} iterations"),
             _sentence(test, problem.names, solution),
         )
         return replace(solution, about=about, remarks=remarks)

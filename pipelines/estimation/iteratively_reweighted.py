@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -114,7 +114,7 @@ class IterativelyReweighted(Estimator):
                 "scale_nm": scale.tolist(),
                 "rejected_share": shares,
             },
-            distrust(settled, f"{ITERATIONS} iterations") + _of_outliers(shares),
+            convergence_remark(settled, f"{ITERATIONS} iterations") + _of_outliers(shares),
         )
 
 

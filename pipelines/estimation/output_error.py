@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pipelines.dynamics.replay import replay
-from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark
 from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -68,7 +68,9 @@ class OutputError(Estimator):
         fit = _fit(problem, values, size, weights)
         about = fit.about | {"simulations": simulations, "settled": settled}
         return replace(
-            fit, about=about, remarks=distrust(settled, f"{simulations} simulations of all runs")
+            fit,
+            about=about,
+            remarks=convergence_remark(settled, f"{simulations} simulations of all runs"),
         )
 
 

@@ -358,8 +358,8 @@ def _covariance(
 ) -> NDArray:
     """Return the covariance of some rows, with the uncertainty of step 1 and of shapes.
 
-    A shape and its amplitudes are estimated from the share that each explains alone: given the
-    shape, an amplitude's error hardly correlates with the shape's, and not at all in white noise.
+    Errors of shapes and of amplitudes count as independent. In white noise they are, since each is
+    estimated from what the other does not explain.
     """
     to_shapes, of_shapes = _sensitivities(training, extension.covariance)
     p, h = to_shapes.shape

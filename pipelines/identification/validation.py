@@ -23,7 +23,7 @@ class Score:
     """On every valid sample."""
     torque_rms: NDArray
     samples: int
-    """Number of blocks of ``rmse``."""
+    """Number of block averages in ``rmse``."""
 
     def by_joint(self) -> list[dict[str, float]]:
         """Return the errors of each joint for a file's metadata."""

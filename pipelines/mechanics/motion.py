@@ -34,12 +34,19 @@ class Motion:
     """
 
     time: NDArray
+    """(n,) s."""
     q: NDArray
+    """(n, J) rad."""
     dq: NDArray
+    """(n, J) rad/s."""
     ddq: NDArray
+    """(n, J) rad/s²."""
     torque: NDArray
+    """(n, J) N·m."""
     segment: NDArray
+    """(n,) number of the stretch without a gap."""
     valid: NDArray
+    """(n,) whether all channels of a sample are usable."""
     run: str = "exo_alone"
     purpose: str = "train"
     sample_rate_hz: float = 200.0

@@ -41,7 +41,7 @@ class Samples:
     reference: NDArray
     """(n, J) rad, set-point at the window's end."""
     forces: NDArray
-    """(n, 4, 3) N; only zeros and noise in an empty machine."""
+    """(n, 4, 3) N; in an empty machine the sensors' zeros and noise alone."""
     truth: NDArray
     """(n, 4, J) true link angle, speed, acceleration and motor angle, for tests."""
 

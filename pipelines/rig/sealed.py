@@ -29,7 +29,7 @@ class SealedFile(Settings):
     """Possible hidden effects, and the seed that chooses among them."""
 
     seed: int = Field(ge=0, description="Chooses the effects, their joints and their values.")
-    hidden: int = Field(1, ge=0, description="How many of the possibilities are there.")
+    hidden: int = Field(1, ge=0, description="Number of possibilities that are present.")
     possibility: tuple[Possibility, ...] = Field(min_length=1, description="The possibilities.")
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Bounds beyond which a length or the gravity was given in another unit."""
+"""Upper bounds that find a length or a gravity in a wrong unit."""
 
 from typing import Annotated
 

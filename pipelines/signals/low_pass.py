@@ -59,7 +59,7 @@ def shortest(rate_hz: float, cutoff_hz: float) -> int:
     Returns
     -------
     int
-        Samples: each side needs padding of one time constant.
+        Samples: each side needs padding of at least one period of the cut-off.
     """
     return max(DERIVATIVE_STENCIL, int(np.ceil(rate_hz / cutoff_hz))) + 1
 

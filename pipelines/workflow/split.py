@@ -43,12 +43,12 @@ def split(experiment: Experiment, folder: Path) -> None:
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             write_text(path, text)
     rules = list(_rules(steps))
-    if records and not _may_share_the_machine(experiment):
+    if records and not _may_run_in_parallel(experiment):
         rules += ["", *ONE_AT_A_TIME]
     write_text(folder / "graph.mk", "\n".join(rules) + "\n")
 
 
-def _may_share_the_machine(experiment: Experiment) -> bool:
+def _may_run_in_parallel(experiment: Experiment) -> bool:
     """Return whether other steps may run during a recording, each run on a rig of its own."""
     rig = load_rig(experiment.file(experiment.acquire.rig))
     # In lockstep no time passes while the computer does something else.

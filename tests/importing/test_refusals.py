@@ -273,7 +273,7 @@ SLIPS = [
     (
         'column = "torque"',
         f'expression = "{"-" * 300}torque"',
-        "at most 100 of them; compute a column",
+        "at most 100 operations; compute a column",
     ),
     (
         'column = "torque"',

@@ -29,7 +29,7 @@ class CuffChecks:
         sent_travel : float
             How far the joints were sent up to then, rad.
         """
-        # No sensor resolves less; a float whose words are swapped often is.
+        # No sensor resolves less: a smaller value but 0 is a float with swapped words.
         least_force_n = 1e-6
         for force, name in zip(forces.tolist(), CUFFS, strict=True):
             if any(map(isnan, force)):
@@ -44,9 +44,9 @@ class CuffChecks:
             cycles, sent = cycle - held.since, sent_travel - held.sent_travel
             if cycles >= STUCK_CYCLES and sent > STUCK_RAD:
                 return (
-                    f"sensor {name}: counts on, but reports forces of {_three(force)} N for"
-                    f" {cycles / self._rate:.3f} s while the leg was sent to move; its registers"
-                    " are frozen"
+                    f"sensor {name}: its counter advances, but its forces stay {_three(force)} N"
+                    f" for {cycles / self._rate:.3f} s while the leg was sent to move; its"
+                    " registers are frozen"
                 )
         return None
 

@@ -35,7 +35,7 @@ def column(motion: Motion, joint: int, quantity: str) -> str:
 
 
 def stretches(marked: NDArray) -> NDArray:
-    """Return the runs of true samples.
+    """Return the stretches of consecutive true samples.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tup
 def _bodies(baseline: Baseline) -> dict[str, NDArray]:
     """Return the columns of the rigid bodies, (bodies, parameters).
 
-    Each row of a body is the sum of its columns.
+    A row of the table, of one kind of run, is the sum of these columns.
     """
     layout = baseline.layout
     if len(layout.bodies) == 1:

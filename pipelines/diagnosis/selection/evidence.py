@@ -216,11 +216,10 @@ def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -
 
 
 def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, most: int) -> float:
-    """Return the part of one output's rows that columns explain, in squared units of noise.
+    """Return the power of one output that columns explain beyond what noise alone would.
 
-    The part of noise alone that they would explain is subtracted. Slow noise has no form that could
-    be wrong, but its variance is an estimate: the part that it explains counts at most as one for
-    each of its coefficients.
+    Its unit is the variance of the noise. Slow noise has no form that could be wrong, but its
+    variance is an estimate, so it counts at most one unit for each of its coefficients.
 
     Parameters
     ----------
@@ -231,7 +230,7 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     variance : (s,) array
         Variance of slow noise's coefficients.
     most : int
-        Number of these curves that belong to this output.
+        Number of these curves that belong to this output, and the most that slow noise counts.
     """
     # Slow noise comes first, so that only the part that the rest adds to it counts in full.
     rest = np.setdiff1d(np.arange(len(gram)), slow)

@@ -86,7 +86,7 @@ class Expression:
                 raise self._refusal()
         if sum(hasattr(node, "op") for node in ast.walk(tree)) > most_operations:
             raise self._refusal(
-                f", at most {most_operations} of them; compute a column of its own instead"
+                f", at most {most_operations} operations; compute a column of its own instead"
             )
         if not self.names:
             raise self._refusal(", one column at least")
