@@ -55,7 +55,9 @@ def refuse_unknown_unit(name: str, unit: str) -> None:
     """
     # Lengths, masses and forces are the same at all joints: only their products with angles differ.
     of_joint = [part for part in ("N·m", "rad", "turn") if part in unit]
-    if of_joint and unit not in UNITS:
+    # A parameter at a prismatic joint has its unit there.
+    known = {*UNITS, *(one.prismatic for one in UNITS.values())}
+    if of_joint and unit not in known:
         raise ValueError(
             f"{name}: found the unit {unit}, expected one without {' and '.join(of_joint)}, or one"
             f" of {', '.join(UNITS)}; add it to UNITS in pipelines/contracts/joint_units.py"

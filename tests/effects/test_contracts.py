@@ -33,6 +33,8 @@ def test_a_unit_that_exoid_cannot_convert_for_a_slide_is_refused_and_one_of_no_j
         "s",
     ]
     assert Parameter("phase", "rad²", of_joint=False, **about).unit == "rad²"
+    # cycles a turn, of a slide
+    assert Parameter("cycles", "rad/m", **about).unit == "rad/m"
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0].strip("`"))
