@@ -89,7 +89,7 @@ def window_panels(joint: Joint, replays: Sequence[DrawnTable]) -> tuple[Panel, P
     )
 
 
-def torque_panels(joint: Joint, loop: pd.DataFrame) -> tuple[Panel, Panel]:
+def drives_loop_panels(joint: Joint, loop: pd.DataFrame) -> tuple[Panel, Panel]:
     """Return a joint's torque in the drives' simulated loop, and its error."""
     measured = loop[joint.column("torque_measured")].to_numpy()
     simulated = loop[joint.column("torque")].to_numpy()

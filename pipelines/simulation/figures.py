@@ -13,10 +13,10 @@ from pipelines.plotting.chart import Chart, DrawnTable, Panel, Role, Series, nam
 from pipelines.plotting.matplotlib_charts import chart_figure
 from pipelines.plotting.simulation_panels import (
     GAIN,
+    drives_loop_panels,
     loop_panels,
     settled_error,
     sweep_panel,
-    torque_panels,
     window_panels,
 )
 from pipelines.plotting.style import STYLE, save
@@ -122,7 +122,7 @@ def draw_replay(
     title = f"simulation of {name} under the recorded torque, in windows of 1 s"
     _draw(title, open_loop, joints, panels, stem)
     if closed_loop is not None:
-        panels = [torque_panels(joint, closed_loop) for joint in joints]
+        panels = [drives_loop_panels(joint, closed_loop) for joint in joints]
         title = f"simulation of {name} in the drives' loop, under the recorded references"
         _draw(title, closed_loop, joints, panels, stem.with_name(f"{stem.name}-closed-loop"))
 
