@@ -247,6 +247,8 @@ class Verdict(_Object):
     """Empty if nothing is missing; files of older versions lack it and the next three."""
     sought_on: Literal["train", "all"] = "train"
     """The runs in which causes were sought; files of older versions lack it."""
+    fitted_to: Literal["train", "all"] = "train"
+    """The runs to which the models are fitted; files of older versions lack it."""
     router: dict[str, Shares] = {}
     posterior: Posterior | None = None
     """None if acquisition is at fault."""

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
+from pipelines.diagnosis.fit.trial import Trial
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
@@ -32,8 +33,10 @@ class Diagnosis:
     """A session, its named causes, and the model with them."""
 
     data: TrainingData
-    prepared: PreparedRuns
-    """The training runs under the baseline alone."""
+    noise: NoiseModel
+    """Of the training runs."""
+    trial: Trial
+    """Which samples the models are fitted to, and which score them."""
     selected: Selection
     before: ValidationResult
     """The baseline."""
@@ -59,9 +62,9 @@ class Diagnosis:
         return self.data.baseline
 
     @property
-    def train(self) -> tuple[Run, ...]:
-        """The training runs, with joint loads computed from the baseline."""
-        return self.prepared.runs
+    def fitted(self) -> tuple[Run, ...]:
+        """The runs that the models are fitted to, with joint loads computed from the baseline."""
+        return self.trial.runs
 
     @property
     def validate(self) -> tuple[Run, ...]:
@@ -124,7 +127,7 @@ class Diagnosis:
     @property
     def has_periods(self) -> bool:
         """Whether some recording names the period of its motion."""
-        return any(run.motion.period_s for run in (*self.train, *self.validate))
+        return any(run.motion.period_s for run in (*self.fitted, *self.validate))
 
     @property
     def is_mostly_unexplained(self) -> bool:
@@ -159,8 +162,10 @@ class Diagnosis:
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """The per-run values of the named causes, by label."""
+        files = {run.motion.file for run in self.fitted}
+        others = [run for run in self.validate if run.motion.file not in files]
         return values_of_each_run(
-            self.after.fit, self.baseline, self.uncertainty, self.train, self.validate
+            self.after.fit, self.baseline, self.uncertainty, self.fitted, others
         )
 
     @cached_property
@@ -191,13 +196,13 @@ class Diagnosis:
     @property
     def unrealizable(self) -> list[str]:
         """Reasons why no real machine has the extended model's rigid bodies; empty if one may."""
-        geometry = self.train[0].motion.geometry
+        geometry = self.fitted[0].motion.geometry
         return unrealizable(self.parameters, self.baseline.machine, geometry)
 
     @cached_property
     def lacks_mass(self) -> bool:
         """Whether a rigid body's least inertia is negative by more than its standard error."""
-        table, geometry = self.parameters.reset_index(drop=True), self.train[0].motion.geometry
+        table, geometry = self.parameters.reset_index(drop=True), self.fitted[0].motion.geometry
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.

@@ -6,38 +6,12 @@ import numpy as np
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.baseline import with_load
-from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
-from pipelines.diagnosis.fit.joint_refinement import Refinement
-from pipelines.diagnosis.fit.validation import (
-    ValidationResult,
-    log_likelihoods,
-    removed_share,
-    without_each,
-)
+from pipelines.diagnosis.evidence.noise_model import NoiseModel
+from pipelines.diagnosis.fit.trial import Trial
+from pipelines.diagnosis.fit.validation import ValidationResult, log_likelihoods, removed_share
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selection import Selection
-from pipelines.diagnosis.training_data import TrainingData
-
-
-def baseline_alone(data: TrainingData, prepared: PreparedRuns) -> ValidationResult:
-    """Return the baseline without causes, fitted, and measured on the validation runs.
-
-    Parameters
-    ----------
-    data : TrainingData
-        Training and validation runs.
-    prepared : PreparedRuns
-        The training runs.
-    """
-    # Loads follow from values of the training runs, so that validation runs stay unseen.
-    loaded = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
-    return ValidationResult.of(_refinement(prepared)(()), loaded, data.baseline)
-
-
-def _refinement(prepared: PreparedRuns) -> Refinement:
-    return Refinement(prepared.runs, prepared.baseline, prepared.weights)
 
 
 @dataclass(frozen=True)
@@ -45,6 +19,8 @@ class JudgedFit:
     """The named causes after judging, fitted to the training runs."""
 
     selected: Selection
+    trial: Trial
+    """Which samples it is fitted to, and which judge it."""
     before: ValidationResult
     """The baseline."""
     after: ValidationResult
@@ -63,39 +39,46 @@ class JudgedFit:
         )
 
 
-def judged_fit(selected: Selection, prepared: PreparedRuns, before: ValidationResult) -> JudgedFit:
+def judged_fit(selected: Selection, trial: Trial, noise: NoiseModel) -> JudgedFit:
     """Fit the named causes, and judge them on the validation runs until no charge remains.
 
     The most harmful cause is charged first: in a model with it, other causes may seem to harm too.
     Of causes that the searched runs cannot separate, those that predict the validation runs worse
     than the best of them are charged. Last, each named cause is tested for being a look-alike
     (``selection/look_alikes.py``). Those that remain are fitted again, and not judged again.
+
+    Parameters
+    ----------
+    selected : Selection
+    trial : Trial
+        Which samples causes are fitted to, and which judge them.
+    noise : NoiseModel
+        Of the training runs.
     """
-    refine = _refinement(prepared)
-    fitted: tuple[Candidate, ...] | None = None
+    before, fitted = trial(()), None
     while True:
         # A charge may change probabilities only, and then the fits stand.
         if selected.candidates != fitted:
             fitted = selected.candidates
-            after, without = _fitted(selected, refine, prepared, before)
-            whole = log_likelihoods(after, prepared.noise)
+            after, without = _fitted(fitted, trial, before)
+            whole = log_likelihoods(after, noise)
             ratios = {
-                label: float(np.sum(whole - log_likelihoods(less, prepared.noise)))
+                label: float(np.sum(whole - log_likelihoods(less, noise)))
                 for label, less in without.items()
             }
         harm = selected.worst_harm(ratios)
         if harm:
             selected = selected.judged(harm, harms=True)
-        elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
+        elif shortfalls := _shortfalls(selected, after, trial, before, noise):
             selected = selected.judged(shortfalls)
         else:
             break
     # Last, because the share that a cause removes depends on the others that stay.
     selected = selected.with_look_alikes(_removed(after, without))
     if selected.candidates != fitted:
-        after, without = _fitted(selected, refine, prepared, before)
-    log_likelihood = float(log_likelihoods(after, prepared.noise).sum())
-    return JudgedFit(selected, before, after, without, log_likelihood)
+        after, without = _fitted(selected.candidates, trial, before)
+    log_likelihood = float(log_likelihoods(after, noise).sum())
+    return JudgedFit(selected, trial, before, after, without, log_likelihood)
 
 
 def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> dict[str, float]:
@@ -110,16 +93,15 @@ def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> d
 def _shortfalls(
     selected: Selection,
     after: ValidationResult,
-    refine: Refinement,
-    prepared: PreparedRuns,
+    trial: Trial,
     before: ValidationResult,
+    noise: NoiseModel,
 ) -> dict[str, float]:
     """Return by how much each tie predicts the validation runs worse than the best of its group.
 
     Log likelihoods, by variant; of groups that were not compared yet.
     """
     shortfalls: dict[str, float] = {}
-    noise = prepared.noise
     for n, one in enumerate(selected.answer.named):
         rest = selected.candidates[:n] + selected.candidates[n + 1 :]
         rivals = selected.rivals_of(n)
@@ -127,8 +109,7 @@ def _shortfalls(
             continue
         likelihoods = {one.element.variant: log_likelihoods(after, noise)}
         for variant, rival in rivals.items():
-            fitted = ValidationResult.of(refine((*rest, rival)), before.runs, prepared.baseline)
-            likelihoods[variant] = log_likelihoods(fitted, noise)
+            likelihoods[variant] = log_likelihoods(trial((*rest, rival)), noise)
         # Twice a log likelihood ratio is the explained square in units of the noise.
         explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
         weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
@@ -143,16 +124,14 @@ def _shortfalls(
 
 
 def _fitted(
-    selected: Selection, refine: Refinement, prepared: PreparedRuns, before: ValidationResult
+    candidates: tuple[Candidate, ...], trial: Trial, before: ValidationResult
 ) -> tuple[ValidationResult, dict[str, ValidationResult]]:
-    """Fit the named causes, and the same without each of them, and validate each fit."""
-    candidates = selected.candidates
+    """Fit causes, and the same without each of them, and score each fit."""
     if not candidates:
         return before, {}
-    baseline = prepared.baseline
-    after = ValidationResult.of(refine(candidates), before.runs, baseline)
+    after = trial(candidates)
+    labels = list(dict.fromkeys(cause.label for cause in after.fit.causes))
     # One cause less one is the baseline, which is fitted already.
     if len(candidates) == 1:
-        return after, {candidates[0].label: before}
-    without = without_each(after.fit, prepared.runs, before.runs, baseline, prepared.weights)
-    return after, without
+        return after, {labels[0]: before}
+    return after, {one: trial.keeping(after, {*labels} - {one}) for one in labels}

@@ -47,7 +47,7 @@ def falls_figure(falls: Sequence[Fall]) -> Figure:
     units = " and ".join(dict.fromkeys(fall.unit for fall in falls))
     axis.set_yticks(range(len(falls)), [fall.joint for fall in falls])
     axis.invert_yaxis()
-    axis.set_xlabel(f"rms error on runs that no fit has seen, {units}")
+    axis.set_xlabel(f"rms error on data that no fit has seen, {units}")
     axis.grid(axis="y", visible=False)
     legend: dict[str, Artist] = {"rigid body and friction": Patch(color=GREY)}
     if falls[0].after is not None:

@@ -42,7 +42,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         findings=reported,
         dropped=frozenset(),
     )
-    return _diagnosis(d.data, d.prepared, judged_fit(given, d.prepared, d.before))
+    return _diagnosis(d.data, d.noise, judged_fit(given, d.trial, d.noise))
 
 
 def _best(d: Diagnosis, label: str):

@@ -143,7 +143,7 @@ def bristles(tmp_path_factory):
 def test_of_a_joint_whose_play_is_named_nothing_more_is_reported(bristles):
     runs, baseline = bristles.train, bristles.baseline
     play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
-    fitted = fit((play,), runs, baseline, bristles.prepared.weights)
+    fitted = fit((play,), runs, baseline, bristles.trial.weights)
     assert [one.joint for one in built_up(fitted, baseline, bristles.train, bristles.validate)] == [
         "knee"
     ]

@@ -124,16 +124,14 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     short = replace(stuck, floor=replace(stuck.floor, from_periods=False))
     estimate = ", so the noise floor is estimated from the band above the motion."
     assert f"No validation run holds two periods{estimate}" in verdict(short)["summary"]
-    prepared = stuck.prepared
-    without_periods = replace(prepared, noise=replace(prepared.noise, from_periods=False))
-    weighed = replace(stuck, prepared=without_periods)
+    without_periods = replace(stuck.noise, from_periods=False)
+    weighed = replace(stuck, noise=without_periods)
     assert "No training run holds two periods" in verdict(weighed)["summary"]
-    neither = replace(short, prepared=without_periods)
+    neither = replace(short, noise=without_periods)
     assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
-    runs = tuple(without_a_period(run) for run in stuck.train)
-    without_periods = replace(without_periods, runs=runs)
+    trial = replace(stuck.trial, runs=tuple(without_a_period(run) for run in stuck.fitted))
     before = replace(stuck.before, runs=[without_a_period(run) for run in stuck.validate])
-    summary = verdict(replace(short, prepared=without_periods, before=before))["summary"]
+    summary = verdict(replace(neither, trial=trial, before=before))["summary"]
     assert f"No recording names a period{estimate}" in summary
 
 

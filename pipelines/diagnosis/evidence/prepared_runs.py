@@ -67,10 +67,7 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
     baseline : Baseline
         Rigid body, friction and known effects.
     """
-    columns = tuple(columns_under((), run, baseline)[0] for run in runs)
-    gram = gram_of_runs(runs, columns)
-    weights = weights_under(gram)
-    values = solve(gram, weights)
+    columns, weights, values = baseline_fit(runs, baseline)
     # No column of the baseline needs a load, so its bodies are known first.
     loaded = tuple(with_load(run, baseline, values) for run in runs)
     residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
@@ -95,6 +92,29 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
         tuple(lines),
         bursts(loaded, residuals),
     )
+
+
+def baseline_fit(
+    runs: Sequence[Run], baseline: Baseline
+) -> tuple[tuple[NDArray, ...], NDArray, NDArray]:
+    """Fit the baseline alone to the usable samples of some runs.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        m blocks of O outputs each.
+    baseline : Baseline
+        Of b columns.
+
+    Returns
+    -------
+    tuple of arrays
+        Columns of each run (m, O, b), the outputs' inverse variances (O,), and values (b,).
+    """
+    columns = tuple(columns_under((), run, baseline)[0] for run in runs)
+    gram = gram_of_runs(runs, columns)
+    weights = weights_under(gram)
+    return columns, weights, solve(gram, weights)
 
 
 def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> tuple[NDArray, ...]:

@@ -42,11 +42,11 @@ def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
 
 
 def values_of_each_run(
-    fit: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
+    fit: Fit, baseline: Baseline, sure: Uncertainty, fitted: Sequence[Run], others: Sequence[Run]
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the per-run values of causes, by label, as entries of ``verdict.json``.
 
-    Those of the training runs are the fit's own, with its intervals. Those of the others are fitted
+    Those of the fitted runs are the fit's own, with its intervals. Those of the others are fitted
     to their runs, all else held, and have none.
 
     Parameters
@@ -55,7 +55,7 @@ def values_of_each_run(
     baseline : Baseline
     sure : Uncertainty
         Of the fit.
-    train, validate : sequences of Run
+    fitted, others : sequences of Run
     """
     values_of: dict[str, list[dict[str, Any]]] = {
         c.label: [] for c in fit.causes if c.effect.per_run
@@ -64,10 +64,10 @@ def values_of_each_run(
         for r in fit.columns_of(number).runs if cause.label in values_of else ():
             values_of[cause.label].append(
                 _stated_values(
-                    cause.effect, train[r], *parameter_rows.values_in_run(fit, sure, number, r)
+                    cause.effect, fitted[r], *parameter_rows.values_in_run(fit, sure, number, r)
                 )
             )
-    for run in validate if values_of else ():
+    for run in others if values_of else ():
         for term in settled(fit, run, baseline):
             if term.effect.label in values_of and term.effect.explains(run.motion):
                 values_of[term.effect.label].append(

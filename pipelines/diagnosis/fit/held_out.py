@@ -50,7 +50,7 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     if not any(effect.per_run and effect.explains(run.motion) for effect in effects):
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
         return measured - columns @ fit.layout.select(fit.values, None)
-    half = _halves(run)
+    half = halves(run)
     residual = np.zeros_like(run.measured)
     for side in (0, 1):
         scored = half == side
@@ -60,10 +60,19 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     return residual
 
 
-def _halves(run: Run) -> NDArray:
-    """Assign the blocks to two halves, second by second, in Thue and Morse's order.
+def halves(run: Run) -> NDArray:
+    """Assign the blocks to two halves, 0 and 1, second by second, in Thue and Morse's order.
 
     No rhythm shares that order. An onset is known to about a second.
+
+    Parameters
+    ----------
+    run : Run
+        m blocks.
+
+    Returns
+    -------
+    (m,) int array
     """
     return np.bitwise_count(np.floor((run.time - run.time[0]) / STRETCH_S).astype(np.int64)) % 2
 

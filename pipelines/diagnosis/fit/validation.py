@@ -14,7 +14,7 @@ from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
-from pipelines.diagnosis.fit.joint_fit import Fit, fit, with_loads_of
+from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.diagnosis.fit.validation_error import Errors, Gain, errors_of, gain
 
 
@@ -27,6 +27,8 @@ class ValidationResult:
     residuals: tuple[NDArray, ...]
     """(m, O) N·m of each run."""
     errors: Errors
+    of_halves: tuple["ValidationResult", ...] = ()
+    """Of cross-validation: the fits whose residuals are those of each half."""
 
     @classmethod
     def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "ValidationResult":
@@ -68,31 +70,6 @@ class ValidationResult:
             Of the drives.
         """
         return np.asarray(self.errors.rms > CRITERIA.at_floor * floor.rms[: len(self.errors.rms)])
-
-
-def without_each(
-    fitted: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
-) -> dict[str, ValidationResult]:
-    """Return the model without each of its causes, by label.
-
-    The other causes are kept and fitted again under the same joint loads.
-
-    Parameters
-    ----------
-    fitted : Fit
-    train, validate : sequences of Run
-    baseline : Baseline
-    weights : (O,) array
-        Inverse variances of the outputs, 1/(N·m)².
-    """
-    validated, runs = {}, with_loads_of(train, fitted, baseline)
-    for label in dict.fromkeys(cause.label for cause in fitted.causes):
-        # The loads stay, so that the difference is due to the cause alone.
-        rest = [cause for cause in fitted.causes if cause.label != label]
-        validated[label] = ValidationResult.of(
-            fit(rest, runs, baseline, weights, fitted.loads), validate, baseline
-        )
-    return validated
 
 
 def gains_of(without: Mapping[str, ValidationResult], whole: ValidationResult) -> dict[str, Gain]:

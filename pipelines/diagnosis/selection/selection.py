@@ -42,6 +42,8 @@ class AllRunsSearch:
     """Number of training runs: the first ones."""
     named_before: tuple[str, ...]
     """Labels that the training runs alone name, before validation."""
+    fitted_to_all: bool = False
+    """Whether causes are fitted to all runs too, as the training runs do not show their sizes."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,11 @@ class Selection:
         return bool(self.answer.named) and not self.shows_unlisted
 
     @property
+    def is_fitted_to_all(self) -> bool:
+        """Whether causes are fitted to the validation runs too, and cross-validated there."""
+        return self.by_all is not None and self.by_all.fitted_to_all
+
+    @property
     def without_names(self) -> "Selection":
         """The same findings without named causes, which the validation runs contradict."""
         assert self.posterior is not None
@@ -110,20 +117,23 @@ class Selection:
         by_all = AllRunsSearch(train_count, answer_of(first.searched).labels)
         return replace(self, by_all=by_all)
 
+    def fitted_to_all(self) -> "Selection":
+        """Return the selection of all runs with causes that are fitted to all runs too."""
+        assert self.by_all is not None
+        return replace(self, by_all=replace(self.by_all, fitted_to_all=True))
+
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The named causes at their most probable shapes, in the training runs."""
+        """The named causes at their most probable shapes, in the runs that they are fitted to."""
         return tuple(self._candidate(one.element) for one in self.answer.named)
 
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
-        # A search of all runs has shapes in validation runs too, to which nothing is fitted.
         candidate = self.library.causes[element.place].candidate
-        return (
-            replace(candidate, shapes=candidate.shapes[: self.by_all.train_count])
-            if self.by_all
-            else candidate
-        )
+        if self.by_all is None or self.is_fitted_to_all:
+            return candidate
+        # A search of all runs has shapes in validation runs too, to which nothing is fitted.
+        return replace(candidate, shapes=candidate.shapes[: self.by_all.train_count])
 
     @property
     def doubted(self) -> frozenset[str]:

@@ -109,7 +109,7 @@ def _unrealizable(d: Diagnosis) -> list[str]:
 
 def _default_length(d: Diagnosis) -> list[str]:
     """Report that the distance between two axes is an exoskeleton's default on another machine."""
-    machine, length = d.baseline.machine, d.train[0].motion.geometry.thigh_length_m
+    machine, length = d.baseline.machine, d.fitted[0].motion.geometry.thigh_length_m
     # A map without this length leaves the default, so that an equal one counts as not given.
     default = length == Geometry().thigh_length_m
     if machine.is_exoskeleton or not machine.mechanism.has_length or not default:
@@ -146,7 +146,12 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
         f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and"
         " that leaves an error above the noise on the validation runs"
     )
-    if d.causes:
+    if d.selected.is_fitted_to_all:
+        sentence += (
+            ". Nor do they show its size: the model is fitted to all runs, and every second of the"
+            " validation runs is predicted by a fit to others. Train on a motion as rich as theirs"
+        )
+    elif d.causes:
         sentence += ". The gain is therefore a little too good: record another run to validate on"
     return [sentence]
 
@@ -176,7 +181,7 @@ def _differs(d: Diagnosis) -> list[str]:
 
 def _one_run(d: Diagnosis) -> list[str]:
     """Report the limits of one training run, unless a cause is named."""
-    if d.causes or d.data.spoilt or len(d.train) > 1 or d.selected.by_all:
+    if d.causes or d.data.spoilt or len(d.fitted) > 1 or d.selected.by_all:
         return []
     if d.status == "nothing_missing" and not _differing(d):
         return []
@@ -188,7 +193,7 @@ def _one_run(d: Diagnosis) -> list[str]:
 
 def _one_kind(d: Diagnosis) -> list[str]:
     """Report the limits of runs of one kind."""
-    kinds = {run.motion.run for run in d.train}
+    kinds = {run.motion.run for run in d.fitted}
     if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
         return []  # other machines have no wearer
     if kinds == {"exo_alone"}:
@@ -197,7 +202,7 @@ def _one_kind(d: Diagnosis) -> list[str]:
             "looks like a mass off the axis. Record with_human runs as well"
         ]
     if kinds == {"with_human"}:
-        has_cuffs = any(run.motion.forces is not None for run in d.train)
+        has_cuffs = any(run.motion.forces is not None for run in d.fitted)
         apart = "are separated by the cuff forces alone" if has_cuffs else "cannot be separated"
         return [
             f"every run is with a person: causes in the machine and in the person {apart}, and the "

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.held_out import evaluate
-from pipelines.diagnosis.fit.joint_fit import fit, with_loads_of
-from pipelines.diagnosis.fit.validation_error import errors_of, scored
+from pipelines.diagnosis.fit.validation_error import scored
 
 FLOOR, REPEATS, WANDERS, UNEXPLAINED = (
     "noise_floor",
@@ -111,17 +109,8 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
-    # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here, under
-    # the same joint loads.
-    whole = d.after.fit
-    fitted = fit(
-        [c for c in whole.causes if c.label in labels],
-        with_loads_of(d.train, whole, d.baseline),
-        d.baseline,
-        d.before.fit.weights,
-        whole.loads,
-    )
-    return errors_of(d.validate, evaluate(fitted, d.validate, d.baseline)).rms ** 2
+    # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here.
+    return d.trial.keeping(d.after, labels).errors.rms ** 2
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:

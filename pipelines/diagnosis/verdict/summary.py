@@ -32,7 +32,7 @@ def summary(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) ->
 def _noise_without_periods(d: Diagnosis) -> str:
     """Report noise that is estimated without differences of periods."""
     # Noise of the training runs weighs causes; that of the validation runs is the floor.
-    weighed, floor = d.prepared.noise.from_periods, d.floor.from_periods
+    weighed, floor = d.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
     if floor and d.selected.by_all:
@@ -179,11 +179,10 @@ def _dropped(d: Diagnosis) -> str:
     text = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
         they, lower, s = ("they", "lower", "") if plural else ("it", "lowers", "s")
-        fitted = (
-            f"fitted to the training runs alone, {they} {lower} the error on the validation runs"
-            " too little"
-        )
-        return f"{text} all runs together, but {fitted}, or raise{s} it."
+        by_training = d.causes and not d.selected.is_fitted_to_all
+        how = "fitted to the training runs alone" if by_training else "cross-validated"
+        too_little = f"{they} {lower} the error on the validation runs too little, or raise{s} it"
+        return f"{text} all runs together, but {how}, {too_little}."
     return (
         f"{text} the training runs, but {'raise' if plural else 'raises'} the error on the"
         " validation runs."

@@ -50,7 +50,7 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
         Of the extended model's residual.
     """
     # The term is fitted to training runs and measured on validation runs, as every model is.
-    term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
+    term = smooth_term(d.fitted, residuals_on(d.after.fit, d.fitted, d.baseline))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     joints = [
         r - np.nan_to_num(term.torque(run))

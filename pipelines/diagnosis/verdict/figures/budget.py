@@ -48,7 +48,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
         )
     last = d.baseline.machine.joints[-1]
     axes[-1, 0].set_xlabel(
-        f"mean square of the {last.effort} error on runs no fit has seen, ({last.unit('torque')})²"
+        f"mean square of the {last.effort} error on data no fit has seen, ({last.unit('torque')})²"
     )
     drawn.suptitle("What the error is made of", x=0.02, ha="left", fontweight="bold")
     drawn.tight_layout()
