@@ -13,7 +13,7 @@ from tests.campaigns.real.machines import LOGS, diagnosed, motions, recordings
     [
         ("simple", "nothing_missing"),
         pytest.param("xl330", "partly_explained", marks=pytest.mark.slow),
-        ("modexo", "unknown_cause"),
+        ("modexo", "partly_explained"),
     ],
 )
 def test_of_small_or_dirty_logs_only_what_predicts_unseen_runs_is_named(
