@@ -52,18 +52,18 @@ class Criteria:
     """Log odds of a cause whose value differs from run to run."""
     worn: float = -4.84
     """Log odds of a mass that the person carries, against the machine."""
-    lines: float = 0.03
+    line_weight: float = 0.03
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
-    coherence: float = 0.451
+    coherence_weight: float = 0.451
     """Share of the log likelihood of common scatter in cuffs and drives that counts for a voluntary
     torque."""
     shape_freedom: float = 3.0
     """Degrees of freedom of the Student prior of a free shape. Its tails are heavy, because typical
     ranges are known roughly."""
-    likely: float = 0.5
+    named_from: float = 0.5
     """Least probability at which a cause, alone or with its ties, is named, and at which a finding
     is reported."""
-    tied: float = 0.1
+    tied_from: float = 0.1
     """Share of the named cause's probability from which another cause is its tie."""
     look_alike: tuple[float, float] = (4.44, 2.42)
     """Intercept and slope of the log odds that a named cause is the true one, over the logarithm of
@@ -86,10 +86,10 @@ HELD = (
     "model_error",
     "background_line",
     "each_run",
-    "lines",
+    "line_weight",
     "base_rate",
-    "likely",
-    "tied",
+    "named_from",
+    "tied_from",
     "look_alike",
     "at_floor",
     "predicted_better",
@@ -101,7 +101,7 @@ HELD = (
 - ``base_rate``: the mixture of the sessions decides it.
 - ``model_error``: learning scores it nearly the same as twice its value, at which a second, smaller
   cause is lost.
-- ``lines``: learning scores values over a factor of thirty alike.
+- ``line_weight``: learning scores values over a factor of thirty alike.
 - ``background_line``: good drives ripple by a percent of their torque. Too few sessions have such
   drives; learned alone, it called their ripple missing.
 - ``each_run``: too few sessions have sensors that are tared again at each start. Its value comes

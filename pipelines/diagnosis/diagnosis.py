@@ -156,7 +156,7 @@ class Diagnosis:
         # the first with the label has the best shape.
         sets = (i for chosen in self.selected.posterior.sets for i in chosen)
         elements = self.selected.posterior.elements
-        place = next(elements[i].place for i in sets if elements[i].label == label)
+        place = next(elements[i].library_number for i in sets if elements[i].label == label)
         return self.selected.library.causes[place].candidate.effect
 
     @cached_property

@@ -50,7 +50,10 @@ def _best(d: Diagnosis, label: str):
     return next(
         element
         for element in d.selected.posterior.elements
-        if element.label == label and element.first and not element.each_run and not element.worn
+        if element.label == label
+        and element.is_best_shape
+        and not element.each_run
+        and not element.worn
     )
 
 

@@ -68,7 +68,7 @@ class Session:
             elements = (replace(CAUSE, derivative=[2]),)
         if self.lines:
             ratio = max(self.lines * share**2, 1e-9)
-            elements = (replace(CAUSE, shown=[(ratio, max(share, 1e-9), 2)]),)
+            elements = (replace(CAUSE, lines=[(ratio, max(share, 1e-9), 2)]),)
             shares[0] = 0.0
         gram, right = np.zeros((2, 4, 4)), np.zeros((2, 4))
         gram[self.output] = LENGTH**2 * np.eye(4)
@@ -99,7 +99,7 @@ SESSIONS: Mapping[str, tuple[Session, float]] = {
     "searched": (Session((replace(CAUSE, log_searched=6.0),)), 0.04374),
     "each_run": (Session((replace(CAUSE, each_run=True),)), 0.04078),
     "worn": (Session((replace(CAUSE, worn=True),)), 0.04546),
-    "coherence": (Session((PUSHES,), auxiliary={PUSHES.label: 6.0}), 0.02691),
+    "coherence_weight": (Session((PUSHES,), auxiliary={PUSHES.label: 6.0}), 0.02691),
     "base_rate": (Session(), 0.03472),
     "drive_weight": (Session(), 0.03472),
     "cuff_weight": (Session(output=CUFF), 0.10156),
@@ -109,13 +109,13 @@ SESSIONS: Mapping[str, tuple[Session, float]] = {
     "shape_sd": (Session(along_its_shape=True), 0.04243),
     "background_cause": (Session(on_a_good_rig=True), 0.03637),
     "background_line": (Session(lines=2e6), 0.02207),
-    "lines": (Session(lines=2e6), 0.02207),
+    "line_weight": (Session(lines=2e6), 0.02207),
 }
 """For each criterion of the posterior a session that it decides, and its least share."""
 LOG_ODDS = ("cause", "law", "further", "each_run", "worn", "base_rate")
 OTHERS = (
-    "likely",
-    "tied",
+    "named_from",
+    "tied_from",
     "look_alike",
     "at_floor",
     "left_of_explained",
@@ -148,7 +148,7 @@ def test_a_cause_is_named_from_the_recorded_share_on(name):
         posterior(session.evidence(share * factor)).marginals[label]
         for factor in (1.0 / WITHIN, WITHIN)
     )
-    assert less < CRITERIA.likely < more
+    assert less < CRITERIA.named_from < more
 
 
 @pytest.mark.parametrize("by", [-1.0, 1.0])

@@ -101,7 +101,7 @@ def test_a_cause_that_was_refined_with_others_counts_once_on_its_own():
     """Its shape in the set is there for the set: many such sets make it no likelier that it is
     there alone."""
     evidence = problem(strength=0.08)
-    again = [replace(evidence.elements[0], context=number) for number in range(10)]
+    again = [replace(evidence.elements[0], refined_in=number) for number in range(10)]
     count = len(evidence.elements)
     grown = replace(
         evidence,

@@ -35,9 +35,9 @@ class Cause:
     imitation: NDArray
     """(b, k + d): values of the baseline that imitate columns and derivatives best, before it is
     projected out."""
-    first: bool
+    is_best_shape: bool
     """Whether it is the best shape of its effect."""
-    context: int = -1
+    refined_in: int = -1
     """The set of causes with which it was refined; -1 where it was refined alone."""
 
     @classmethod
@@ -47,8 +47,8 @@ class Cause:
         slopes: NDArray,
         regression: DecisionRegression,
         *,
-        first: bool,
-        context: int = -1,
+        is_best_shape: bool,
+        refined_in: int = -1,
     ) -> "Cause | None":
         """Return a fitted candidate as a cause; None where the baseline explains all of it.
 
@@ -58,9 +58,9 @@ class Cause:
             The candidate at its best shapes, with its columns.
         slopes : (N, d) array
             Change of the rows by each shape, per unit of change.
-        first : bool
+        is_best_shape : bool
             Whether these are the best shapes of the effect.
-        context : int, optional
+        refined_in : int, optional
             Number of the set with whose other causes it was refined; -1 where it was refined alone.
         """
         typical = fitted.candidate.typical(regression.kinds)
@@ -80,7 +80,14 @@ class Cause:
         variance = size[kept] / size[kept].sum()
         columns, derivative = regression.project(rows), regression.project(slopes)
         return cls(
-            fitted.candidate, columns, amplitudes, variance, derivative, imitation, first, context
+            fitted.candidate,
+            columns,
+            amplitudes,
+            variance,
+            derivative,
+            imitation,
+            is_best_shape,
+            refined_in,
         )
 
 

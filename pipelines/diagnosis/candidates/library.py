@@ -99,7 +99,7 @@ class Library:
         fits = sorted((f for f in partners if f is not None), key=lambda f: -f.score)
         for fitted in fits[:most]:
             none = np.zeros((len(rows_of_main), 0))
-            cause = Cause.of(fitted, none, self.regression, first=True)
+            cause = Cause.of(fitted, none, self.regression, is_best_shape=True)
             grown = grown if cause is None else grown._with([main, cause])
         return grown
 
@@ -110,7 +110,7 @@ class Library:
             return self
         count, number = len(self.causes), len(self.contexts)
         # These shapes belong to this set: counted alone as well, a cause would count twice.
-        own = [replace(cause, context=number) for cause in own]
+        own = [replace(cause, refined_in=number) for cause in own]
         context = Context(tuple(range(count, count + len(own))), tuple(laws))
         return replace(self, causes=(*self.causes, *own), contexts=(*self.contexts, context))
 
@@ -134,7 +134,7 @@ class Library:
                 start = alone.fit(refined_causes[n].candidate)
                 if start is None:
                     return None
-                cause = Cause.of(*alone.refined(start), regression, first=True)
+                cause = Cause.of(*alone.refined(start), regression, is_best_shape=True)
                 if cause is None:
                     return None
                 refined_causes[n] = cause
@@ -223,7 +223,7 @@ def _ripples(
             if fitted is not None:
                 # Order tracking has refined the orders already, so they need no derivatives.
                 none = np.zeros((len(fitted.columns), 0))
-                ripples.append(Cause.of(fitted, none, regression, first=True))
+                ripples.append(Cause.of(fitted, none, regression, is_best_shape=True))
     return [cause for cause in ripples if cause is not None]
 
 
@@ -245,9 +245,11 @@ def _shapes(
     # to the best shape.
     others = others_of(fits, best if swings else fits[0], ALTERNATIVES)
     slopes = np.hstack([slopes, towards(best, others)])
-    shaped = [Cause.of(best, slopes, regression, first=True)]
+    shaped = [Cause.of(best, slopes, regression, is_best_shape=True)]
     none = np.zeros((len(slopes), 0))
-    shaped += [Cause.of(other, none, regression, first=False) for other in others[:ALTERNATIVES]]
+    shaped += [
+        Cause.of(other, none, regression, is_best_shape=False) for other in others[:ALTERNATIVES]
+    ]
     return [cause for cause in shaped if cause is not None]
 
 

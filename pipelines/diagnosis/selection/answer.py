@@ -71,7 +71,7 @@ def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> 
     best = _best(posterior)
     candidates = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
     for group in together:
-        if posterior.any_of(group) >= CRITERIA.likely and not any(
+        if posterior.any_of(group) >= CRITERIA.named_from and not any(
             group & one.members for one in candidates
         ):
             members = (
@@ -81,7 +81,7 @@ def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> 
                 if posterior.elements[i].label in group
             )
             candidates.append(_named(posterior, *next(members)))
-    named = [one for one in candidates if one.probability >= CRITERIA.likely]
+    named = [one for one in candidates if one.probability >= CRITERIA.named_from]
     return Answer(
         tuple(sorted(named, key=lambda one: -one.probability)),
         posterior.nothing,
@@ -100,13 +100,13 @@ def _best(posterior: Posterior) -> Set:
     The common part of most sets may be likely where the most probable single set lacks it (Barbieri
     and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
-    likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
+    likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.named_from}
     # Labels may be likely each by itself, and never occur in one set.
     sets = [own for own in posterior.by_labels if likely <= own] or list(posterior.by_labels)
     # Rivals share the probability that there is one more cause, and each may have less than none.
     listed = {e.label for e in posterior.elements if not e.is_law}
     with_more = [own for own in sets if (own - likely) & listed]
-    if sum(posterior.by_labels[own] for own in with_more) >= CRITERIA.likely:
+    if sum(posterior.by_labels[own] for own in with_more) >= CRITERIA.named_from:
         sets = with_more
     labels = max(sets, key=lambda own: posterior.by_labels[own])
     return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
@@ -149,7 +149,7 @@ def _named(posterior: Posterior, best: Set, i: int) -> NamedCause:
     element = posterior.elements[i]
     rest = posterior.labels_of(best) - {element.label}
     own, rivals = in_place(posterior, element.label, rest)
-    ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied * own]
+    ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied_from * own]
     members = frozenset((element.label, *(label for label, _ in ties)))
     return NamedCause(
         element, posterior.any_of(members), posterior.marginals[element.label], tuple(ties)

@@ -28,7 +28,7 @@ from pipelines.wording.law import FAMILIES, law_label
 LEAST_VARIANCE = 1e-10
 """Least variance of slow noise's coefficients, in squared shares of the torque: keeps their
 precision finite."""
-Shown = tuple[float, float, int]
+LineEvidence = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and its number of phases."""
 
 
@@ -53,7 +53,7 @@ class Element:
     """Rows: those amplitudes of the effect that are never negative, per coefficient."""
     repeats: bool = True
     """Whether it is the same in every period of the motion."""
-    first: bool = True
+    is_best_shape: bool = True
     """Whether it is the best shape of its cause."""
     each_run: bool = False
     """Whether its value differs from run to run."""
@@ -64,15 +64,15 @@ class Element:
     """Whether the person carries it."""
     wearer: str = "all"
     """Of a law: in all runs' drives, or the human's share."""
-    place: int = -1
+    library_number: int = -1
     """Of a cause: its number in the library."""
     log_prior: float = 0.0
     """Of a cause: the part of the log odds from its shape and form; of bursts: their evidence."""
     log_searched: float = 0.0
     """The log number of values that the search for its waves, tones, onsets or steps tried."""
-    shown: list[Shown] = field(default_factory=list)
+    lines: list[LineEvidence] = field(default_factory=list)
     """Of a ripple or a tone: its lines at the full sampling rate."""
-    context: int = -1
+    refined_in: int = -1
     """Of a cause: the set with whose others it was refined; -1 where it was refined alone."""
 
     @property
@@ -314,7 +314,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             repeats=FAMILIES[kind] != Family.TIME,
             wearer=wearer,
             log_searched=float(np.log(STEPS_TRIED)) if kind == QUANTISATION else 0.0,
-            shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
+            lines=_lines(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
         )
         for (kind, j, wearer), own in laws.items()
         if wearer != "cuffs"
@@ -346,7 +346,9 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     """
     # Such a law stands for the cause in any form. So it needs no step along shapes, and has no
     # amplitude with a sign.
-    best = {e.label: e for e in elements if e.label in any_form and e.first and e.context < 0}
+    best = {
+        e.label: e for e in elements if e.label in any_form and e.is_best_shape and e.refined_in < 0
+    }
     of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
     return [
         replace(
@@ -355,7 +357,7 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
             variance=e.variance,
             derivative=[],
             amplitudes=[],
-            first=False,
+            is_best_shape=False,
         )
         if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws
         else e
@@ -382,7 +384,7 @@ def _normalised(variance: Sequence[float]) -> list[float]:
     return [v / total for v in variance]
 
 
-def _shown(kind: Kind, joint: int, prepared: PreparedRuns) -> list[Shown]:
+def _lines(kind: Kind, joint: int, prepared: PreparedRuns) -> list[LineEvidence]:
     """Return the evidence of a joint's lines of one kind."""
     phases = 1 if kind is Kind.ANGLE else len(prepared.runs)
     lines = prepared.lines[joint].of_kind(kind)
@@ -409,15 +411,15 @@ def _of_cause(number: int, cause: Cause, at: _Places, prepared: PreparedRuns) ->
         derivative=at.derivatives[number].tolist(),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
         repeats=not effect.depends_on_time and effect.family != Family.TIME,
-        first=cause.first,
+        is_best_shape=cause.is_best_shape,
         each_run=effect.each_run,
         sized_each_run=effect.sized_each_run,
         worn=effect.run is not None,
-        place=number,
+        library_number=number,
         log_prior=cause.candidate.log_prior,
         log_searched=log_searched(cause.candidate),
-        shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
-        context=cause.context,
+        lines=_lines(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
+        refined_in=cause.refined_in,
     )
 
 
@@ -445,7 +447,7 @@ def _background(library: Library, at: _Places):
     for cause, places in zip(library.causes, at.causes, strict=True):
         effect = cause.candidate.effect
         # Each cause once, at its best shape: further shapes and variants would make the rig worse.
-        alone = cause.first and cause.context < 0
+        alone = cause.is_best_shape and cause.refined_in < 0
         if alone and not effect.each_run and effect.run is None:
             yield from (
                 (int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True)

@@ -66,7 +66,7 @@ def _cause(label: str, probability: float) -> dict[str, Any]:
 
 def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     """Return the missing causes, the most probable first; empty where the model is complete."""
-    if 1.0 - posterior.nothing < CRITERIA.likely:
+    if 1.0 - posterior.nothing < CRITERIA.named_from:
         return []
     results = [_of_cause(posterior, named) for named in answer.named]
     # Elements that a named cause or its ties stand for are not reported a second time.
@@ -134,7 +134,7 @@ def _likely(
         for one in nodes:
             inside = _within(posterior, one) & rest
             probability = _chance(posterior, inside)
-            if probability >= CRITERIA.likely:
+            if probability >= CRITERIA.named_from:
                 likely.append((_finding(posterior, one, inside, probability), inside))
         if likely:
             yield from likely

@@ -50,7 +50,9 @@ class MarginalLikelihood:
         own = [features(e, evidence.auxiliary) for e in evidence.elements]
         self.features = np.array(own).reshape(-1, len(FEATURES))
         self._weights = weights(criteria)
-        self.apart = np.array([e.log_prior + _shown(e, criteria) for e in evidence.elements])
+        self.apart = np.array(
+            [e.log_prior + _log_odds_of_lines(e, criteria) for e in evidence.elements]
+        )
 
     def _background(self) -> tuple[NDArray, NDArray]:
         background = self.evidence.background
@@ -293,17 +295,17 @@ def _share(values: NDArray) -> float:
     return float(np.linalg.norm(values))
 
 
-def _shown(element: Element, c: Criteria) -> float:
+def _log_odds_of_lines(element: Element, c: Criteria) -> float:
     """Return how much likelier a cause shows a ripple's or tone's lines than a good rig.
 
     The amplitudes of a line are Gaussian about zero in both: with the shares of any cause in the
     one, with a small share in the other. A good rig need not have it at all.
     """
-    if not element.shown:
+    if not element.lines:
         return 0.0
     odds = []
-    for ratio, share, phases in element.shown:
-        ratio *= c.lines
+    for ratio, share, phases in element.lines:
+        ratio *= c.line_weight
         variance = phases * share**2 / (2.0 * ratio)
         of_cause = [_line(ratio, variance, phases, size) for size in c.amplitudes]
         of_rig = [0.0, _line(ratio, variance, phases, c.background_line)]

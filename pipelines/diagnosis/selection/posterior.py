@@ -179,7 +179,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
 
 def _explains(element: Element) -> bool:
     """Return whether an element explains rows in any set, and not only in its own."""
-    return element.context < 0 and bool(element.columns)
+    return element.refined_in < 0 and bool(element.columns)
 
 
 def _with_bursts(
@@ -207,12 +207,12 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
     for chosen in weighed.sets:
         # A law without columns leaves a cause's shape as it is.
         elements = [e for e in (weighed.elements[i] for i in chosen) if e.columns]
-        causes = tuple(e.place for e in elements if not e.is_law)
+        causes = tuple(e.library_number for e in elements if not e.is_law)
         if len(elements) > 1 and causes:
             laws = tuple(e.variant for e in elements if e.is_law)
             contexts.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
         # Sets come by falling probability: all after the empty one are less likely than nothing.
-        if len(contexts) == CONTEXTS or (not chosen and weighed.nothing > CRITERIA.likely):
+        if len(contexts) == CONTEXTS or (not chosen and weighed.nothing > CRITERIA.named_from):
             break
     return list(contexts.values())
 
@@ -225,10 +225,10 @@ def strongest(weighed: Posterior) -> list[int]:
     causes: dict[str, int] = {}
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
-        if len(causes) == STRONGEST or (not chosen and weighed.nothing > CRITERIA.likely):
+        if len(causes) == STRONGEST or (not chosen and weighed.nothing > CRITERIA.named_from):
             break
         if element is not None and not element.is_law:
-            causes.setdefault(element.label, element.place)
+            causes.setdefault(element.label, element.library_number)
     return list(causes.values())
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element
 
-FEATURES = ("cause", "law", "further", "searched", "each_run", "worn", "coherence")
+FEATURES = ("cause", "law", "further", "searched", "each_run", "worn", "coherence_weight")
 """Names of the criteria by which the features of a set are multiplied."""
 
 
@@ -27,7 +27,7 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
     own["further"] = float(at_both)
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
-    own["coherence"] = auxiliary.get(element.label, 0.0)
+    own["coherence_weight"] = auxiliary.get(element.label, 0.0)
     return np.array(list(own.values()))
 
 

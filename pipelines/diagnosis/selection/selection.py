@@ -81,12 +81,12 @@ class Selection:
     @property
     def shows_something(self) -> bool:
         """Whether it is more likely than not that something is missing."""
-        return 1.0 - self.answer.nothing >= CRITERIA.likely
+        return 1.0 - self.answer.nothing >= CRITERIA.named_from
 
     @property
     def shows_unlisted(self) -> bool:
         """Whether it is more likely than not that something unlisted is missing."""
-        return self.answer.unlisted >= CRITERIA.likely
+        return self.answer.unlisted >= CRITERIA.named_from
 
     @property
     def names_all(self) -> bool:
@@ -129,7 +129,7 @@ class Selection:
 
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
-        candidate = self.library.causes[element.place].candidate
+        candidate = self.library.causes[element.library_number].candidate
         if self.by_all is None or self.is_fitted_to_all:
             return candidate
         # A search of all runs has shapes in validation runs too, to which nothing is fitted.

@@ -103,7 +103,9 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
         # The named set with a tie in a cause's place is the same answer in other words.
         if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
             return "indistinguishable", f"these data cannot separate it from {one.element.label}"
-    is_likely = probability >= CRITERIA.likely and any(label.startswith(LAW) for label in labels)
+    is_likely = probability >= CRITERIA.named_from and any(
+        label.startswith(LAW) for label in labels
+    )
     return "unlisted" if is_likely else "rejected", "; ".join(_against(d, labels, probability))
 
 

@@ -42,7 +42,7 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     assert d.selected.evidence is not None
     if d.selected.evidence.auxiliary.get(label, 0.0) > MENTIONED_FROM:
         sentences.append(effect.cuff_coherence)
-    lines = len(named.element.shown)
+    lines = len(named.element.lines)
     if lines:
         plural = "s stand" if lines > 1 else " stands"
         sentences.append(f"{lines} line{plural} out over the angle at the full sampling rate")

@@ -40,7 +40,7 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
         }
     # The most probable law has the joint whose angle, speed or load it is.
     law, p = next(iter(finding.laws), ("", 0.0))
-    of_other_joint = p >= CRITERIA.likely and is_of_other_joint(law)
+    of_other_joint = p >= CRITERIA.named_from and is_of_other_joint(law)
     for node in entry["path"]:
         node["words"] = _node_in_words(d, node, entry, of_other_joint)
     entry["laws"] = list(_laws(finding, machine))

@@ -149,7 +149,7 @@ def _unlisted(d: Diagnosis) -> str:
     text = (
         f"Something is missing {which}: {first.words} (probability {first.probability:.2f}){also}."
     )
-    laws = [law for law in first.laws if law.probability >= CRITERIA.likely]
+    laws = [law for law in first.laws if law.probability >= CRITERIA.named_from]
     # An unlisted effect that resembles a listed cause is described by that cause.
     if laws and laws[0].words != first.words and not laws[0].law.startswith(UNLISTED):
         text += f" Most likely it is {laws[0].words} ({laws[0].probability:.2f})."

@@ -14,7 +14,7 @@ FLOOR = 1e-4
 """Probability that a truth has at least: one hopeless session must not decide."""
 SPREAD = 3.0
 """Standard deviation of the weights about those at the start: keeps one without evidence."""
-POSITIVE = ("coherence",)
+POSITIVE = ("coherence_weight",)
 """Weights that are not negative: evidence for a cause never makes it less likely."""
 
 

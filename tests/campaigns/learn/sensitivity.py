@@ -38,9 +38,16 @@ to its neutral value, all else as it stands. Neutral is one for weights and line
 in full; one of several values is then not there; all else is zero. Eight numbers have no row: three
 act before evidence is stored, the base rate is the sessions' own, and four change no
 probability."""
-NOT_MEASURED = (*BEFORE_EVIDENCE, "base_rate", "likely", "tied", "at_floor", "left_of_explained")
+NOT_MEASURED = (
+    *BEFORE_EVIDENCE,
+    "base_rate",
+    "named_from",
+    "tied_from",
+    "at_floor",
+    "left_of_explained",
+)
 """Criteria that do not change the probability of the truth, given stored evidence."""
-NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "lines": 1.0, "shape_sd": 1e-6}
+NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "line_weight": 1.0, "shape_sd": 1e-6}
 """Neutral values, where they are not zero."""
 
 
