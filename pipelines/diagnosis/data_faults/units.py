@@ -32,7 +32,7 @@ compared."""
 NOTHING = 1e-4
 """Least scale that is compared. No unit is as far from N·m: the channels contradict each other in
 another way."""
-LAW_HOLDS = 0.8
+LOOP_EXPLAINS = 0.8
 """Share of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
 """Largest angle of a leg's joint from its zero; a pendulum may turn over."""
@@ -124,16 +124,16 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
 
 def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
     """Return the joints whose torque contradicts their position loops; None if one is unknown."""
-    laws = [_drive_law(run.motion, j) for j in range(2)]
+    ratios = [_torque_over_position_loop(run.motion, j) for j in range(2)]
     wrong = {
-        j: (law, f"{the(name)}'s position loop")
-        for j, (name, law) in enumerate(zip(run.motion.joints, laws, strict=True))
-        if law and not 1 / WRONG < law < WRONG
+        j: (ratio, f"{the(name)}'s position loop")
+        for j, (name, ratio) in enumerate(zip(run.motion.joints, ratios, strict=True))
+        if ratio and not 1 / WRONG < ratio < WRONG
     }
-    return None if None in laws and not wrong else wrong
+    return None if None in ratios and not wrong else wrong
 
 
-def _drive_law(motion: Motion, joint: int) -> float | None:
+def _torque_over_position_loop(motion: Motion, joint: int) -> float | None:
     """Return recorded torque over that of the position loop in the metadata.
 
     The torque is fitted by the angle's error and both speeds; the multiple of the error is the
@@ -158,7 +158,7 @@ def _drive_law(motion: Motion, joint: int) -> float | None:
     torque = motion.torque[good, joint]
     multiples = np.linalg.lstsq(columns.T @ columns, columns.T @ torque)[0]
     misfit = np.sum((torque - columns @ multiples) ** 2)
-    holds = misfit < (1.0 - LAW_HOLDS) * np.sum(torque**2)
+    holds = misfit < (1.0 - LOOP_EXPLAINS) * np.sum(torque**2)
     return float(abs(multiples[0])) / stiffness if holds else None
 
 
