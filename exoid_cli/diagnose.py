@@ -105,7 +105,7 @@ def diagnose(
         "residuals": diagnosis.residuals,
         "candidates": candidates(diagnosis),
     }
-    detectable = as_json(detectability(diagnosis.fitted, diagnosis.baseline, diagnosis.floor))
+    detectable = as_json(detectability(diagnosis.fitted_runs, diagnosis.baseline, diagnosis.floor))
     # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
     with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():

@@ -4,9 +4,8 @@
 2. *Library*: every cause and every unlisted law as columns of one regression.
 3. *Posterior*: the probability of each set of causes and laws.
 4. *Fit*: the named causes with the baseline, their shapes refined.
-5. *Validation*: errors and gains on runs that no fit has seen. Where their error is above the
-   noise, steps 2 to 5 are repeated with causes sought on all runs. Where the training runs do not
-   show the size of these causes, each half of the validation runs is scored by a fit to all else.
+5. *Validation*: errors and gains on data that no fit has seen. Where the error is above the noise,
+   steps 2 to 5 are repeated with causes sought on all runs.
 """
 
 from collections.abc import Sequence
@@ -20,8 +19,8 @@ from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
 from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.presliding_test import built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
-from pipelines.diagnosis.fit.trial import CrossValidation, HoldOut
 from pipelines.diagnosis.fit.uncertainty import uncertainty
+from pipelines.diagnosis.fit.validation_scheme import CrossValidation, HoldOut
 from pipelines.diagnosis.judged_fit import JudgedFit, judged_fit
 from pipelines.diagnosis.selection.selection import Report, nothing_selected, select
 from pipelines.diagnosis.training_data import TrainingData, training_data
@@ -36,10 +35,11 @@ def diagnose(
 ) -> Diagnosis:
     """Find where rigid body with Coulomb and viscous friction is wrong, and the cause.
 
-    The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
-    every error. They may lower the probability of a cause that does harm there, and decide between
-    ties. Where the named causes leave an error above the noise there, causes are sought on all
-    runs. They are still fitted to the training runs, unless these show nothing of them.
+    Causes are sought in, and fitted to, the ``train`` runs. The ``validate`` runs measure every
+    error. They may lower the probability of a cause that does harm there, and decide between ties.
+    Where the named causes leave an error above the noise there, causes are sought on all runs. If
+    these causes, fitted to the ``train`` runs, do not predict the ``validate`` runs, they are
+    cross-validated there.
 
     Parameters
     ----------
@@ -64,7 +64,9 @@ def diagnose(
     prepared = prepare(data.train, data.baseline)
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
-    judged = judged_fit(selected, HoldOut.of(prepared, data.validate), prepared.noise)
+    judged = judged_fit(
+        selected, HoldOut.of(data.train, data.validate, data.baseline), prepared.noise
+    )
     # An error above the noise may mean that the training runs alone show too little.
     if not data.spoilt and judged.after.leaves_more_than_noise:
         judged = _by_all_runs(data, prepared, judged, report)
@@ -78,29 +80,28 @@ def _by_all_runs(
 
     Its causes are fitted to the training runs, and must predict the validation runs better. Where
     the training runs show something, all runs must name other listed causes, and leave nothing
-    unlisted. Where they show nothing, they need not show the size of the causes either: these are
-    then cross-validated. Where this fails too, the finding of all runs is reported without a name.
+    unlisted. Where they show nothing, they may not determine the sizes of the new causes either:
+    these are then cross-validated. Where this fails too, the finding of all runs has no name.
     """
     first, noise = judged.selected, prepared.noise
     runs = (*data.train, *data.validate)
-    searched = select(prepare(runs, data.baseline), _in_the_rest(report)).as_all_runs_search(
-        first, len(data.train)
-    )
-    by_all = judged_fit(searched, judged.trial, noise)
+    searched = select(prepare(runs, data.baseline), _in_the_rest(report)).as_all_runs_search(first)
+    by_all = judged_fit(searched, judged.scheme, noise)
     now = by_all.selected
-    if now.answer.named and by_all.predicts_better_than(judged):
+    if now.answer.named and by_all.predicts_better_than(judged.after, noise):
         # The causes of the training runs again are no news: their error called for this search.
         others = now.names_all and now.answer.variants != first.answer.variants
         if others or not first.shows_something:
             return by_all
     if first.shows_something or not searched.shows_something:
         return judged
-    halves = CrossValidation(data.train, data.validate, data.baseline)
-    by_halves = judged_fit(searched.fitted_to_all(), halves, noise)
-    if by_halves.selected.answer.named and by_halves.predicts_better_than(
-        judged_fit(first, halves, noise)
-    ):
-        return by_halves
+    if searched.answer.named:
+        scheme = CrossValidation(data.train, data.validate, data.baseline)
+        validated = judged_fit(searched, scheme, noise)
+        if validated.selected.answer.named and validated.predicts_better_than(
+            validated.before, noise
+        ):
+            return validated
     return replace(judged, selected=searched.without_names)
 
 
@@ -112,18 +113,19 @@ def _in_the_rest(report: Report) -> Report:
 def _diagnosis(data: TrainingData, noise: NoiseModel, judged: JudgedFit) -> Diagnosis:
     """Assemble the result: intervals, parameters, simulation errors, reversals."""
     baseline, before, after = data.baseline, judged.before, judged.after
-    fitted, validate = judged.trial.runs, before.runs
+    fitted, validate = judged.scheme.runs, before.runs
     known = uncertainty(after.fit, fitted, baseline, imperfection(fitted))
     parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
     drift = simulation_error(before.fit, validate, baseline)
     # Without named causes both models are the same.
     after_drift = drift if after is before else simulation_error(after.fit, validate, baseline)
     residuals = {"baseline": before.residuals, "extended": after.residuals}
-    reversals = [] if data.spoilt else built_up(after.fit, baseline, fitted, validate)
+    train = fitted[: len(data.train)]
+    reversals = [] if data.spoilt else built_up(after.fit, baseline, train, validate)
     return Diagnosis(
         data,
         noise,
-        judged.trial,
+        judged.scheme,
         judged.selected,
         before,
         after,

@@ -15,10 +15,10 @@ from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
-from pipelines.diagnosis.fit.trial import Trial
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
+from pipelines.diagnosis.fit.validation_scheme import ValidationScheme
 from pipelines.diagnosis.selection.answer import NamedCause
 from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
@@ -35,7 +35,7 @@ class Diagnosis:
     data: TrainingData
     noise: NoiseModel
     """Of the training runs."""
-    trial: Trial
+    scheme: ValidationScheme
     """Which samples the models are fitted to, and which score them."""
     selected: Selection
     before: ValidationResult
@@ -62,9 +62,24 @@ class Diagnosis:
         return self.data.baseline
 
     @property
-    def fitted(self) -> tuple[Run, ...]:
+    def fitted_runs(self) -> tuple[Run, ...]:
         """The runs that the models are fitted to, with joint loads computed from the baseline."""
-        return self.trial.runs
+        return self.scheme.runs
+
+    @property
+    def fitted_to_all(self) -> bool:
+        """Whether the models are fitted to the validation runs too, and cross-validated."""
+        return len(self.fitted_runs) > len(self.data.train)
+
+    @property
+    def training_runs(self) -> tuple[Run, ...]:
+        """Those of the fitted runs that no model is scored on."""
+        return self.fitted_runs[: len(self.data.train)]
+
+    @property
+    def sought_on_all(self) -> bool:
+        """Whether causes were sought on all runs."""
+        return self.selected.training_alone is not None
 
     @property
     def validate(self) -> tuple[Run, ...]:
@@ -127,7 +142,7 @@ class Diagnosis:
     @property
     def has_periods(self) -> bool:
         """Whether some recording names the period of its motion."""
-        return any(run.motion.period_s for run in (*self.fitted, *self.validate))
+        return any(run.motion.period_s for run in (*self.fitted_runs, *self.validate))
 
     @property
     def is_mostly_unexplained(self) -> bool:
@@ -162,10 +177,9 @@ class Diagnosis:
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """The per-run values of the named causes, by label."""
-        files = {run.motion.file for run in self.fitted}
-        others = [run for run in self.validate if run.motion.file not in files]
+        others = () if self.fitted_to_all else self.validate
         return values_of_each_run(
-            self.after.fit, self.baseline, self.uncertainty, self.fitted, others
+            self.after.fit, self.baseline, self.uncertainty, self.fitted_runs, others
         )
 
     @cached_property
@@ -180,7 +194,7 @@ class Diagnosis:
 
     @property
     def collinear(self) -> list[str]:
-        """Nearly collinear parameters of the extended model on the training runs, in words."""
+        """Nearly collinear parameters of the extended model on the fitted runs, in words."""
         fit = self.after.fit
         shapes = [(fit.causes[k].effect, i) for k, i, _ in self.uncertainty.shapes]
         own = (Column(effect, effect.shape[i], None) for effect, i in shapes)
@@ -196,13 +210,16 @@ class Diagnosis:
     @property
     def unrealizable(self) -> list[str]:
         """Reasons why no real machine has the extended model's rigid bodies; empty if one may."""
-        geometry = self.fitted[0].motion.geometry
+        geometry = self.fitted_runs[0].motion.geometry
         return unrealizable(self.parameters, self.baseline.machine, geometry)
 
     @cached_property
     def lacks_mass(self) -> bool:
         """Whether a rigid body's least inertia is negative by more than its standard error."""
-        table, geometry = self.parameters.reset_index(drop=True), self.fitted[0].motion.geometry
+        table, geometry = (
+            self.parameters.reset_index(drop=True),
+            self.fitted_runs[0].motion.geometry,
+        )
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.

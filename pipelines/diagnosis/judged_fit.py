@@ -1,4 +1,4 @@
-"""Fit the named causes to the training runs, and judge them on the validation runs."""
+"""Fit the named causes, and judge them on the validation runs."""
 
 from dataclasses import dataclass
 
@@ -7,39 +7,45 @@ import numpy as np
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
-from pipelines.diagnosis.fit.trial import Trial
 from pipelines.diagnosis.fit.validation import ValidationResult, log_likelihoods, removed_share
 from pipelines.diagnosis.fit.validation_error import gain
+from pipelines.diagnosis.fit.validation_scheme import ValidationScheme
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selection import Selection
 
 
 @dataclass(frozen=True)
 class JudgedFit:
-    """The named causes after judging, fitted to the training runs."""
+    """The named causes after judging, and their fit."""
 
     selected: Selection
-    trial: Trial
-    """Which samples it is fitted to, and which judge it."""
+    scheme: ValidationScheme
+    """Which samples it is fitted to, and which score it."""
     before: ValidationResult
     """The baseline."""
     after: ValidationResult
     """The baseline with the named causes."""
     without: dict[str, ValidationResult]
     """The named causes less one, by that cause's label."""
-    log_likelihood: float
-    """Of the validation runs, up to a constant."""
 
-    def predicts_better_than(self, other: "JudgedFit") -> bool:
-        """Return whether it predicts the validation runs significantly better than another."""
-        gained = self.log_likelihood - other.log_likelihood
+    def predicts_better_than(self, other: ValidationResult, noise: NoiseModel) -> bool:
+        """Return whether it predicts the validation runs significantly better than another model.
+
+        Parameters
+        ----------
+        other : ValidationResult
+            Scored on the same samples.
+        noise : NoiseModel
+            Of the training runs.
+        """
+        gained = log_likelihoods(self.after, noise) - log_likelihoods(other, noise)
         return (
-            gained > CRITERIA.predicted_better
-            and gain(other.after.errors, self.after.errors).low > 0.0
+            float(gained.sum()) > CRITERIA.predicted_better
+            and gain(other.errors, self.after.errors).low > 0.0
         )
 
 
-def judged_fit(selected: Selection, trial: Trial, noise: NoiseModel) -> JudgedFit:
+def judged_fit(selected: Selection, scheme: ValidationScheme, noise: NoiseModel) -> JudgedFit:
     """Fit the named causes, and judge them on the validation runs until no charge remains.
 
     The most harmful cause is charged first: in a model with it, other causes may seem to harm too.
@@ -50,17 +56,17 @@ def judged_fit(selected: Selection, trial: Trial, noise: NoiseModel) -> JudgedFi
     Parameters
     ----------
     selected : Selection
-    trial : Trial
-        Which samples causes are fitted to, and which judge them.
+    scheme : ValidationScheme
+        Which samples causes are fitted to, and which score them.
     noise : NoiseModel
         Of the training runs.
     """
-    before, fitted = trial(()), None
+    before, fitted = scheme.validated(()), None
     while True:
         # A charge may change probabilities only, and then the fits stand.
         if selected.candidates != fitted:
             fitted = selected.candidates
-            after, without = _fitted(fitted, trial, before)
+            after, without = _fitted(fitted, scheme, before)
             whole = log_likelihoods(after, noise)
             ratios = {
                 label: float(np.sum(whole - log_likelihoods(less, noise)))
@@ -69,16 +75,15 @@ def judged_fit(selected: Selection, trial: Trial, noise: NoiseModel) -> JudgedFi
         harm = selected.worst_harm(ratios)
         if harm:
             selected = selected.judged(harm, harms=True)
-        elif shortfalls := _shortfalls(selected, after, trial, before, noise):
+        elif shortfalls := _shortfalls(selected, after, scheme, before, noise):
             selected = selected.judged(shortfalls)
         else:
             break
     # Last, because the share that a cause removes depends on the others that stay.
     selected = selected.with_look_alikes(_removed(after, without))
     if selected.candidates != fitted:
-        after, without = _fitted(selected.candidates, trial, before)
-    log_likelihood = float(log_likelihoods(after, noise).sum())
-    return JudgedFit(selected, trial, before, after, without, log_likelihood)
+        after, without = _fitted(selected.candidates, scheme, before)
+    return JudgedFit(selected, scheme, before, after, without)
 
 
 def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> dict[str, float]:
@@ -93,7 +98,7 @@ def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> d
 def _shortfalls(
     selected: Selection,
     after: ValidationResult,
-    trial: Trial,
+    scheme: ValidationScheme,
     before: ValidationResult,
     noise: NoiseModel,
 ) -> dict[str, float]:
@@ -109,7 +114,7 @@ def _shortfalls(
             continue
         likelihoods = {one.element.variant: log_likelihoods(after, noise)}
         for variant, rival in rivals.items():
-            likelihoods[variant] = log_likelihoods(trial((*rest, rival)), noise)
+            likelihoods[variant] = log_likelihoods(scheme.validated((*rest, rival)), noise)
         # Twice a log likelihood ratio is the explained square in units of the noise.
         explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
         weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
@@ -124,14 +129,14 @@ def _shortfalls(
 
 
 def _fitted(
-    candidates: tuple[Candidate, ...], trial: Trial, before: ValidationResult
+    candidates: tuple[Candidate, ...], scheme: ValidationScheme, before: ValidationResult
 ) -> tuple[ValidationResult, dict[str, ValidationResult]]:
     """Fit causes, and the same without each of them, and score each fit."""
     if not candidates:
         return before, {}
-    after = trial(candidates)
+    after = scheme.validated(candidates)
     labels = list(dict.fromkeys(cause.label for cause in after.fit.causes))
     # One cause less one is the baseline, which is fitted already.
     if len(candidates) == 1:
         return after, {labels[0]: before}
-    return after, {one: trial.keeping(after, {*labels} - {one}) for one in labels}
+    return after, {one: scheme.refitted(after, {*labels} - {one}) for one in labels}

@@ -42,7 +42,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         findings=reported,
         dropped=frozenset(),
     )
-    return _diagnosis(d.data, d.noise, judged_fit(given, d.trial, d.noise))
+    return _diagnosis(d.data, d.noise, judged_fit(given, d.scheme, d.noise))
 
 
 def _best(d: Diagnosis, label: str):

@@ -200,11 +200,15 @@ def test_a_joint_is_explained_where_a_fifth_of_the_systematic_power_is_left():
 
 def test_an_answer_by_all_runs_gains_a_log_unit_on_the_validation_runs(monkeypatch):
     monkeypatch.setattr(module_of_judged_fit, "gain", lambda *_: SimpleNamespace(low=1.0))
+    monkeypatch.setattr(module_of_judged_fit, "log_likelihoods", lambda model, _: model.logs)
 
-    def fit(log_likelihood):
-        return SimpleNamespace(log_likelihood=log_likelihood, after=SimpleNamespace(errors=None))
+    def model(*logs):
+        return SimpleNamespace(logs=np.array(logs), errors=None)
 
-    better = [JudgedFit.predicts_better_than(fit(gained), fit(0.0)) for gained in (0.9, 1.1)]
+    better = [
+        JudgedFit.predicts_better_than(SimpleNamespace(after=model(*own)), model(0.0, 0.0), None)
+        for own in ((0.9, 0.0), (2.0, -0.9))
+    ]
     assert better == [False, True]
 
 

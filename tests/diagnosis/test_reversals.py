@@ -129,7 +129,7 @@ def test_friction_that_alone_is_late_is_given_no_travel(faultless, late):
         return replace(run, motion=replace(motion, torque=motion.torque + level * (then - side)))
 
     train, validate = (
-        [moved(run) for run in some] for some in (faultless.train, faultless.validate)
+        [moved(run) for run in some] for some in (faultless.fitted_runs, faultless.validate)
     )
     assert built_up(fitted, baseline, train, validate) == []
 
@@ -141,12 +141,12 @@ def bristles(tmp_path_factory):
 
 @pytest.mark.slow
 def test_of_a_joint_whose_play_is_named_nothing_more_is_reported(bristles):
-    runs, baseline = bristles.train, bristles.baseline
+    runs, baseline = bristles.fitted_runs, bristles.baseline
     play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
-    fitted = fit((play,), runs, baseline, bristles.trial.weights)
-    assert [one.joint for one in built_up(fitted, baseline, bristles.train, bristles.validate)] == [
-        "knee"
-    ]
+    fitted = fit((play,), runs, baseline, bristles.before.fit.weights)
+    assert [
+        one.joint for one in built_up(fitted, baseline, bristles.fitted_runs, bristles.validate)
+    ] == ["knee"]
 
 
 def slower(motion):
@@ -159,7 +159,7 @@ def slower(motion):
 def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_shows_none(bristles):
     slow = [
         [replace(run, motion=slower(run.motion)) for run in some]
-        for some in (bristles.train, bristles.validate)
+        for some in (bristles.fitted_runs, bristles.validate)
     ]
     assert built_up(bristles.after.fit, bristles.baseline, *slow) == []
 

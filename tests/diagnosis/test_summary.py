@@ -129,9 +129,10 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     assert "No training run holds two periods" in verdict(weighed)["summary"]
     neither = replace(short, noise=without_periods)
     assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
-    trial = replace(stuck.trial, runs=tuple(without_a_period(run) for run in stuck.fitted))
+    runs = tuple(without_a_period(run) for run in stuck.fitted_runs)
+    scheme = replace(stuck.scheme, runs=runs)
     before = replace(stuck.before, runs=[without_a_period(run) for run in stuck.validate])
-    summary = verdict(replace(neither, trial=trial, before=before))["summary"]
+    summary = verdict(replace(neither, scheme=scheme, before=before))["summary"]
     assert f"No recording names a period{estimate}" in summary
 
 

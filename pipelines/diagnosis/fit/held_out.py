@@ -1,4 +1,4 @@
-"""Compute a model's residuals on the validation runs, which no fit has seen.
+"""Compute a model's residuals on runs that its fit has not seen.
 
 Shared parameters come from training. Per-run parameters (an onset, a phase, a zero set at each
 start) are fitted to each validation run: on one half of its seconds to be scored on the other, and

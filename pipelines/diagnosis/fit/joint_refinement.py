@@ -33,7 +33,7 @@ Place = tuple[int, int, int, float]
 
 
 class Refinement:
-    """Refines the shapes of one set of causes on the training runs."""
+    """Refines the shapes of one set of causes on the fitted runs."""
 
     def __init__(self, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> None:
         """Prepare; ``weights`` (O,) are the outputs' inverse variances, 1/(N·m)²."""

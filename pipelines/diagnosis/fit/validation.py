@@ -1,4 +1,4 @@
-"""Evaluate a model on the validation runs, which no fit has seen, and judge its causes."""
+"""Evaluate a model on samples that its fit has not seen, and judge its causes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,8 +27,11 @@ class ValidationResult:
     residuals: tuple[NDArray, ...]
     """(m, O) N·m of each run."""
     errors: Errors
-    of_halves: tuple["ValidationResult", ...] = ()
-    """Of cross-validation: the fits whose residuals are those of each half."""
+    half_fits: tuple[Fit, ...] = ()
+    """In cross-validation: the fits without the first, and the second half of these runs."""
+    without_steps: tuple[NDArray, ...] | None = None
+    """In cross-validation: residuals of the fit to all runs, (m, O) N·m of each. Those of the two
+    other fits differ by a step where their halves meet."""
 
     @classmethod
     def of(cls, fit: Fit, validate: Sequence[Run], baseline: Baseline) -> "ValidationResult":
@@ -49,7 +52,8 @@ class ValidationResult:
     @cached_property
     def floor(self) -> Floor:
         """The noise floor of these runs."""
-        return noise_floor(self.runs, self.residuals)
+        # A step between two fits would count as noise.
+        return noise_floor(self.runs, self.without_steps or self.residuals)
 
     @property
     def leaves_more_than_noise(self) -> bool:

@@ -35,18 +35,6 @@ Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class AllRunsSearch:
-    """A search for causes on all runs, and its reason."""
-
-    train_count: int
-    """Number of training runs: the first ones."""
-    named_before: tuple[str, ...]
-    """Labels that the training runs alone name, before validation."""
-    fitted_to_all: bool = False
-    """Whether causes are fitted to all runs too, as the training runs do not show their sizes."""
-
-
-@dataclass(frozen=True)
 class Selection:
     """The answer from the searched runs, before and after the validation runs judge it.
 
@@ -75,8 +63,8 @@ class Selection:
     """Share of the validation runs' systematic error that each cause removed when it was tested for
     being a look-alike, by label."""
 
-    by_all: AllRunsSearch | None = None
-    """None where the evidence is from the training runs."""
+    training_alone: tuple[str, ...] | None = None
+    """Of a search of all runs: labels that the training runs alone name, before validation."""
 
     @property
     def shows_something(self) -> bool:
@@ -94,11 +82,6 @@ class Selection:
         return bool(self.answer.named) and not self.shows_unlisted
 
     @property
-    def is_fitted_to_all(self) -> bool:
-        """Whether causes are fitted to the validation runs too, and cross-validated there."""
-        return self.by_all is not None and self.by_all.fitted_to_all
-
-    @property
     def without_names(self) -> "Selection":
         """The same findings without named causes, which the validation runs contradict."""
         assert self.posterior is not None
@@ -108,32 +91,19 @@ class Selection:
             self, answer=answer, findings=findings_now, dropped=frozenset(self.answer.labels)
         )
 
-    def as_all_runs_search(self, first: "Selection", train_count: int) -> "Selection":
-        """Mark the result of all runs, after the training runs alone gave ``first``.
-
-        The training runs are the first ``train_count``.
-        """
+    def as_all_runs_search(self, first: "Selection") -> "Selection":
+        """Mark the result of all runs, after the training runs alone gave ``first``."""
         assert first.searched is not None
-        by_all = AllRunsSearch(train_count, answer_of(first.searched).labels)
-        return replace(self, by_all=by_all)
-
-    def fitted_to_all(self) -> "Selection":
-        """Return the selection of all runs with causes that are fitted to all runs too."""
-        assert self.by_all is not None
-        return replace(self, by_all=replace(self.by_all, fitted_to_all=True))
+        return replace(self, training_alone=answer_of(first.searched).labels)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The named causes at their most probable shapes, in the runs that they are fitted to."""
+        """The named causes at their most probable shapes, in the searched runs."""
         return tuple(self._candidate(one.element) for one in self.answer.named)
 
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
-        candidate = self.library.causes[element.library_number].candidate
-        if self.by_all is None or self.is_fitted_to_all:
-            return candidate
-        # A search of all runs has shapes in validation runs too, to which nothing is fitted.
-        return replace(candidate, shapes=candidate.shapes[: self.by_all.train_count])
+        return self.library.causes[element.library_number].candidate
 
     @property
     def doubted(self) -> frozenset[str]:

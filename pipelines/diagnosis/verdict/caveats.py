@@ -86,9 +86,10 @@ def _at_ends(d: Diagnosis) -> list[str]:
 
 
 def _size_may_be_zero(d: Diagnosis) -> list[str]:
-    """Report named causes whose size the training runs do not separate from zero."""
+    """Report named causes whose size the fitted runs do not separate from zero."""
+    fitted = "all runs together" if d.fitted_to_all else "the training runs"
     return [
-        "the training runs do not determine the size of"
+        f"{fitted} do not determine the size of"
         f" {label_in_words(cause.label, d.baseline.machine)}: its 95 % interval includes zero"
         for number, cause in enumerate(d.after.fit.causes)
         if not cause.effect.per_run
@@ -109,7 +110,7 @@ def _unrealizable(d: Diagnosis) -> list[str]:
 
 def _default_length(d: Diagnosis) -> list[str]:
     """Report that the distance between two axes is an exoskeleton's default on another machine."""
-    machine, length = d.baseline.machine, d.fitted[0].motion.geometry.thigh_length_m
+    machine, length = d.baseline.machine, d.fitted_runs[0].motion.geometry.thigh_length_m
     # A map without this length leaves the default, so that an equal one counts as not given.
     default = length == Geometry().thigh_length_m
     if machine.is_exoskeleton or not machine.mechanism.has_length or not default:
@@ -138,21 +139,23 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
 
 def _by_all_runs(d: Diagnosis) -> list[str]:
     """Report that the validation runs helped to find the causes, and why."""
-    by_all = d.selected.by_all
-    if by_all is None:
+    alone = d.selected.training_alone
+    if alone is None:
         return []
-    named = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
+    named = " and ".join(label_in_words(label, d.baseline.machine) for label in alone)
     sentence = (
         f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and"
         " that leaves an error above the noise on the validation runs"
     )
-    if d.selected.is_fitted_to_all:
+    too_good = "the gain is a little too good: record"
+    if d.fitted_to_all:
         sentence += (
-            ". Nor do they show its size: the model is fitted to all runs, and every second of the"
-            " validation runs is predicted by a fit to others. Train on a motion as rich as theirs"
+            ". Fitted to these alone, the causes found do not predict the validation runs, so each"
+            " half of these is predicted by a fit to all other data. The motion is the same, so"
+            f" {too_good} training runs that show the causes"
         )
     elif d.causes:
-        sentence += ". The gain is therefore a little too good: record another run to validate on"
+        sentence += f". Therefore {too_good} another run to validate on"
     return [sentence]
 
 
@@ -163,7 +166,7 @@ def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
     pairs = zip(d.baseline.joints, errors, strict=True)
     return (
         {}
-        if d.data.spoilt
+        if d.data.spoilt or d.fitted_to_all
         else {joint: both for joint, both in pairs if both[0] > LARGER * both[1]}
     )
 
@@ -181,7 +184,7 @@ def _differs(d: Diagnosis) -> list[str]:
 
 def _one_run(d: Diagnosis) -> list[str]:
     """Report the limits of one training run, unless a cause is named."""
-    if d.causes or d.data.spoilt or len(d.fitted) > 1 or d.selected.by_all:
+    if d.causes or d.data.spoilt or len(d.fitted_runs) > 1 or d.sought_on_all:
         return []
     if d.status == "nothing_missing" and not _differing(d):
         return []
@@ -193,7 +196,7 @@ def _one_run(d: Diagnosis) -> list[str]:
 
 def _one_kind(d: Diagnosis) -> list[str]:
     """Report the limits of runs of one kind."""
-    kinds = {run.motion.run for run in d.fitted}
+    kinds = {run.motion.run for run in d.fitted_runs}
     if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
         return []  # other machines have no wearer
     if kinds == {"exo_alone"}:
@@ -202,7 +205,7 @@ def _one_kind(d: Diagnosis) -> list[str]:
             "looks like a mass off the axis. Record with_human runs as well"
         ]
     if kinds == {"with_human"}:
-        has_cuffs = any(run.motion.forces is not None for run in d.fitted)
+        has_cuffs = any(run.motion.forces is not None for run in d.training_runs)
         apart = "are separated by the cuff forces alone" if has_cuffs else "cannot be separated"
         return [
             f"every run is with a person: causes in the machine and in the person {apart}, and the "

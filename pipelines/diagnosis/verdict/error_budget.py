@@ -110,7 +110,7 @@ def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
     # Judging has fitted the sets that lack one cause at most; smaller ones are fitted here.
-    return d.trial.keeping(d.after, labels).errors.rms ** 2
+    return d.scheme.refitted(d.after, labels).errors.rms ** 2
 
 
 def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:

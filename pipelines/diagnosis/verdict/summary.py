@@ -35,7 +35,7 @@ def _noise_without_periods(d: Diagnosis) -> str:
     weighed, floor = d.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
-    if floor and d.selected.by_all:
+    if floor and d.sought_on_all:
         return ""  # the runs that were searched hold periods
     if floor:
         return (
@@ -177,12 +177,12 @@ def _dropped(d: Diagnosis) -> str:
     words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
     plural = len(labels) > 1
     text = f" {words[:1].upper()}{words[1:]} would explain"
-    if d.selected.by_all:
+    if d.sought_on_all:
         they, lower, s = ("they", "lower", "") if plural else ("it", "lowers", "s")
-        by_training = d.causes and not d.selected.is_fitted_to_all
-        how = "fitted to the training runs alone" if by_training else "cross-validated"
+        by_training = d.causes and not d.fitted_to_all
+        how = "fitted to the training runs alone," if by_training else "in cross-validation"
         too_little = f"{they} {lower} the error on the validation runs too little, or raise{s} it"
-        return f"{text} all runs together, but {how}, {too_little}."
+        return f"{text} all runs together, but {how} {too_little}."
     return (
         f"{text} the training runs, but {'raise' if plural else 'raises'} the error on the"
         " validation runs."

@@ -49,8 +49,10 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
     dependences : list of Dependence
         Of the extended model's residual.
     """
-    # The term is fitted to training runs and measured on validation runs, as every model is.
-    term = smooth_term(d.fitted, residuals_on(d.after.fit, d.fitted, d.baseline))
+    # The term is fitted to training runs, as it is measured on validation runs.
+    count = len(d.training_runs)
+    residuals = residuals_on(d.after.fit, d.fitted_runs, d.baseline)
+    term = smooth_term(d.training_runs, residuals[:count])
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     joints = [
         r - np.nan_to_num(term.torque(run))

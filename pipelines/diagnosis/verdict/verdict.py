@@ -40,8 +40,8 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "summary": summary(d, named, remainder),
         "finding": None if d.data.spoilt else finding_in_words(d, named, remainder),
         "findings": findings(d),
-        "sought_on": "train" if d.selected.by_all is None else "all",
-        "fitted_to": "all" if d.selected.is_fitted_to_all else "train",
+        "sought_on": "all" if d.sought_on_all else "train",
+        "fitted_to": "all" if d.fitted_to_all else "train",
         "router": {
             joint.name: shares.as_json()
             for joint, shares in zip(joints, d.selected.router, strict=True)

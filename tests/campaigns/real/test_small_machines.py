@@ -1,4 +1,4 @@
-"""Machines with little evidence: named causes predict runs that no fit has seen, and no travel is
+"""Machines with little evidence: named causes predict data that no fit has seen, and no travel is
 reported."""
 
 import pytest
@@ -16,7 +16,7 @@ from tests.campaigns.real.machines import LOGS, diagnosed, motions, recordings
         ("modexo", "partly_explained"),
     ],
 )
-def test_of_small_or_dirty_logs_only_what_predicts_unseen_runs_is_named(
+def test_of_small_or_dirty_logs_only_what_predicts_unseen_data_is_named(
     real_data, tmp_path, machine, status
 ):
     outcome = diagnosed(LOGS[machine], real_data, tmp_path).verdict
