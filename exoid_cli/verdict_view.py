@@ -136,7 +136,9 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
         rows.append((joint.name, *numbers, *excess))
     effort = either(joint.effort for joint in joints)
     unit = either(joint.unit("torque") for joint in joints)
-    _show_table(f"{effort} error on data no fit has seen, {unit}", headings, rows)
+    _show_table(
+        f"{effort} error on data no fit has seen, away from reversals, {unit}", headings, rows
+    )
 
 
 def _show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

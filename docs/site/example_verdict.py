@@ -45,7 +45,7 @@ PARTS = {
     "missing": "is anything missing?",
     "path": "what is missing, and where",
     "shares": "where the error of rigid body",
-    "errors": "torque error on runs",
+    "errors": "torque error on data",
     "cause": "parallel_spring at the knee",
 }
 """How the paragraphs of the printed verdict begin."""
@@ -103,8 +103,10 @@ def main() -> None:
         parts = paragraphs(diagnosed(Path(name)))
         for figure in FIGURES:
             shutil.copy(Path(name) / f"{figure}.png", DOCS / "images")
-    for page in PAGES:
-        page.write_text(filled(page.read_text(encoding="utf-8"), parts), encoding="utf-8")
+    # All before any is written: a part may be missing.
+    pages = {page: filled(page.read_text(encoding="utf-8"), parts) for page in PAGES}
+    for page, text in pages.items():
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

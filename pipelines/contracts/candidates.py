@@ -20,7 +20,12 @@ CANDIDATES = Contract(
             "what was fitted",
             dtype=pa.list_(pa.struct([("name", TEXT), ("value", FLOAT), ("unit", TEXT)])),
         ),
-        Column("train_score", "", "score on the train runs", nullable=True),
+        Column(
+            "train_score",
+            "",
+            "log odds against the empty set, after the validation runs judged",
+            nullable=True,
+        ),
         per_joint("rmse_before", "validate RMSE of the baseline", nullable=True),
         per_joint("rmse_after", "validate RMSE with the causes", nullable=True),
         Column(

@@ -166,6 +166,8 @@ class Posterior(_Object):
     unlisted: Probability
     causes: dict[str, Probability]
     laws: dict[str, Probability]
+    searched_causes: dict[str, Probability] = {}
+    validation_log_odds: dict[str, Number] = {}
     systematic_error_removed: dict[str, Probability] = {}
 
 

@@ -28,6 +28,15 @@ def test_every_part_that_a_page_asks_for_is_there(example):
         assert set(asked) <= set(example.PARTS)
 
 
+def test_every_part_of_a_page_begins_as_its_name_says(example):
+    """What is printed has changed, or what a part is recognized by."""
+    for page in example.PAGES:
+        for block, names, _ in example.MARK.findall(page.read_text(encoding="utf-8")):
+            _, _, after = page.read_text(encoding="utf-8").partition(block)
+            shown = after[: after.index("```")]
+            assert set(names.split()) == set(example.paragraphs(shown))
+
+
 def test_parts_are_recognized_by_their_first_words_and_long_sentences_are_broken(example):
     sentence = "Missing from the simulation: " + "a cause and " * 10
     parts = example.paragraphs(

@@ -86,8 +86,10 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
 
 def _refuse_twins(motions: Sequence[Motion]) -> None:
     """Raise InputError for one measurement under two names."""
-    # A copy's error would count as that of a run that no fit has seen.
-    for one, other in combinations(motions, 2):
+    # A copy's error would count as that of a run that no fit has seen. Dead channels are alike too,
+    # and have a message of their own.
+    varying = [motion for motion in motions if np.ptp(motion.torque, axis=0).any()]
+    for one, other in combinations(varying, 2):
         if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
             raise InputError(
                 f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as"

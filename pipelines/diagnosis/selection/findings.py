@@ -188,4 +188,5 @@ def _ranked(posterior: Posterior, inside: Inside, *, are_laws: bool) -> Iterator
 def _chance(posterior: Posterior, inside: Inside) -> float:
     """Return the probability that the true set has at least one of these elements."""
     pairs = zip(posterior.sets, posterior.probabilities, strict=True)
-    return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))
+    # Rounding may make a sum of probabilities slightly larger than one.
+    return min(float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen))), 1.0)

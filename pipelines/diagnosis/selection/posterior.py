@@ -152,7 +152,7 @@ class Posterior:
 
 
 def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
-    """Weigh all sets of up to three elements.
+    """Weigh sets of up to three elements, each with bursts at a joint as well.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.wording.label import amount, label_in_words
 
 HIDING = 0.2
-"""Share of a joint's torque above which an estimated noise floor is doubtful: no sensor is as
+"""Share of a joint's torque above which a noise floor is doubtful: no sensor is as
 noisy, and friction is seldom more."""
 
 LARGER = 2.0
@@ -49,20 +49,20 @@ def caveats(d: Diagnosis) -> list[str]:
 
 
 def floor_that_hides(d: Diagnosis) -> dict[str, float]:
-    """Return joints whose noise floor is estimated without periods and high, with its share."""
-    if d.floor.from_periods:
-        return {}
+    """Return joints whose noise floor is high, with its share of their torque."""
     shares = zip(d.baseline.joints, (d.floor_rms / d.torque_rms).tolist(), strict=True)
     return {joint: share for joint, share in shares if share > HIDING}
 
 
 def _high_floor(d: Diagnosis) -> list[str]:
     machine = d.baseline.machine
+    measured = d.floor.from_periods
+    known = "is" if measured else "is estimated as"
+    record = "Check" if measured else "Repeat one motion and record its period, and check"
     return [
-        f"the noise floor of {the(joint)} is estimated as {share:.0%} of its "
+        f"the noise floor of {the(joint)} {known} {share:.0%} of its "
         f"{machine.joint(joint).effort}, more than any sensor's noise: it may hide missing "
-        "effects. Repeat one motion and record its period, and check unit, sign and time stamps "
-        "of that channel"
+        f"effects. {record} unit, sign and time stamps of that channel"
         for joint, share in floor_that_hides(d).items()
     ]
 

@@ -97,8 +97,8 @@ def _numbers(d: Diagnosis) -> dict[str, Any]:
 
 def _posterior(d: Diagnosis) -> dict[str, Any] | None:
     """Return the probabilities of nothing missing, of something unlisted, and of each cause."""
-    weighed = d.selected.posterior
-    if weighed is None:
+    weighed, searched = d.selected.posterior, d.selected.searched
+    if weighed is None or searched is None:
         return None
     listed = {e.label for e in weighed.elements if not e.is_law}
     return {
@@ -106,6 +106,8 @@ def _posterior(d: Diagnosis) -> dict[str, Any] | None:
         "unlisted": d.selected.answer.unlisted,
         "causes": {label: p for label, p in weighed.marginals.items() if label in listed},
         "laws": {label: p for label, p in weighed.marginals.items() if label not in listed},
+        "searched_causes": {label: p for label, p in searched.marginals.items() if label in listed},
+        "validation_log_odds": dict(d.selected.charged),
         "systematic_error_removed": dict(d.selected.removed),
     }
 

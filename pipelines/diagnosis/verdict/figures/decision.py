@@ -64,7 +64,10 @@ LINE_IN, SMALLEST_IN, FEWEST = 0.17, 4.4, 17
 """Height of a line of a label, least height of the figure, and its least number of lines."""
 SHADES = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
 NOTHING = "nothing is missing"
-PROBABILITY = "probability of each set of causes and laws; bold: named, or tied with it"
+PROBABILITY = (
+    "probability of each set of causes and laws; a cause's own is the sum over its sets\n"
+    "bold: named, or tied with it"
+)
 BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
 AGAINST = " (validation runs against it)"
 
@@ -208,7 +211,7 @@ def _bars(d: Diagnosis) -> list[Bar]:
             # A set that contains the first one agrees with it on these causes.
             and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest
         ):
-            words += ", mostly the first and more"
+            words += ", mostly the first with a further cause or law"
         bars.append(Bar(rest, ((fill(words, LABEL), None, False, False),)))
     return bars
 
@@ -266,7 +269,10 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         label.set_fontweight("bold" if named else "normal")
     # Without a least number of lines, few bars fill the axis.
     axis.set_ylim(max(top, FEWEST), -0.4)
+    # Beyond 1 only the number beside a long bar.
     axis.set_xlim(0.0, 1.1)
+    axis.set_xticks(np.linspace(0.0, 1.0, 6))
+    axis.spines["bottom"].set_bounds(0.0, 1.0)
     axis.grid(axis="y", visible=False)
     axis.set_axisbelow(True)
     axis.tick_params(axis="y", length=0)
@@ -277,7 +283,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         families.values(),
         families.keys(),
         loc="upper left",
-        bbox_to_anchor=(-0.02, -0.14),
+        bbox_to_anchor=(-0.02, -0.17),
         fontsize=8,
         ncols=4,
     )
