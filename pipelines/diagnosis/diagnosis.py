@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
-from pipelines.diagnosis.fit.presliding_test import BuildUp
-from pipelines.diagnosis.fit.uncertainty import Uncertainty
+from pipelines.diagnosis.fit.presliding_test import BuildUp, built_up
+from pipelines.diagnosis.fit.simulation_error import simulation_error
+from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
 from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
 from pipelines.diagnosis.fit.validation_scheme import ValidationScheme
+from pipelines.diagnosis.judged_fit import JudgedFit
 from pipelines.diagnosis.selection.answer import NamedCause
 from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
@@ -55,6 +59,45 @@ class Diagnosis:
     samples."""
     simulation_error: dict[str, NDArray | None]
     """(J,) rad of 1 s simulations with the baseline and with the extended model."""
+
+    @classmethod
+    def of(cls, data: TrainingData, noise: NoiseModel, judged: JudgedFit) -> "Diagnosis":
+        """Compute intervals, parameters, simulation errors and reversals.
+
+        Parameters
+        ----------
+        data : TrainingData
+        noise : NoiseModel
+            Of the training runs.
+        judged : JudgedFit
+            The named causes, fitted and judged.
+        """
+        baseline, before, after = data.baseline, judged.before, judged.after
+        fitted, validate = judged.scheme.runs, before.runs
+        known = uncertainty(after.fit, fitted, baseline, imperfection(fitted))
+        parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
+        drift = simulation_error(before.fit, validate, baseline)
+        # Without named causes both models are the same.
+        after_drift = drift if after is before else simulation_error(after.fit, validate, baseline)
+        residuals = {"baseline": before.residuals, "extended": after.residuals}
+        train = fitted[: len(data.train)]
+        reversals = [] if data.spoilt else built_up(after.fit, baseline, train, validate)
+        return cls(
+            data,
+            noise,
+            judged.scheme,
+            judged.selected,
+            before,
+            after,
+            judged.without,
+            after.floor,
+            known,
+            parameters,
+            covariance,
+            parameter_rows.residual_table(validate, residuals),
+            tuple(reversals),
+            {"baseline": drift, "extended": after_drift},
+        )
 
     @property
     def baseline(self) -> Baseline:

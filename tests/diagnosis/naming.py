@@ -6,7 +6,6 @@ from itertools import combinations
 
 import numpy as np
 
-from pipelines.diagnosis.diagnose import _diagnosis
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.judged_fit import judged_fit
 from pipelines.diagnosis.selection.answer import Answer, NamedCause
@@ -42,7 +41,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         findings=reported,
         dropped=frozenset(),
     )
-    return _diagnosis(d.data, d.noise, judged_fit(given, d.scheme, d.noise))
+    return Diagnosis.of(d.data, d.noise, judged_fit(given, d.scheme, d.noise))
 
 
 def _best(d: Diagnosis, label: str):

@@ -49,7 +49,7 @@ def test_bars_fall_and_with_that_of_all_others_they_add_up_to_one():
 def test_it_is_said_where_most_of_the_other_sets_hold_the_first_and_more():
     certain = {(SPEED,): 0.98, (SPEED, OFFSET): 0.008, (SPEED, COGGING): 0.008, (): 0.004}
     words = " ".join(_bars(diagnosed(certain))[-1].elements[0][0].split())
-    assert words == "3 other sets, mostly the first and more"
+    assert words == "3 other sets, mostly the first with a further cause or law"
 
 
 def test_every_family_has_a_colour_of_its_own():
