@@ -229,7 +229,9 @@ def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(m
     )
     with_it, without = diagnose([*motions, stuck]), diagnose(motions)
     assert with_it.causes == without.causes and with_it.status == without.status
-    assert {run.motion.file for run in with_it.train} == {run.motion.file for run in without.train}
+    assert {run.motion.file for run in with_it.fitted_runs} == {
+        run.motion.file for run in without.fitted_runs
+    }
 
 
 @pytest.mark.parametrize("factor", [1e-2, 1e-6])

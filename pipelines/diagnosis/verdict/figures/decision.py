@@ -269,7 +269,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         label.set_fontweight("bold" if named else "normal")
     # Without a least number of lines, few bars fill the axis.
     axis.set_ylim(max(top, FEWEST), -0.4)
-    # Beyond 1 only the number beside a long bar.
+    # Beyond 1 there is only the number of a long bar.
     axis.set_xlim(0.0, 1.1)
     axis.set_xticks(np.linspace(0.0, 1.0, 6))
     axis.spines["bottom"].set_bounds(0.0, 1.0)
