@@ -18,6 +18,7 @@ from tests.campaigns.blind.cases import (
     SINGLES,
     Case,
     case,
+    drawn,
     full,
     mixed,
     of_one_joint,
@@ -44,6 +45,9 @@ def main(
     seeds: Annotated[Seeds, typer.Option(help="Which range of seeds.")] = Seeds.tuning,
     seed_base: Annotated[
         int | None, typer.Option(help="First seed, instead of the range's own.")
+    ] = None,
+    most: Annotated[
+        int | None, typer.Option(min=1, help="Only so many of the cases, drawn at random.")
     ] = None,
     mix: Annotated[str, typer.Option(help=f"Shares of the categories, as {_written(MIX)}.")] = "",
     every: Annotated[
@@ -86,6 +90,8 @@ def main(
         if fixed
         else _planned(cases, base, mix, every, only, one_joint, worlds)
     )
+    if most is not None:
+        planned = drawn(planned, most)
     console = Console()
     if simulate_only:
         folders = Folders(out.resolve())

@@ -2,7 +2,9 @@
 
 ``python -m tests.campaigns.blind.page REPORT... docs/blind.md`` writes the page and its
 ``images/blind-reliability.png``. The mixed examination comes first: its probabilities are those
-drawn. ``docs/blind-machines.md`` is written from that of the machines of one joint.
+drawn. ``docs/blind-machines.md`` is written from that of the machines of one joint. With
+``--pooled`` the cases of all examinations are counted together: parts of one that was too long for
+one day.
 """
 
 from collections.abc import Callable, Sequence
@@ -84,18 +86,22 @@ level slide and a lift. Each has one run of 60 to 80 s to train on and one to va
 """
 
 
-def page(examinations: Sequence[Examination], picture: str = "", revision: str = "") -> str:
+def page(
+    parts_run: Sequence[Examination], picture: str = "", revision: str = "", *, pooled: bool = False
+) -> str:
     """Return the page as Markdown.
 
-    ``picture`` is where its figure lies beside it, ``revision`` that of the exoid that answered.
+    ``picture`` is where its figure lies beside it, ``revision`` that of the exoid that answered;
+    ``pooled`` counts the cases of all examinations together.
     """
+    examinations = [_pooled(parts_run)] if pooled else parts_run
     richest = max(examinations, key=lambda e: len(of(e.scores, "single")))
     legs = any(s.machine == "leg" for e in examinations for s in e.scores)
     parts = [
         INTRODUCTION,
         "" if legs else OF_ONE_JOINT,
         f"The answers are those of revision `{revision}`.\n" if revision else "",
-        _what_was_run(examinations),
+        _what_was_run(parts_run, pooled),
         _targets(examinations),
     ]
     parts += [_section(table, remark, examinations, [richest]) for table, remark in OF_SINGLES]
@@ -120,7 +126,17 @@ def _section(
     return "\n".join(lines)
 
 
-def _what_was_run(examinations: Sequence[Examination]) -> str:
+def _pooled(examinations: Sequence[Examination]) -> Examination:
+    """Return one examination with the cases of several."""
+    scores = [score for one in examinations for score in one.scores]
+    if len({(s.seed, s.machine) for s in scores}) < len(scores):
+        raise typer.BadParameter(
+            "a seed is in two of these records, so its case would count twice: give each once"
+        )
+    return Examination("; ".join(one.command for one in examinations), scores)
+
+
+def _what_was_run(examinations: Sequence[Examination], pooled: bool) -> str:
     rows = []
     for number, examination in enumerate(examinations, 1):
         seeds = [s.seed for s in examination.scores]
@@ -133,8 +149,9 @@ def _what_was_run(examinations: Sequence[Examination]) -> str:
             )
         )
     section = Page("What was run", ("", "command", "cases", "seeds"), rows)
+    together = "The tables count all these cases together, as examination 1.\n\n" * pooled
     uses_of_seeds = {use for e in examinations for use in uses(s.seed for s in e.scores)}
-    return f"{titled(section)}\n{_provenance(uses_of_seeds)}\n"
+    return f"{titled(section)}\n{together}{_provenance(uses_of_seeds)}\n"
 
 
 def _provenance(uses_of_seeds: set[str]) -> str:
@@ -172,13 +189,17 @@ def main(
     revision: Annotated[
         str, typer.Option(help="Which revision of exoid gave the answers, where it is not this.")
     ] = "",
+    pooled: Annotated[
+        bool, typer.Option("--pooled", help="Count the cases of all records together.")
+    ] = False,
 ) -> None:
     """Write the page and its picture."""
     examinations = [read(path) for path in records]
     picture = Path("images") / f"{out.stem}-reliability.png"
     (out.parent / picture).parent.mkdir(parents=True, exist_ok=True)
-    reliability_figure.draw(examinations[0].scores, out.parent / picture)
-    out.write_text(page(examinations, str(picture), revision))
+    drawn = _pooled(examinations) if pooled else examinations[0]
+    reliability_figure.draw(drawn.scores, out.parent / picture)
+    out.write_text(page(examinations, str(picture), revision, pooled=pooled))
 
 
 if __name__ == "__main__":

@@ -2,10 +2,11 @@
 
 from collections import Counter
 
-from tests.campaigns.blind.cases import MIX, SINGLES, full, mixed, of_one_joint
+from tests.campaigns.blind.cases import MIX, SINGLES, drawn, full, mixed, of_one_joint
 from tests.campaigns.blind.causes import HUMAN_CAUSES
 from tests.campaigns.blind.mechanisms import ONE_JOINT
 from tests.campaigns.blind.outside import OF_ONE_JOINT
+from tests.campaigns.blind.seeds import uses
 
 
 def test_a_mixed_examination_has_all_categories_and_every_cause():
@@ -46,3 +47,17 @@ def test_machines_of_one_joint_take_turns_and_hide_what_each_can_have():
         f"outside:{k}" for k in OF_ONE_JOINT
     }
     assert {c.machine for c in cases if c.category == "none"} == set(ONE_JOINT)
+
+
+def test_a_part_of_an_examination_is_drawn_at_random_and_a_larger_part_holds_a_smaller():
+    cases = mixed(300, 900_000)
+    part, more = drawn(cases, 60), drawn(cases, 120)
+    assert more[:60] == part
+    assert set(drawn(cases, 1000)) == set(cases)
+    share = sum(c.category == "single" for c in part) / 60
+    assert abs(share - MIX["single"]) < 0.15
+
+
+def test_seeds_whose_cases_were_read_are_for_tuning():
+    assert uses([839_999, 840_360]) == {"reporting"}
+    assert uses([840_000, 840_359]) == {"tuning"}

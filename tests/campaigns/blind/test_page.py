@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 from matplotlib import image
+from typer import BadParameter
 
 from tests.campaigns.blind.page import main, page
 from tests.campaigns.blind.report import Examination, read, write
@@ -155,3 +156,15 @@ def test_the_page_and_its_picture_are_written_from_records(tmp_path, scores):
     ).read_text() or scores == [SILENT]
     picture = image.imread(tmp_path / "docs" / "images" / "blind-reliability.png")
     assert picture.std() > 0
+
+
+def test_parts_of_an_examination_are_counted_together_and_no_case_twice():
+    more = Examination("again", [replace(SCORE, seed=540_100), replace(MISTAKEN, seed=540_101)])
+    text = page([MIXED, more], pooled=True)
+    run = section(text, "What was run")
+    assert f"`{MIXED.command}`" in run and "`again`" in run
+    assert "as examination 1" in run and "as examination 1" not in page([MIXED, more])
+    assert "Examination 2" not in text
+    assert "| backlash@knee | 50.0 % of 4 (15 to 85) |" in section(text, "By cause and joint")
+    with pytest.raises(BadParameter, match="would count twice"):
+        page([MIXED, MIXED], pooled=True)
