@@ -18,13 +18,12 @@ from tests.campaigns.blind.cases import (
     SINGLES,
     Case,
     case,
-    drawn,
     full,
     mixed,
     of_one_joint,
 )
 from tests.campaigns.blind.causes import WORLDS
-from tests.campaigns.blind.examine import Folders, examine, prepare
+from tests.campaigns.blind.examine import Folders, drawn, examine, prepare
 from tests.campaigns.blind.plan import JOINTS
 from tests.campaigns.blind.seeds import RANGES
 

@@ -1,6 +1,5 @@
 """Which cases an examination consists of: what is hidden in each, by its number alone."""
 
-import random
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
@@ -88,13 +87,6 @@ def mixed(
         for i in range(part)
     ]
     return [case(seed_base + k, *one) for k, one in enumerate(planned)]
-
-
-def drawn(planned: Sequence[Case], most: int) -> list[Case]:
-    """Return at most so many of the cases, in a random order that is the same for any number."""
-    order = list(planned)
-    random.Random(1).shuffle(order)
-    return order[:most]
 
 
 def _counts(cases: int, mix: dict[str, float]) -> dict[str, int]:

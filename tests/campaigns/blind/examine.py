@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import random
 import resource
 import shutil
 import subprocess
@@ -99,6 +100,13 @@ def neutral_name(case: Case) -> str:
     """Name a session so that the name says nothing, and is another one when the simulator has
     changed."""
     return hashlib.sha256(f"{fingerprint()} {case}".encode()).hexdigest()[:12]
+
+
+def drawn(planned: Sequence[Case], most: int) -> list[Case]:
+    """Return at most so many of the cases, in a random order that is the same for any number."""
+    order = list(planned)
+    random.Random(1).shuffle(order)
+    return order[:most]
 
 
 def examine(

@@ -2,8 +2,9 @@
 
 from collections import Counter
 
-from tests.campaigns.blind.cases import MIX, SINGLES, drawn, full, mixed, of_one_joint
+from tests.campaigns.blind.cases import MIX, SINGLES, full, mixed, of_one_joint
 from tests.campaigns.blind.causes import HUMAN_CAUSES
+from tests.campaigns.blind.examine import drawn
 from tests.campaigns.blind.mechanisms import ONE_JOINT
 from tests.campaigns.blind.outside import OF_ONE_JOINT
 from tests.campaigns.blind.seeds import uses
