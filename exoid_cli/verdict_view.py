@@ -122,6 +122,7 @@ def _listed(words: Iterable[str]) -> str:
 
 def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     from pipelines.contracts.joints import HIP_AND_KNEE, either
+    from pipelines.wording.increased_errors import increased_errors
 
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
     # Files of older versions lack one of these errors.
@@ -139,6 +140,8 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     _show_table(
         f"{effort} error on data no fit has seen, away from reversals, {unit}", headings, rows
     )
+    for sentence in increased_errors(verdict, joints):
+        console.note(f"{sentence}.")
 
 
 def _show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

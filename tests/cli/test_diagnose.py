@@ -42,6 +42,20 @@ def test_where_no_cause_is_named_no_error_with_causes_is_shown(capsys):
     assert "excess left" not in printed
 
 
+def test_errors_that_the_causes_increase_are_printed_below_those_that_fall(capsys):
+    grown = {
+        "baseline_rmse_unmasked_nm": {"hip": 0.8, "knee": 2.95},
+        "extended_rmse_unmasked_nm": {"hip": 0.4, "knee": 3.38},
+    }
+    show_verdict(checked_verdict(**grown), HIP_AND_KNEE)
+    printed = " ".join(capsys.readouterr().out.split())
+    assert (
+        "Reversals included, the knee's torque error is 2.95 → 3.38 N·m with the causes" in printed
+    )
+    show_verdict(checked_verdict(), HIP_AND_KNEE)
+    assert "Reversals included" not in capsys.readouterr().out
+
+
 def test_an_error_stands_next_to_its_torque_which_older_files_lack(capsys):
     show_verdict(checked_verdict(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
     show_verdict(checked_verdict(), HIP_AND_KNEE)

@@ -9,13 +9,13 @@ from pipelines.contracts.joints import in_words
 from pipelines.contracts.verdict import Cause
 from pipelines.errors import InputError
 from pipelines.report.html.page import render
-from pipelines.report.numbers import digits
 from pipelines.report.sections.error_budget import torque_unit
 from pipelines.report.sections.headline import headline, lead, machine, status
 from pipelines.report.sections.parameters import Estimate, estimates
 from pipelines.report.sections.settings_diff import SettingDifference, settings_diff
 from pipelines.report.session import Artifact, Session
 from pipelines.wording.causes import any_label_in_words, cause_in_words
+from pipelines.wording.numbers import digits
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from pipelines import __version__
 from pipelines.contracts import describe
 from pipelines.contracts.provenance import sha256
 from pipelines.plotting.chart import Chart, Series
-from pipelines.report.numbers import digits, digits_for
 from pipelines.report.sections.animation import Animation
 from pipelines.report.session import Artifact
+from pipelines.wording.numbers import digits, digits_for
 from pipelines.workflow.graph import SWEEP
 
 LARGEST_BYTES = 5_000_000

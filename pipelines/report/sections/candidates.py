@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.report.numbers import digits
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
+from pipelines.wording.numbers import digits
 
 TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn"}
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any
 
-from pipelines.report.numbers import digits
 from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import unit
 from pipelines.report.session import Artifact, Session
+from pipelines.wording.numbers import digits
 
 NUMBERS = {
     "condition": "condition number",

@@ -10,8 +10,9 @@ from pipelines.contracts import Joint
 from pipelines.plotting.chart import Chart, DrawnTable, Role
 from pipelines.plotting.residual_panels import torque_panels
 from pipelines.plotting.simulation_panels import window_panels
-from pipelines.report.sections.standstill import moving, simulation_error_grew, torque_error_grew
+from pipelines.report.sections.standstill import moving
 from pipelines.report.session import Artifact, Session
+from pipelines.wording.increased_errors import simulation_error_grew, torque_error_grew
 
 MODELS = {
     "baseline": (Role.BEFORE, "rigid body and friction"),

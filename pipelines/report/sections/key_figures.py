@@ -6,13 +6,13 @@ from typing import Any
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
 from pipelines.contracts.verdict import Cause, Verdict
-from pipelines.report.numbers import digits
 from pipelines.report.sections.error_budget import falls, torque_unit
 from pipelines.report.sections.fit_quality import replayed
 from pipelines.report.sections.section import Content
-from pipelines.report.sections.standstill import simulation_error_grew
 from pipelines.report.session import Session
 from pipelines.wording.causes import cause_in_words
+from pipelines.wording.increased_errors import simulation_error_grew
+from pipelines.wording.numbers import digits
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from pipelines.plotting.chart import Chart
-from pipelines.report.numbers import digits
 from pipelines.report.sections.fit_quality import Score, models_of, replayed, run_names, scores
 from pipelines.report.sections.not_simulated import lacks_causes, refusal
 from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
+from pipelines.wording.numbers import digits
 
 
 @dataclass(frozen=True)
