@@ -100,7 +100,8 @@ def why_no_step(stage: str, run: str | None = None) -> str:
         )
     if stage == "simulate":
         return "`exoid simulate` follows a leg's gait, and the recordings are of another machine"
-    return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
+    what = "`exoid diagnose`" if stage == "diagnose" else f"stage {stage}"
+    return f"no [[run]] has purpose validate, without which {what} has nothing to do here"
 
 
 def _how_to_begin(named: bool) -> str:

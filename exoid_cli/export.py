@@ -111,7 +111,7 @@ def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path])
     result = {"to": chosen.name, "run": exported.run, "files": written}
     console.emit(result | {"warnings": exported.driving(), "terms": terms})
     rows = [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
-    console.table(("term", "held", "how"), rows)
+    console.table(("term", "in the file", "how"), rows)
     for sentence in exported.driving():
         console.warn(sentence)
     for term, holding in holdings:

@@ -173,8 +173,7 @@ def _write(
     from pipelines.identification.figures import draw
 
     with console.working("drawing"):
-        draw(RESIDUALS.scan(residuals_file), output)
-    return sorted(path.name for path in output.glob("*.png"))
+        return draw(RESIDUALS.scan(residuals_file), output)
 
 
 def _report(model: "Identified", machine: "Machine") -> None:

@@ -27,7 +27,7 @@ def init(
 
     # The Makefile calls exoid by its path: make may have another PATH, without the environment.
     command = Path(sys.argv[0])
-    words = [sys.executable, "-m", "exoid_cli.app"]
+    words = [sys.executable, "-m", "exoid_cli"]
     if command.name == "exoid":
         words = [str(command.resolve())]
     create(folder, exoid=shlex.join(words))

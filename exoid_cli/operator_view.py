@@ -104,7 +104,7 @@ class OperatorView:
             return ""
         # The most urgent first: with drives enabled after a stop, only the operator can act.
         if progress.still_enabled:
-            return "PRESS E-STOP"
+            return "USE THE EMERGENCY STOP"
         if progress.abort is not None:
             return "ABORT"
         if now - self._near_at < shown_s:

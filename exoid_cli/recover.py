@@ -29,7 +29,8 @@ def recover(
 ) -> None:
     """Make a recording of a killed run's journal, and say what is missing.
 
-    The journal is removed once the recording is written. No file is overwritten.
+    The journal is removed once the recording is written, unless it is damaged. No file is
+    overwritten.
 
     \b
     Examples:
@@ -86,5 +87,4 @@ def _in_words(recording: "Recovery") -> str:
 def _as_json(recording: "Recovery") -> dict:
     keys = ("samples", "planned", "cut_off", "gaps", "abort", "damaged")
     summary = {key: getattr(recording.summary, key) for key in keys}
-    # Every journal has checksums; programs that read this JSON expect the key.
-    return {"path": recording.path} | summary | {"checked": True}
+    return {"path": recording.path} | summary

@@ -67,7 +67,7 @@ def check(
     if file is None:
         folder = open_experiment(config, problem="no rig file is given", allow_damaged=True)
         file = folder.experiment.file(folder.experiment.acquire.rig)
-    # Outside an experiment no rate is wanted, and none is compared.
+    # Outside an experiment a virtual rig has a rate of its own; a real one is only measured.
     if rate_hz is None and (config or in_experiment_folder()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":

@@ -164,7 +164,7 @@ def _show_known(known: "Known") -> None:
 
 def _show_cause(cause: "Cause") -> None:
     from pipelines.contracts.joints import the
-    from pipelines.wording.label import effect_of_cause, in_words
+    from pipelines.wording.causes import cause_in_words
 
     where = f" at {the(cause.joint)}" if cause.joint else ""
     likely = f"probability {cause.probability:.2f}"
@@ -176,7 +176,7 @@ def _show_cause(cause: "Cause") -> None:
     for sentence in cause.evidence:
         console.note(f"- {sentence}")
     for tie in cause.indistinguishable_from:
-        console.note(f"or {in_words(effect_of_cause(tie))}: {tie.why}; {tie.how_to_separate}")
+        console.note(f"or {cause_in_words(tie)}: {tie.why}; {tie.how_to_separate}")
 
 
 def _in_words(parameter: "Parameter") -> str:

@@ -18,7 +18,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import regressor_rows
 
 CRITERIA = ("log_det", "condition", "scaled_condition")
-LOG_DET, CONDITION, SCALED_CONDITION = range(3)
+LOG_DET, SCALED_CONDITION = CRITERIA.index("log_det"), CRITERIA.index("scaled_condition")
 
 FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
 

@@ -49,7 +49,7 @@ def resting_state(q: NDArray) -> NDArray:
     Returns
     -------
     (4, J) array
-        Motor and link angles, rad, and their speeds, rad/s.
+        Rows Q, DQ, THETA, DTHETA: angle (rad) and speed (rad/s) of the links, then of the motors.
     """
     still = np.zeros_like(q, dtype=float)
     return np.array([q, still, q, still], dtype=float)

@@ -48,19 +48,17 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
 
 def _poses(joints: int) -> NDArray:
     """Return joint angles, (k, J) rad; no mass matrix depends on the first joint's."""
+    if joints < 3:
+        poses = np.zeros((len(KNEE_ANGLES), joints))
+        # One joint has the same mass at each of them.
+        poses[:, -1] = KNEE_ANGLES
+        return poses
     # Only here: to import all of scipy.stats takes a third of a second.
     from scipy.stats import qmc
 
-    # Number of poses of a machine of more than two joints.
-    more_poses = 500
-    poses = np.zeros((len(KNEE_ANGLES) if joints < 3 else more_poses, joints))
-    if joints < 3:
-        # One joint has the same mass at each of them.
-        poses[:, -1] = KNEE_ANGLES
-    else:
-        poses[:, 1:] = np.pi * (
-            2.0 * qmc.Halton(joints - 1, scramble=False).random(more_poses) - 1.0
-        )
+    count = 500
+    poses = np.zeros((count, joints))
+    poses[:, 1:] = np.pi * (2.0 * qmc.Halton(joints - 1, scramble=False).random(count) - 1.0)
     return poses
 
 

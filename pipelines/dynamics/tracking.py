@@ -58,8 +58,9 @@ class ClosedLoop:
         if len(self.time) == self.asked:
             return ""
         # The first joint whose last angle is not within a turn; NaN is not, either.
-        joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))].name
-        return f"the simulated {joint} ran past one full turn at t = {self.time[-1]:.3f} s"
+        joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))]
+        bound = "one full turn" if joint.kind == "revolute" else f"{TURN:.3g} m"
+        return f"the simulated {joint.name} ran past {bound} at t = {self.time[-1]:.3f} s"
 
     def frame(self) -> pd.DataFrame:
         """Return the columns of a ``simulation/1`` table.

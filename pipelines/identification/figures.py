@@ -51,7 +51,7 @@ class _RunData:
         return float(np.sqrt(self.squares[column] / self.scored)) if self.scored else np.nan
 
 
-def draw(residuals: Rows, folder: Path) -> None:
+def draw(residuals: Rows, folder: Path) -> list[str]:
     """Write the figures of every validation run as PNG and PDF.
 
     Parameters
@@ -60,8 +60,13 @@ def draw(residuals: Rows, folder: Path) -> None:
         A ``residuals/1`` table, N·m.
     folder : Path
         Where to write them.
+
+    Returns
+    -------
+    list of str
+        Names of the PNG files.
     """
-    joints = residuals.joints
+    joints, names = residuals.joints, list[str]()
     with plt.rc_context(STYLE):
         for file, run in _validation_runs(residuals).items():
             name = Path(file).stem
@@ -69,6 +74,8 @@ def draw(residuals: Rows, folder: Path) -> None:
             grid = [_residuals(run, joint) for joint in joints]
             title = f"residual of {name} against time, angle and velocity"
             save(grid_figure(title, grid), folder / f"residual-{name}")
+            names += [f"torque-{name}.png", f"residual-{name}.png"]
+    return sorted(names)
 
 
 def _validation_runs(residuals: Rows) -> dict[str, _RunData]:
@@ -99,7 +106,9 @@ def _residuals(run: _RunData, joint: Joint) -> list[Chart]:
     scored = run.frame[run.frame["scored"]]
     model, reach = DrawnTable("running mean", Role.AFTER, scored), residual_reach(scored, joint)
     against = {"time, s": "time_s"} | {
-        f"{joint.name} {quantity}, {joint.unit(quantity)}": joint.column(quantity)
+        f"{joint.name} {joint.place if quantity == 'angle' else quantity}, {joint.unit(quantity)}": (
+            joint.column(quantity)
+        )
         for quantity in ("angle", "velocity")
     }
     charts = []

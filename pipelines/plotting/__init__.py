@@ -1,1 +1,1 @@
-"""The style of exoid's matplotlib figures."""
+"""Charts as data, panels of each kind of table, and figures of them."""

@@ -11,8 +11,9 @@ from pipelines.plotting.chart import DrawnTable, Mark, Panel, Role, Series
 
 GAIN = "feedback_gain_nm_s_rad"
 """Column of the gains in a sweep."""
-LIMIT = 4.0
-"""Height of a panel in largest settled errors; the start from rest exceeds it."""
+REACH = 4.0
+"""Half the height of the panel of errors, in largest settled errors; the start from rest exceeds
+it."""
 
 
 def loop_panels(
@@ -36,19 +37,21 @@ def loop_panels(
     worst = max(settled_error(loop.rows, joint, settled_after_s) for loop in loops)
     unit = joint.unit("angle")
     return (
-        Panel(f"angle, {unit}", tuple(angles)),
+        Panel(f"{joint.place}, {unit}", tuple(angles)),
         # A height of zero is no range, so it becomes None.
         Panel(
             f"error, m{unit}",
             tuple(_series(loops, joint.column("error"), 1e3)),
-            reach=LIMIT * worst or None,
+            reach=REACH * worst or None,
         ),
-        Panel(f"torque, {joint.unit('torque')}", tuple(_series(loops, joint.column("torque")))),
+        Panel(
+            f"{joint.effort}, {joint.unit('torque')}", tuple(_series(loops, joint.column("torque")))
+        ),
     )
 
 
 def settled_error(loop: pd.DataFrame, joint: Joint, settled_after_s: float) -> float:
-    """Return a joint's largest settled error in an adaptive loop, mrad."""
+    """Return a joint's largest settled error in an adaptive loop, mrad; mm at a prismatic joint."""
     error = 1e3 * loop[joint.column("error")].to_numpy()
     return float(np.abs(error[loop["time_s"] >= settled_after_s]).max(initial=0.0))
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from pipelines.contracts.atomic import whole_file
 
 GREY, ORANGE, BLUE = "#7a869a", "#c2410c", "#1d4ed8"
-"""Reference or measurement; model; residual."""
+"""Baseline; first cause, and limits; model with the causes."""
 NOISE, WANDERS, CAUSES = "#d5dae1", "#93b4f5", (ORANGE, "#f59e0b", "#7c2d12")
 """Parts of an error budget: noise floor, non-repeating part, each cause; the rest is blue."""
 

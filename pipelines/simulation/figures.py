@@ -52,7 +52,7 @@ def draw_tracking(
         for joint in joints
     )
     titles = {
-        "tracking": "the leg under adaptive RBF control",
+        "tracking": f"{' and '.join(joint.name for joint in joints)} under adaptive RBF control",
         "error": f"tracking error: {settled} after {settled_after_s:g} s",
         "torque": "torque of the drives, and the network's share of it",
     }

@@ -113,7 +113,6 @@ def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> Lo
         state=state,
         angle=counted,
         speed=motor.dq[k].copy(),
-        torque=plant.model.delivered(motion)[k].copy(),
         # Extrapolated to the sample before, from which the drives go to the first set-point.
         reference=2.0 * motion.reference[k] - ahead,
     )

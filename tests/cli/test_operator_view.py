@@ -98,7 +98,7 @@ def test_an_abort_is_the_first_word_and_its_reason_stands_below(reason, state):
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (80, 7), (40, 5), (30, 24), (14, 3)])
 def test_a_drive_that_could_not_be_disabled_is_the_first_thing_to_read(width, height):
     stuck = view(progress(State.ABORT, abort=ABORTS[2], still_enabled=True))
-    assert picture(stuck, width, height)[0].startswith(" PRESS E-STOP"[:width])
+    assert picture(stuck, width, height)[0].startswith(" USE THE EMERGENCY STOP"[:width])
 
 
 @pytest.mark.parametrize(

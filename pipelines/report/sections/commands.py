@@ -73,9 +73,22 @@ def _folder(path: Path) -> str:
     return f"{path.parent}/"
 
 
+def _in_force(session: Session) -> Experiment:
+    """Return the settings that a command would take from the session's exoid.toml."""
+    return Experiment.load(session.config) if session.config else Experiment()
+
+
 def _design(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
-    return ["design", *config, "-o", str(artifact.path)], needs
+    used, now = resolved(artifact).get("design") or {}, _in_force(session).design
+    # Options that took the place of the settings.
+    options = [
+        word
+        for key in ("criterion", "harmonics", "seed")
+        if session.config and key in used and used[key] != getattr(now, key)
+        for word in (f"--{key}", str(used[key]))
+    ]
+    return ["design", *config, *options, "-o", str(artifact.path)], needs
 
 
 def _record(session: Session, artifact: Artifact) -> Words | None:
@@ -107,7 +120,11 @@ def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str
 
 def _filter(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
-    return ["filter", *_inputs(session, artifact), *config, "-o", str(artifact.path)], needs
+    cutoff_hz = (resolved(artifact).get("filter") or {}).get("cutoff_hz", "auto")
+    changed = session.config and cutoff_hz != _in_force(session).filter.cutoff_hz
+    option = ["--cutoff-hz", str(cutoff_hz)] if changed else []
+    words = ["filter", *_inputs(session, artifact), *config, *option]
+    return [*words, "-o", str(artifact.path)], needs
 
 
 def _identify(session: Session, artifact: Artifact) -> Words | None:
@@ -129,7 +146,9 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
 
 def _diagnose(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
-    words = ["diagnose", *_inputs(session, artifact), *config]
+    labels = (resolved(artifact).get("diagnose") or {}).get("known") or []
+    known = [word for label in labels for word in ("--known", label)]
+    words = ["diagnose", *_inputs(session, artifact), *known, *config]
     return [*words, "--out", _folder(artifact.path)], needs
 
 

@@ -30,7 +30,6 @@ class Estimate:
     low: float | None
     high: float | None
     """Ends of the 95 % interval; None if there is none."""
-    std_error: float | None = None
     each_run: bool = False
     """Whether values differ from run to run; this is the first training run's."""
     meaning: str = ""
@@ -154,9 +153,8 @@ def estimates(table: Table) -> list[Estimate]:
 
 
 def _estimate(row: Mapping[Any, Any]) -> Estimate:
-    low, high, error = (
-        None if pd.isna(row[key]) else float(row[key])
-        for key in ("ci95_low", "ci95_high", "std_error")
+    low, high = (
+        None if pd.isna(row[key]) else float(row[key]) for key in ("ci95_low", "ci95_high")
     )
     # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
@@ -165,7 +163,6 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
         "value": float(row["value"]),
         "low": low,
         "high": high,
-        "std_error": error,
     }
     each_run = bool(row.get("each_run"))
     return Estimate(**names, **numbers, joint=joint, run=run, each_run=each_run)

@@ -10,7 +10,7 @@ from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 from pipelines.settings import Experiment
 
-SECTIONS = ("mechanism", "design", "filter", "identify", "simulate")
+SECTIONS = ("mechanism", "design", "filter", "identify", "diagnose", "simulate")
 """Sections of exoid.toml that a stage's file repeats."""
 REMEDY = "`exoid run` or `make` makes them again"
 

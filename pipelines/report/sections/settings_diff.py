@@ -35,7 +35,7 @@ def settings_diff(first: Session, second: Session) -> list[SettingDifference]:
 
 def _settings(session: Session) -> dict[str, list[str]]:
     # Sections of exoid.toml that files repeat.
-    sections = ("mechanism", "design", "acquire", "filter", "identify", "simulate")
+    sections = ("mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate")
     by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}
