@@ -34,7 +34,7 @@ def check(
             min=1.0,
             max=1e5,
             help="Samples a second that are wanted.",
-            show_default="that of exoid.toml, if any",
+            show_default="that of exoid.toml, else a virtual rig's own",
         ),
     ] = None,
     run: Annotated[

@@ -10,7 +10,7 @@ from pipelines.validation.suggestion import closest
 
 
 def message(error: TyperException) -> str:
-    """Print the fault of a command line and where its help is."""
+    """Return the message of a mistyped command line, with the command for its help."""
     context: Any = getattr(error, "ctx", None)
     text, option = error.format_message().rstrip("."), getattr(error, "option_name", None)
     help_command = f"`{context.command_path} --help`" if context else "`exoid --help`"
@@ -45,7 +45,7 @@ def _name(parameter: Any) -> str:
 
 
 def _value_fault(parameter: Any, text: str) -> str:
-    """Print the fault of an option's or argument's value."""
+    """Return what is wrong with an option's or argument's value."""
     choices = parameter.type_descriptor.choices if parameter.type_descriptor.is_choice else None
     if not text.strip():
         return "missing" + (f", expected {' or '.join(map(str, choices))}" if choices else "")

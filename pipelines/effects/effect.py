@@ -429,11 +429,6 @@ class Effect(ABC):
         return self.each_run or any(p.per_run for p in self.linear)
 
     @property
-    def rings(self) -> bool:
-        """Whether it is a transmission whose load can swing."""
-        return self.spring is not None
-
-    @property
     def on_limb(self) -> bool:
         """Whether it acts on the wearer's side of the cuffs."""
         return self.side is Side.HUMAN or self.run == "with_human"

@@ -67,8 +67,9 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
         # A dependence harms only where it involves two parameters or more (Belsley's rule).
         if len(involved) > 1:
             how = "hardly separates" if index[k] > strong else "separates only weakly"
+            listed = f"{', '.join(involved[:-1])} and {involved[-1]}"
             sentences.append(
-                f"this motion {how} {_listed(involved)} (condition index {index[k]:.0f}): "
+                f"this motion {how} {listed} (condition index {index[k]:.0f}): "
                 "the others compensate for an error in one"
             )
     return sentences
@@ -93,7 +94,3 @@ def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
     # Eigenvalues rise, so the first vector is the combination that the data determine least.
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

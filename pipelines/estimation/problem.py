@@ -121,8 +121,9 @@ class Training:
         return replace(self, own={file: tuple(terms) for file, terms in own.items()})
 
     def loaded(self, run: Run) -> Run:
-        """Return a run with its joint loads, if the bodies are known."""
-        return run.whole().loaded(*self.bodies[run.run]) if self.bodies else run
+        """Return a run with its joint loads; unchanged if the bodies of its kind are unknown."""
+        bodies = self.bodies.get(run.run)
+        return run if bodies is None else run.whole().loaded(*bodies)
 
     def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
         """Return the same training with the loads of other rigid bodies.
@@ -130,7 +131,7 @@ class Training:
         Parameters
         ----------
         bodies : mapping
-            By kind of run: two arrays (k,) of body values, as `Run.loaded` takes them.
+            By kind of run: two arrays (k,) of body values, as ``Motion.loaded`` takes them.
         """
         training = replace(self, bodies=bodies)
         # Two steps, because ``loaded`` reads the bodies that were set.

@@ -106,10 +106,8 @@ def _residuals(run: _RunData, joint: Joint) -> list[Chart]:
     scored = run.frame[run.frame["scored"]]
     model, reach = DrawnTable("running mean", Role.AFTER, scored), residual_reach(scored, joint)
     against = {"time, s": "time_s"} | {
-        f"{joint.name} {joint.place if quantity == 'angle' else quantity}, {joint.unit(quantity)}": (
-            joint.column(quantity)
-        )
-        for quantity in ("angle", "velocity")
+        f"{joint.name} {words}, {joint.unit(quantity)}": joint.column(quantity)
+        for quantity, words in (("angle", joint.place), ("velocity", "velocity"))
     }
     charts = []
     for label, column in against.items():

@@ -22,8 +22,6 @@ class Score:
     rmse_unmasked: NDArray
     """On every valid sample."""
     torque_rms: NDArray
-    samples: int
-    """Number of block averages in ``rmse``."""
 
     def by_joint(self) -> list[dict[str, float]]:
         """Return the errors of each joint for a file's metadata."""
@@ -126,7 +124,6 @@ class _Sums:
             rmse=_root(self.residual, self.scored),
             rmse_unmasked=_root(self.unmasked, self.valid),
             torque_rms=_root(self.torque, self.scored),
-            samples=self.scored,
         )
 
 

@@ -27,7 +27,8 @@ def refuse_several_machines(motions: Sequence[Run]) -> None:
                 " runs of one machine"
             )
         # The regressor contains only these. Cuff distances may differ, as each run uses its own.
-        for key in ("thigh_length_m", "gravity_m_s2"):
+        lengths = ("thigh_length_m",) if first.machine.mechanism.has_length else ()
+        for key in (*lengths, "gravity_m_s2"):
             ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
             if ours != theirs:
                 raise InputError(

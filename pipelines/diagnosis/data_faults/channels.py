@@ -264,7 +264,7 @@ def has_silent_cuffs(motion: Motion) -> bool:
 
 
 def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
-    """Report cuff force channels that are dead, or constant for a second while others change."""
+    """Report cuff force channels that are dead, or constant for at least ``STUCK_FORCE_S``."""
     if has_silent_cuffs(motion):
         yield Fault(
             motion.file,
@@ -284,12 +284,13 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
             samples = mask_of(still, len(motion))
             # A channel that is dead all along has no good sample, so no mask helps.
             dead = samples.all()
+            # All twelve were not dead above.
+            extent = "all along while other sensors changed" if dead else when(motion, still)
             yield Fault(
                 motion.file,
                 f"{cuff}_force_{axis}_n",
                 f"the {cuff.replace('_', ' ')} cuff's {axis} force is"
-                f" {'dead' if dead else 'stuck'}: constant"
-                f" {'all along' if dead else when(motion, still)} while other sensors changed;"
+                f" {'dead' if dead else 'stuck'}: constant {extent};"
                 " check the sensor's supply and cable, or leave its column out",
                 None if dead else samples,
             )

@@ -91,7 +91,10 @@ def _cuff(run: Run, j: int) -> NDArray | None:
 
 
 def _temperature(run: Run, j: int) -> NDArray | None:
-    return None if run.motion.temperature is None else run.average(run.motion.temperature)[:, j]
+    if run.motion.temperature is None:
+        return None
+    read = run.average(run.motion.interpolated_temperature)[:, j]
+    return read if np.isfinite(read).all() else None
 
 
 def _phase(run: Run, j: int) -> NDArray | None:

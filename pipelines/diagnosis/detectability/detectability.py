@@ -139,8 +139,6 @@ class DetectionProblem:
     """The baseline's values under which the motion is transformed."""
     root: NDArray
     """(O,) root of the independent share over the noise; zero without such an output."""
-    noise: NDArray
-    """(O,) N·m."""
     independent: float
     """Independent samples of the output that has most."""
     basis: NDArray
@@ -179,9 +177,7 @@ class DetectionProblem:
             [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
         )
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        problem = cls(
-            loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms
-        )
+        problem = cls(loaded, baseline, untouched, values, root, independent, np.zeros((0, 0)), rms)
         # The basis is made of weighted rows, which the problem itself provides.
         return replace(problem, basis=np.linalg.qr(problem.rows(untouched))[0])
 
@@ -200,16 +196,6 @@ class DetectionProblem:
         """
         scaled = (c * self.root[:, np.newaxis] for c in columns)
         return np.concatenate([s[run.usable] for run, s in zip(self.runs, scaled, strict=True)])
-
-    def outputs(self) -> NDArray:
-        """Return each row's output.
-
-        Returns
-        -------
-        (rows,) int array
-            Drives first.
-        """
-        return np.concatenate([np.nonzero(run.usable)[1] for run in self.runs])
 
     def remainder(self, columns: Sequence[NDArray]) -> NDArray:
         """Return columns less their projection on the baseline.

@@ -35,8 +35,12 @@ def at_block_rate(run: Run) -> Run:
         cutoff_hz=min(motion.cutoff_hz, HIGHEST_CUTOFF * rate_hz),
         load=None if motion.load is None else run.average(motion.load),
         limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
-        temperature=None if motion.temperature is None else run.average(motion.temperature),
-        forces=None if motion.held_forces is None else run.average(motion.held_forces),
+        temperature=None
+        if motion.temperature is None
+        else run.average(motion.interpolated_temperature),
+        forces=None
+        if motion.held_forces is None
+        else run.average(np.nan_to_num(motion.held_forces)),
         reference=None,
         measured_angle=None,
         sequence=None,

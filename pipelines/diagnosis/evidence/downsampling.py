@@ -27,8 +27,11 @@ def downsampled(motion: Motion) -> Motion:
     every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
     if every.decimation < 2:
         return motion
-    # Forces are read less often than angles: without interpolation most averages would be NaN.
-    motion, starts = replace(motion, forces=motion.held_forces), every.starts(motion.segment)
+    # Forces and temperatures are read less often than angles: without interpolation most averages
+    # would be NaN.
+    read = None if motion.temperature is None else motion.interpolated_temperature
+    motion = replace(motion, forces=motion.held_forces, temperature=read)
+    starts = every.starts(motion.segment)
     averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)
         for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "temperature")

@@ -90,7 +90,7 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
         # Across a gap there is nothing to interpolate.
         joined = run.time[ahead] - run.time[ahead - 1] < 1.5 * width
         usable = run.usable & run.usable[ahead] & run.usable[ahead - 1] & joined[:, np.newaxis]
-        # Interpolation halves the later noise's variance on average, to two thirds.
+        # Interpolation lowers the later noise's variance, on average to two thirds.
         return np.where(usable, (later - residual) / np.sqrt(1 + 2 / 3), np.nan)
     ahead = np.searchsorted(run.time, run.time + period - 0.25 * width)
     inside = ahead < len(run.time)

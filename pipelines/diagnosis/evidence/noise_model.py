@@ -32,7 +32,7 @@ CORRELATION_S = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
 PINK_HZ = 1.5
 """Frequency at which pink noise is compared with first-order noise, Hz."""
 PINK = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
-"""Ratios of the two tried."""
+"""Ratios of pink to first-order noise at ``PINK_HZ`` that are tried."""
 UNKNOWN_PINK = 0.2
 """The ratio where it cannot be measured."""
 TINY_HZ = 1e-3

@@ -16,9 +16,9 @@ from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
-"""Length of a fold where the excitation does not repeat, s."""
+"""Time after which an excitation without a period moves to the next fold, s."""
 FOLDS = 4
-"""Folds of a run whose excitation does not repeat."""
+"""Number of folds of a run."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Run:
     state: tuple[NDArray, NDArray, NDArray]
     """q, dq, ddq (m, J)."""
     measured: NDArray
-    """(m, O) N·m; NaN where there is no such output."""
+    """(m, O) N·m; zero where there is no such output."""
     usable: NDArray
     """(m, O) bool."""
     valid: NDArray
@@ -130,7 +130,8 @@ class Run:
         cuffs = self.motion.cuff_torque(link.q)
         assert cuffs is not None, "a run that has cuffs has their forces"
         joints = len(self.motion.joints)
-        return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])
+        # As in ``observe``: a filter would spread one NaN over its whole stretch.
+        return np.hstack([self.measured[:, :joints], self.average(np.nan_to_num(cuffs))])
 
     @property
     def has_cuffs(self) -> bool:

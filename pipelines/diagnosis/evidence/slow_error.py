@@ -57,7 +57,7 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     count = np.maximum(np.sum([run.usable.sum(axis=0) for run in longer], axis=0), 1)
     rms = np.sqrt(np.sum(squares, axis=0) / count)
     independent = count * floor.independent_share
-    # An unknown floor is infinite: without a second of comparable samples nothing is systematic.
+    # An unknown floor is infinite: with 20 differences or fewer nothing is systematic.
     known = np.where(np.isfinite(floor.rms), floor.rms, np.inf)
     return SlowError(rms, known, independent)
 

@@ -108,11 +108,10 @@ class _About:
         ):
             return None
         read, speed = np.ascontiguousarray(motion.measured_angle[:, j]), motion.dq[:, j]
-        coulomb_torque = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(
-            motion
-        )
+        without_coulomb = model.with_linear(np.where(coulomb, 0.0, model.linear_values))
         # Coulomb friction is left out of the model here, and added again in each way of reversing.
-        rest = filtered(motion, motion.torque[:, j] - coulomb_torque[:, j], CUTOFF_HZ)
+        other_torque = without_coulomb.torque(motion)[:, j]
+        rest = filtered(motion, motion.torque[:, j] - other_torque, CUTOFF_HZ)
         return cls(motion, model, j, read, speed, rest, level, near)
 
     def remainder(self, side: "Side") -> NDArray:
