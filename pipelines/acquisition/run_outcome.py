@@ -43,6 +43,10 @@ def finish_run(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
                 f"{text}; its samples are not in {journal} any more ({error.strerror}); where that"
                 " was moved to, `exoid recover` makes a recording of it"
             ) from error
+        if not lock.free:
+            raise kind(
+                f"{text}; another process is making a recording of {journal} now; wait for its end"
+            )
         return record_journal(output, lock, kind, text, supervisor.fault)
 
 

@@ -10,6 +10,7 @@ from pipelines.acquisition.machine.drive_protocol import disable
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.uninterrupted import outlive
 from pipelines.errors import DeviceError, Unanswered
+from pipelines.mechanics.motion import CUFFS
 
 DISABLE_TRIES = 3
 """How often a drive is sent to disable, each time but the first on a new connection."""
@@ -152,9 +153,23 @@ class Stopping:
 
     async def _watch_cuffs(self) -> None:
         """Watch the cuffs while the drives slow down: nobody is held where cuffs press."""
+        machine = self._exchange.machine
+        sensors = list(machine.sensors)
         try:
-            while not self._supervisor.pressing:
-                self._supervisor.safe_stop.check_cuffs(await self._exchange.machine.cuff_forces())
+            while sensors and not self._supervisor.pressing:
+                answers = await asyncio.gather(
+                    *(sensor.look() for sensor in sensors), return_exceptions=True
+                )
+                forces = machine.no_force.copy()
+                for sensor, answer in zip(tuple(sensors), answers, strict=True):
+                    if isinstance(answer, BaseException):
+                        # A failed sensor, perhaps the reason of this stop, must not end the watch
+                        # of the others.
+                        self._supervisor.abort(answer)
+                        sensors.remove(sensor)
+                    elif answer is not None:
+                        forces[CUFFS.index(sensor.settings.cuff)] = answer
+                self._supervisor.safe_stop.check_cuffs(forces)
                 await asyncio.sleep(1.0 / self._supervisor.rate)
         except BaseException as error:
             # Else it was cancelled.

@@ -50,7 +50,6 @@ def _tables_equal(old: BinaryIO, new: BinaryIO) -> bool:
 
 
 def _header(schema: pa.Schema) -> tuple[list[Any], dict[str, Any]]:
-    created_at = "created_at"
     metadata = json.loads((schema.metadata or {}).get(KEY, b"{}"))
     columns = [(field.name, str(field.type), field.metadata or {}) for field in schema]
-    return columns, metadata | {created_at: None}
+    return columns, metadata | {"created_at": None}

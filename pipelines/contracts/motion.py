@@ -31,7 +31,7 @@ MOTION = Contract(
     purpose="a recording made fit for regression",
     made_by="exoid filter",
     columns=(
-        Column("time_s", "s", "device time since the run began"),
+        Column("time_s", "s", "device time since the recording began"),
         per_joint("angle", "joint angle after zero-phase filtering"),
         per_joint("angle_measured", "measured joint angle"),
         per_joint("velocity", "derivative of the filtered angle"),

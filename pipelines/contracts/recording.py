@@ -24,7 +24,7 @@ RECORDING = Contract(
     purpose="one run on the rig",
     made_by="exoid acquire",
     columns=(
-        Column("time_s", "s", "device time since the run began"),
+        Column("time_s", "s", "device time since the recording began"),
         per_joint("angle", "measured joint angle"),
         per_joint("torque", "what the drive delivers at the joint"),
         per_joint("reference", "commanded angle", required=False, nullable=True),

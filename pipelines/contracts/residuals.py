@@ -12,7 +12,7 @@ RESIDUALS = Contract(
         Column("run", "", "kind of run", dtype=TEXT, choices=("exo_alone", "with_human")),
         Column("purpose", "", "what the run is for", dtype=TEXT, choices=("train", "validate")),
         Column("segment", "", "number of the stretch without gaps", dtype=INTEGER),
-        Column("time_s", "s", "device time since the run began"),
+        Column("time_s", "s", "device time since the recording began"),
         Column(
             "model", "", "the model that predicts", dtype=TEXT, choices=("baseline", "extended")
         ),

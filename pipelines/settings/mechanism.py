@@ -47,8 +47,10 @@ class MechanismSettings(Settings):
                 f" {' and '.join(USUAL_JOINTS)}; add [[mechanism.joints]], or correct the name:"
                 f" {suggestion(self.name, list(USUAL_JOINTS))}"
             )
-        if len({joint.name for joint in self.joints}) < len(self.joints):
-            raise ValueError("joints: found a name twice, expected each once")
+        names = [joint.name for joint in self.joints]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"joints: found {name} twice, expected each name once; rename one")
         return self
 
     def refuse_all_but_the_leg(self, command: str) -> None:

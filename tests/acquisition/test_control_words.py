@@ -7,7 +7,7 @@ import pytest
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.modbus.device import Device
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, Refused, SettingsError
 from pipelines.rig.device import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings import datasets
@@ -165,6 +165,21 @@ def test_a_drive_whose_angle_is_no_set_point_is_told_the_one_it_holds(rig_file, 
     monkeypatch.setattr(Device, "read", read)
     told = drive.write_block.decode(asyncio.run(drive.idle_words(DISABLE, angle)))
     assert (told["reference"], told["control"]) == (pytest.approx(0.3), DISABLE)
+
+
+@pytest.mark.parametrize(("angle", "told"), [(1.8, 1.75), (-0.4, -0.35), (float("nan"), 0.0)])
+def test_a_drive_whose_set_point_cannot_be_read_is_disabled_all_the_same(
+    rig_file, monkeypatch, angle, told
+):
+    """It is told the nearest set-point within its limits."""
+    drive = first_drive(rig_file)
+
+    async def read(device, address, count):
+        raise Refused("it has no such register")
+
+    monkeypatch.setattr(Device, "read", read)
+    words = drive.write_block.decode(asyncio.run(drive.idle_words(DISABLE, angle)))
+    assert (words["reference"], words["control"]) == (pytest.approx(told, abs=1e-3), DISABLE)
 
 
 def faulty(rig, reset_faults, tmp_path, excitation, serve, port):

@@ -1,7 +1,9 @@
 """A stop heeds what the drives tell meanwhile, and what they told before it that nobody had come to
 judge."""
 
+import asyncio
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.acquisition.stopping import Stopping
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
@@ -137,3 +140,46 @@ def test_a_stop_leaves_no_sample_of_a_drive_without_a_set_point(tmp_path, monkey
         ]
         assert len(sample) >= 20
         assert set(np.diff(sample)) == {1}
+
+
+class Cuff:
+    """A cuff's sensor that fails, or that answers with a force."""
+
+    def __init__(self, cuff, answer):
+        self.settings, self.answer = SimpleNamespace(cuff=cuff), answer
+
+    async def look(self):
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+
+@pytest.mark.parametrize("force", [(0.0, 0.0, 900.0), None])
+def test_a_failed_sensor_does_not_end_the_watch_of_the_other_cuffs(force):
+    """The failure is reported; a cuff that presses lets go of the leg all the same."""
+    failed = DeviceError("sensor thigh_front does not answer")
+    machine = SimpleNamespace(
+        drives=(),
+        no_force=np.full((4, 3), np.nan),
+        sensors=[Cuff("thigh_front", failed), Cuff("shank_back", force)],
+    )
+    supervisor = SimpleNamespace(rate=1000.0, pressing=False, reasons=[])
+    supervisor.abort = supervisor.reasons.append
+
+    def check_cuffs(forces):
+        assert np.isnan(forces[:3]).all()
+        supervisor.pressing = bool(np.nanmax(forces[3], initial=0.0) > 100.0)
+
+    supervisor.safe_stop = SimpleNamespace(check_cuffs=check_cuffs)
+    stopping = Stopping(SimpleNamespace(machine=machine), supervisor, [], lambda: None)
+
+    async def watch():
+        watching = asyncio.ensure_future(stopping._watch_cuffs())
+        await asyncio.sleep(0.05)
+        stopping._has_ended = True
+        watching.cancel()
+        await asyncio.wait([watching])
+
+    asyncio.run(watch())
+    assert supervisor.pressing == (force is not None)
+    assert supervisor.reasons == [failed]

@@ -184,7 +184,8 @@ def test_with_yes_given_beforehand_a_warning_says_that_nobody_watches_the_cuffs(
     (tmp_path / "rig.toml").write_text(without)
     outcome = exoid(*arguments, "--yes")
     assert outcome.err.startswith(
-        "warning: the rig file has no [[sensor]]: the force on the cuffs is not watched\n"
+        "warning: the rig file has no [[sensor]]: the force on the cuffs is not watched; add the"
+        " sensors\n"
     )
 
 

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from exoid_cli.app import run
 from pipelines.importing.finding import noting
 from pipelines.importing.quantities.numbers import numbers
+from pipelines.importing.sources.dialect import _encoding
 from tests.importing.conftest import MAP
 
 
@@ -42,6 +43,13 @@ def assert_is_the_pendulum(outcome, pendulum, name="whole"):
 )
 def test_text_is_read_however_it_is_delimited(imported, pendulum, write_csv, how):
     assert_is_the_pendulum(imported(write_csv(pendulum.columns(), **how)), pendulum)
+
+
+@pytest.mark.parametrize("padding", range(4))
+def test_a_character_of_two_bytes_near_the_end_of_a_file_does_not_change_its_encoding(padding):
+    assert _encoding(b"time,angle\n" + b"x" * padding + "20 °C,\n".encode()) == "utf-8"
+    assert _encoding("20 °C,\n".encode()[:4]) == "utf-8"
+    assert _encoding("20 °C,\n".encode("cp1252")) == "cp1252"
 
 
 def test_comments_among_the_rows_are_no_rows(imported, pendulum, write_csv):

@@ -118,7 +118,7 @@ def test_every_key_of_a_rig_file_has_a_description():
         ("run = []", "run: found no run, expected at least one; add a [[run]]"),
         (
             '[[mechanism.joints]]\nname = "a"\n[[mechanism.joints]]\nname = "a"\n',
-            "mechanism: joints: found a name twice, expected each once",
+            "mechanism: joints: found a twice, expected each name once; rename one",
         ),
         (
             '[mechanism]\nname = "sinlge"\n',

@@ -114,7 +114,7 @@ async def _watch(
         away = np.abs(np.concatenate([value(probe) for probe in probes]) - rest)
         # Not np.maximum: one NaN among the readings would hide all movements after it.
         largest = np.fmax(largest, away)
-        which = int(np.nanargmax(np.nan_to_num(largest)))
+        which = int(np.argmax(np.nan_to_num(largest)))
         if largest[which] < least or not away[which] < back * largest[which]:
             still_since = now
         elif now - still_since > STILL_S:

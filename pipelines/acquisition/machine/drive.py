@@ -10,7 +10,7 @@ from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.ring_buffer import Queue, Ring
 from pipelines.acquisition.modbus.wraparound import Unwrapper
-from pipelines.errors import DeviceError, Unanswered
+from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.block import registers_of
@@ -214,7 +214,8 @@ class Drive:
     async def idle_words(self, control: int, angle: float) -> list[int]:
         """Return the registers of a control word for a drive that shall not follow.
 
-        Where the leg is outside its limits, the set-point is the one that the drive holds.
+        Where the leg is outside its limits, the set-point is the one that the drive holds; the
+        nearest limit if its registers cannot be read.
 
         Parameters
         ----------
@@ -232,8 +233,11 @@ class Drive:
         if low <= angle <= high:
             return self.words(control, angle)
         block = self.write_block
-        held = block.decode(await self.device.read(block.address, block.count))
-        return self._encode(control, held["reference"])
+        try:
+            held = block.decode(await self.device.read(block.address, block.count))["reference"]
+        except Refused:  # not every drive lets its written registers be read
+            held = min(max(low, angle if isfinite(angle) else 0.0), high)
+        return self._encode(control, held)
 
     def says_enabled(self, status: int) -> bool:
         """Return whether a status word reports that the drive is enabled."""

@@ -8,20 +8,23 @@ def unmonitored(rig: RigSettings) -> list[str]:
     """Return in words which dangers go unnoticed on a rig while it moves a person."""
     missing = []
     if not rig.sensor:
-        missing.append("the rig file has no [[sensor]]: the force on the cuffs is not watched")
+        missing.append(
+            "the rig file has no [[sensor]]: the force on the cuffs is not watched; add the sensors"
+        )
     blind = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].enabled_mask]
     if blind:
         missing.append(
             f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency"
             " stop that is pressed and released is noticed only by safety.following_error_rad"
             f" ({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g}"
-            " rad), by which the leg may leap on the release"
+            " rad), by which the leg may leap on the release; add enabled_mask and enabled_value"
         )
     deaf = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]
     if deaf:
         missing.append(
             f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: its fault is"
-            " noticed only if it then reports that it is not enabled, or the leg does not follow"
+            " noticed only if it then reports that it is not enabled, or the leg does not follow;"
+            " add fault_mask"
         )
     return missing
 

@@ -63,9 +63,9 @@ class RecordAgreement:
         # NaN: nothing is known.
         if apart > near_rad + 1.5 * abs(exchanged.velocity) / self._rate_hz:
             raise DeviceError(
-                self._contradiction(
-                    "angle", exchanged.angle, recorded.angle, "rad", recorded.sequence
-                )
+                f"{self._label}: reports angle {exchanged.angle:.4g} rad of sample"
+                f" {recorded.sequence}, while its own record holds {recorded.angle:.4g} rad;"
+                f" {self._correct('angle')}"
             )
         # Without a current in both, there is nothing to compare.
         if not isfinite(exchanged.torque * recorded.torque):
@@ -78,15 +78,16 @@ class RecordAgreement:
             # Of rms values: noise in its regressor would make the slope of a regression too small.
             ratio = copysign(sqrt(self._yy / self._xx), self._xy)
             if not abs(ratio - 1.0) <= RATIO:
-                what = exchanged.torque, recorded.torque
-                raise DeviceError(self._contradiction("torque", *what, "N·m", recorded.sequence))
+                rms = sqrt(self._xx / self._compared)
+                raise DeviceError(
+                    f"{self._label}: reports a torque of {rms:.4g} N·m rms over {self._compared}"
+                    f" samples, while its own record holds {ratio * rms:.4g} N·m;"
+                    f" {self._correct('current')}"
+                )
 
-    def _contradiction(
-        self, what: str, exchanged: float, recorded: float, unit: str, sequence: int
-    ) -> str:
-        name = "current" if what == "torque" else what
+    def _correct(self, register: str) -> str:
+        """Return the remedy where a register and its record differ."""
         return (
-            f"{self._label}: reports {what} {exchanged:.4g} {unit} of sample {sequence},"
-            f" while its own record holds {recorded:.4g} {unit}; correct scale, sign and offset of"
-            f" {self._where}.read.{name} or {self._where}.ring.record.{name}"
+            f"correct scale, sign and offset of {self._where}.read.{register} or"
+            f" {self._where}.ring.record.{register}"
         )

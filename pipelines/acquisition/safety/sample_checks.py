@@ -94,7 +94,11 @@ class SampleChecks:
         answers = Answers(of_drives, np.full((len(CUFFS), 3), np.nan), None)
         base = [tracker.base for tracker in trackers]
         # The sample was latched before the set-point that was sent with the question takes effect.
-        reason = self._limits.violation(answers) or self._limits.straying(answers, base, late=1)
+        reason = (
+            self.streams[joint].limit_violation(reading)
+            or self._limits.cuff_violation(answers)
+            or self._limits.straying(answers, base, late=1)
+        )
         if reason:
             raise DeviceError(self._with_jerk(reason))
         self._note_sent(joint, reading, trackers[joint])
@@ -161,11 +165,12 @@ class SampleChecks:
     def _straying(
         self, answers: Answers, trackers: Sequence[SetPointTracker], cycle: int
     ) -> str | None:
-        """Return which joint is too far from its set-point; None without the machine's counter."""
+        """Return which joint is too far from its set-point."""
         first = answers.drives[0]
-        if isinstance(first, Unanswered):
-            return None
-        late = abs(first.sequence // self._samples_per_cycle - cycle)
+        # Without the machine's counter as for a drive that is held.
+        late = 1
+        if not isinstance(first, Unanswered):
+            late = abs(first.sequence // self._samples_per_cycle - cycle)
         return self._limits.straying(answers, [tracker.in_force for tracker in trackers], late)
 
     def _with_jerk(self, reason: str) -> str:

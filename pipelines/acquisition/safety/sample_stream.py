@@ -16,7 +16,6 @@ from pipelines.acquisition.safety.stuck_register import StuckRegisters
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings
-from pipelines.settings.rig.block import MOST_REGISTERS
 
 
 class SampleStream:
@@ -33,6 +32,9 @@ class SampleStream:
         self._watchdog = Watchdog(rig.safety.watchdog_s)
         # What comes within the watchdog's time, and one cycle more.
         self._most = self._cycle * (1 + ceil(rig.safety.watchdog_s * sample_rate_hz))
+        ring = rig.map.drive[self._drive.map].ring
+        # Records that fill one read wait for it.
+        self._waiting = ring.records_per_read if ring else 0
         self._history = history
         self._clock = ClockCheck(self._label, self._cycle, self._rate)
         self._registers = StuckRegisters(self._label, self._cycle, self._rate, history)
@@ -72,8 +74,7 @@ class SampleStream:
         if self._newest_at_first is None:
             self._newest_at_first = newest
         last = self._newest_at_first if self._last is None else self._last.sequence
-        # What fills one read waits for it.
-        if newest - last > self._most + MOST_REGISTERS["read"]:
+        if newest - last > self._most + self._waiting:
             raise DeviceError(
                 f"watchdog: {self._label} is at sample {newest}, but its record brought none after"
                 f" {last}, allowed are {self._watchdog.longest_s:g} s; the record stands still, its"
@@ -124,6 +125,10 @@ class SampleStream:
         self._last = reading
         self._watchdog.reset(now)
         return True
+
+    def limit_violation(self, reading: Reading) -> str | None:
+        """Return which limit a sample breaks that is outside the stream, next to its newest one."""
+        return sample_violation(self._drive, self._last or reading, reading, self._rate)
 
     def _leap(self, before: Reading, reading: Reading) -> str | None:
         """Check an angle against the one before it, the speed limit and the measured velocity."""

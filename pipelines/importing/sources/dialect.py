@@ -1,5 +1,6 @@
 """The dialect of a text file: encoding, delimiter, decimal point, comments, header."""
 
+import codecs
 import csv
 import re
 from collections import Counter
@@ -124,7 +125,8 @@ def _encoding(start: bytes) -> str:
             " Parquet, JSON, HDF5, MCAP or ROS 2 bag"
         )
     try:
-        start[:-4].decode("utf-8")  # the last character may be cut in two
+        # Incremental, as the last character may be cut in two.
+        codecs.getincrementaldecoder("utf-8")().decode(start)
     except UnicodeDecodeError:
         # The usual encoding of Windows in Western Europe, where ° and µ are single bytes.
         return "cp1252"

@@ -68,7 +68,9 @@ class NetworkLine(Line):
 class TcpLine(NetworkLine):
     """Modbus TCP."""
 
-    transport: Literal["tcp"] = Field("tcp", description="tcp, or nothing.")
+    transport: Literal["tcp"] = Field(
+        "tcp", description="tcp, nothing else; a [line] table must state it."
+    )
 
 
 class RtuOverTcpLine(NetworkLine):

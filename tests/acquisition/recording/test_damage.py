@@ -1,6 +1,8 @@
 """A journal that is damaged anywhere, in any way a disk damages a file, never gives wrong numbers
 for right ones."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from pipelines.acquisition.recording.journal import Journal
 from pipelines.acquisition.recording.journal_file import JournalFile, refuse_leftover
 from pipelines.acquisition.recording.recording import recording_path
 from pipelines.acquisition.recording.recover import recover
-from pipelines.acquisition.run_outcome import record_journal
+from pipelines.acquisition.run_outcome import finish_run, record_journal
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, InputError
@@ -200,3 +202,18 @@ def test_no_flipped_bit_in_a_batchs_header_asks_for_more_memory_than_there_is(tm
             whole.path.write_bytes(flipped(whole.bytes, at, bit))
             rows = sum(batch.rows.num_rows for batch in JournalFile(whole.path).batches())
             assert rows >= 3 * BATCH  # all that comes before
+
+
+def test_a_run_whose_journal_another_process_recovers_leaves_it_to_that(tmp_path):
+    """Both would write the recording, and remove the journal twice."""
+    journal = tmp_path / "x.journal"
+    journal.write_bytes(b"samples")
+    over = SimpleNamespace(fault=None, why="")
+    with (
+        locked(journal) as lock,
+        pytest.raises(DeviceError, match="another process is making a recording of .*x.journal"),
+    ):
+        assert lock.free
+        finish_run(tmp_path / "x.parquet", journal, over)
+    assert journal.read_bytes() == b"samples"
+    assert not (tmp_path / "x.parquet").exists()

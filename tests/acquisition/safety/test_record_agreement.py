@@ -32,8 +32,8 @@ def test_a_record_of_currents_of_another_sign_or_scale_ends_the_run(factor):
     with pytest.raises(
         DeviceError,
         match=(
-            r"drive hip.*: reports torque .* N·m of sample 49, while its own record holds"
-            r" .*record\.current"
+            r"drive hip.*: reports a torque of .* N·m rms over 50 samples, while its own record"
+            r" holds .*record\.current"
         ),
     ):
         judged(lambda k: factor * 10.0 * np.sin(0.1 * k))

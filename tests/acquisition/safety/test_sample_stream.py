@@ -179,6 +179,24 @@ def test_a_late_record_is_held_against_what_the_joint_was_told_then_and_not_sinc
     assert all(take(stream_of(history), *at_rest))
 
 
+def test_a_drive_without_a_velocity_is_checked_against_its_newest_sample(hip):
+    """Against an older one its speed would be a mean since then."""
+    swing(hip, BEGINS + 1000)
+    newest = moved(BEGINS + 999)
+    leapt = replace(moved(BEGINS + 1000), angle=newest.angle + 0.05, velocity=np.nan)
+    assert "hip speed" in hip.limit_violation(leapt)
+    assert hip.limit_violation(replace(leapt, angle=newest.angle)) is None
+
+
+def test_a_record_may_wait_for_the_samples_of_one_read_and_the_watchdogs_time(hip):
+    ring = hip._waiting
+    swing(hip, BEGINS + 100)
+    hip.refuse_to_fall_behind(BEGINS + 99 + hip._most + ring)
+    with pytest.raises(DeviceError, match="its record brought none after"):
+        hip.refuse_to_fall_behind(BEGINS + 100 + hip._most + ring)
+    assert ring < 125
+
+
 def test_a_record_that_stands_still_while_the_counter_goes_on_ends_the_run(hip):
     swing(hip, BEGINS + 100)
     hip.refuse_to_fall_behind(BEGINS + 300)

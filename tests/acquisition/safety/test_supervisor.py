@@ -386,6 +386,14 @@ def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
     assert supervisor.trackers[0].sent < 0.16
 
 
+def test_a_knee_that_does_not_follow_stops_the_run_though_the_hip_is_silent(supervisor):
+    enable(supervisor)
+    supervisor.begin(row(100), 10.0)
+    blocked = replace(row(101).drives[1], angle=0.3)
+    with pytest.raises(DeviceError, match=r"knee angle 0\.300 rad is 0\.\d+ rad from its"):
+        supervisor.check_answers(Answers((LOST, blocked), row(101).forces, None), 10.005)
+
+
 def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervisor):
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
