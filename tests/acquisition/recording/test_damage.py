@@ -211,7 +211,7 @@ def test_a_run_whose_journal_another_process_recovers_leaves_it_to_that(tmp_path
     over = SimpleNamespace(fault=None, why="")
     with (
         locked(journal) as lock,
-        pytest.raises(DeviceError, match="another process is making a recording of .*x.journal"),
+        pytest.raises(DeviceError, match=r"another process is making a recording of .*x\.journal"),
     ):
         assert lock.free
         finish_run(tmp_path / "x.parquet", journal, over)

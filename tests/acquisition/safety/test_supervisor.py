@@ -387,11 +387,18 @@ def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
 
 
 def test_a_knee_that_does_not_follow_stops_the_run_though_the_hip_is_silent(supervisor):
+    """The hip falls silent just before the knee's error reaches its limit."""
     enable(supervisor)
     supervisor.begin(row(100), 10.0)
-    blocked = replace(row(101).drives[1], angle=0.3)
-    with pytest.raises(DeviceError, match=r"knee angle 0\.300 rad is 0\.\d+ rad from its"):
-        supervisor.check_answers(Answers((LOST, blocked), row(101).forces, None), 10.005)
+    with pytest.raises(DeviceError, match=r"knee angle 0\.000 rad is 0\.1\d+ rad from its set"):
+        for k in range(101, 172):
+            now = 10.0 + (k - 100) / RATE
+            step(supervisor, k, now)
+            hip = row(k, 0.0025 * (k - 100)).drives[0] if k < 158 else LOST
+            knee = row(k, 1e-4 * (k % 2)).drives[1]
+            found = None if hip is LOST else Row((hip, knee), row(k).forces)
+            supervisor.check_answers(Answers((hip, knee), row(k).forces, found), now)
+    assert hip is LOST
 
 
 def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervisor):
