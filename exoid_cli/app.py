@@ -1,7 +1,7 @@
 """The commands of exoid; here, and only here, an error becomes a line and an exit code.
 
 0 is success, 1 a fault of exoid, 2 an input that the user must correct, 3 a device's fault, 130 a
-stop by Ctrl-C, 129, 131 and 143 a stop by SIGHUP, SIGQUIT and SIGTERM.
+stop by Ctrl-C, 129, 131 and 143 a stop by SIGHUP, SIGQUIT and SIGTERM, 141 a closed pipe.
 
 A command's function imports the libraries that it needs, so that help and light commands start
 fast; tests/cli/test_imports.py lists the libraries that each of them may not import.

@@ -165,6 +165,6 @@ def _row(one: "Detectable") -> tuple[str, ...]:
     share = one.smallest_rms_nm / one.torque_rms_nm
     # It would need as much torque as the whole motion.
     if share >= 1.0:
-        return (*cause, "not to be seen", "", "")
+        return (*cause, "not detectable", "", "")
     rms = number(machine, one.smallest_rms_nm)
     return (*cause, one.size_in_words(), rms, f"{100 * share:.1f} %")

@@ -110,7 +110,7 @@ def _how_to_begin(named: bool) -> str:
     if imported_in(Path("recordings")):
         return f"put an empty {NAME} next to recordings/, then `exoid run` uses what was imported"
     return (
-        f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with"
-        " --config, or start one with `exoid init DIR`; next to imported recordings/ an empty"
+        f"{'' if named else 'name the missing file, '}go to an experiment's folder, name its"
+        " settings with --config, or start one with `exoid init DIR`; next to imported recordings/ an empty"
         f" {NAME} is enough"
     )

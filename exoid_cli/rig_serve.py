@@ -91,8 +91,9 @@ def _address(bind: str, anyone: bool) -> str:
         return addresses[0]  # not the name, which may be resolved differently the next time
     if not anyone:
         raise SettingsError(
-            f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}."
-            " Modbus has no authentication: add --anyone if any computer may move the rig"
+            f"--bind: found {bind}, expected an address that only this computer reaches, such as"
+            f" {LOOPBACK}. Modbus has no authentication: add --anyone if any computer may move the"
+            " rig"
         )
     console.warn(
         f"the rig listens on {bind}, and Modbus has no authentication: every computer that reaches"

@@ -73,10 +73,7 @@ def _say_skipped(skipped: Sequence[SkippedStep]) -> None:
     """Repeat at the end which steps could not be done, those of one reason together."""
     for reason in dict.fromkeys(step.reason for step in skipped):
         targets = [skip.step.target.as_posix() for skip in skipped if skip.reason == reason]
-        are = "is" if len(targets) == 1 else "are"
-        console.say(
-            f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {reason}"
-        )
+        console.say(f"not done, so left out: {', '.join(targets)}: {reason}")
 
 
 def _refuse_unknown(stages: Sequence[str], folder: ExperimentFolder) -> None:

@@ -42,7 +42,8 @@ def check(
     if folder.of_stage("acquire"):
         folder.experiment.refuse_what_cannot_run()
     console.emit(folder.experiment.model_dump(mode="json"))
-    console.say(f"{config}: {len(folder.experiment.run)} runs, all settings are valid")
+    count = len(folder.experiment.run)
+    console.say(f"{config}: {count} run{'s' * (count != 1)}, all settings are valid")
 
 
 @settings.command("split", cls=Command, short_help="Write one file a section, for make.")

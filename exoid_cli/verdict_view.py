@@ -56,7 +56,6 @@ def _show_faults(verdict: "Verdict") -> None:
     faults = verdict.data_faults
     if verdict.acquisition_at_fault:
         console.say("\nNo cause was sought. Correct the acquisition, and record again.")
-    # The summary has named the first one.
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")

@@ -21,7 +21,7 @@ class Outcome:
     samples: int
     missed: int
     left_out: int
-    """Set-points that were left out, from the way to its beginning to that from its end."""
+    """Set-points that were not sent because samples came late, ramps included."""
 
 
 def finish_run(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
@@ -104,7 +104,7 @@ def record_journal(
 
 
 def _error_of(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str]:
-    """Return the kind of error that the end of a run is, and how the run ended and the leg is."""
+    """Return the kind of error to raise, and a text with the run's end and the drives' state."""
     if supervisor.fault:
         log = _write_traceback(supervisor.fault, recording_path(output, supervisor.why))
         why = f"{supervisor.why}; please report it with {log}"

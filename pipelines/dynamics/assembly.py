@@ -120,7 +120,8 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             )
         if sprung[joint[i]] >= 0:
             raise InputError(
-                f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most"
+                f"{effect.label}: the joint has another transmission already, and can have one;"
+                " remove one of them"
             )
         # A motor without inertia could not be integrated in front of its spring.
         sprung[joint[i]], inertias[joint[i]] = i, motor_inertia(effect, model, geometry)

@@ -51,9 +51,10 @@ from pipelines.mechanics.instant import vector
 PARTS = 256
 """Number of parts into which a step with a switch can be divided, a power of two."""
 
-ROUNDING, CREEP = 1e-6, 1e-3
-"""Greatest speed, rad/s, against a joint's direction, and of a joint held by friction, due to the
-change of torque in a step."""
+ROUNDING = 1e-6
+"""Greatest speed of a moving joint against its direction of friction, rad/s."""
+CREEP = 1e-3
+"""Greatest speed of a joint that friction holds, rad/s: torque changes within a step."""
 
 TURN = 2.0 * np.pi
 """Angle, rad, at which a joint counts as running away."""
@@ -98,7 +99,10 @@ class _Network(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """Last reading, low-passed speed, and the errors of angle and speed; (J,) each."""
+    """The encoders as the controller sees them, (J,) each.
+
+    Last reading (``angle``), low-passed ``speed``, their errors, and ``reading`` as scratch.
+    """
 
     angle: np.ndarray
     speed: np.ndarray

@@ -22,9 +22,9 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
 
 HUBER = 1.345
+"""Standard deviations from which Huber's weights fall: 95 % efficiency on Gaussian noise."""
 BISQUARE = 4.685
-"""Standard deviations at which Huber's weights begin to fall, and at which Tukey's are zero: 95 %
-efficiency on Gaussian noise."""
+"""Standard deviations from which Tukey's weights are zero: 95 % efficiency on Gaussian noise."""
 ITERATIONS = 50
 
 

@@ -45,6 +45,6 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         mixed = worst_direction(scaled, names)
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
-            " others. Excite more harmonics and both joints at once, or lengthen the run"
+            " others. Excite more harmonics, move all joints at once, or record longer"
         )
     return np.linalg.inv(scaled) / np.outer(size, size)

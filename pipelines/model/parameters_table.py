@@ -30,8 +30,11 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     """
     is_body = frame["effect"] == RigidBody.name
     if not (is_body & (frame["run"] == run)).any():
-        known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
-        raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
+        known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique())) or "none"
+        raise InputError(
+            f"the parameters hold no rigid body for run {run!r}, only for {known}. Choose one of"
+            " these, or identify with a training run of that kind"
+        )
     terms = [
         term for term, _ in terms_next_to_bodies(frame, machine) if term.effect.run in (None, run)
     ]
@@ -148,8 +151,8 @@ def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
     ]
     return [
         f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to"
-        f" {row['ci95_high']:.3g}) puts mass above the axis at angle zero, where the leg must hang"
-        " straight down. Unless the link is overbalanced or stands up, the zero is half a turn off,"
+        f" {row['ci95_high']:.3g}) puts mass above the axis at angle zero, where the link is to"
+        " hang straight down. Unless the link is overbalanced or stands up, the zero is half a turn off,"
         " a sign is wrong, or a spring is taken for gravity"
         # The whole interval has to be negative, as noise may change the sign of a small moment.
         for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")

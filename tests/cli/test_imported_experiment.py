@@ -113,7 +113,7 @@ def test_steps_that_cannot_be_done_are_listed_with_the_reason_after_the_count_of
     assert outcome.out.splitlines()[-2].startswith("3 of 4 steps done in ")
     assert (
         outcome.out.splitlines()[-1]
-        == "1 could not be done and is left out, simulated/replay-Monday-2.parquet: backlash@arm:"
+        == "not done, so left out: simulated/replay-Monday-2.parquet: backlash@arm:"
         " no simulation holds it; simulate the model without it"
     )
     assert "0 of 4 steps done in 0 s; 3 were up to date" in exoid("run", "replay").out

@@ -188,6 +188,6 @@ def test_presliding_holds_like_a_spring_before_it_slides():
 def test_two_transmissions_at_one_joint_are_refused():
     spring = Term(JointElasticity("knee"), np.array([500.0]))
     with pytest.raises(
-        InputError, match="knee: joint_elasticity is a second transmission; a joint has one at most"
+        InputError, match="joint_elasticity@knee: the joint has another transmission already"
     ):
         assemble(Model((BODY, spring, spring)), GEOMETRY)

@@ -42,7 +42,7 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     faults = [
         fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
     ]
-    faults = _hopeless(motions, faults)
+    faults = _with_short_runs_left_out(motions, faults)
     rightly_wired = []
     for motion in excluding(motions, faults):
         # A run that is left out whole has nothing to compare.
@@ -64,11 +64,11 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     return sorted(faults, key=lambda fault: files.index(fault.file))
 
 
-def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
-    """Return the faults, those of runs that are too short without their faulty samples changed.
+def _with_short_runs_left_out(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
+    """Return the faults; those of runs with too few good samples mask or spoil the whole run.
 
-    Masking does not help such a run. Where other runs of its kind suffice, it is left out whole
-    instead, and spoils nothing but itself.
+    Where other runs of its kind suffice, such a run is masked as a whole. Otherwise its faults
+    have no mask.
     """
     sound = excluding(motions, faults)
     hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}

@@ -21,11 +21,11 @@ class Fault:
     what: str
     """The fault, its extent, its time, and the remedy."""
     samples: NDArray | None = None
-    """(n,) bool, the samples that must not be used; None where masking does not help."""
+    """(n,) bool, the samples to mask; None where masking does not help: no physics is judged."""
 
     @property
     def spoils(self) -> bool:
-        """Whether it spoils the whole recording: physics must not be blamed for it."""
+        """Whether it prevents any statement on the physics of the session."""
         return self.samples is None
 
 

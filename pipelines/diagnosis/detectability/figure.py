@@ -70,7 +70,7 @@ def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
     )
     axis.grid(axis="y", visible=False)
     axis.set_xlabel(
-        f"smallest effect that would be seen, {group[0].unit} rms (white tick: at its best shape)"
+        f"smallest detectable effect, {group[0].unit} rms (white tick: at its best shape)"
     )
     axis.set_title(joint, loc="left")
 
@@ -85,7 +85,7 @@ def _name(one: Detectable) -> str:
 
 def _note(one: Detectable) -> str:
     if not _seen(one):
-        return "not to be seen"
+        return "not detectable"
     ties = ", ".join(_short(label, one.effect.joint) for label in one.tied_with[:2])
     more = f" +{len(one.tied_with) - 2}" if len(one.tied_with) > 2 else ""
     return one.size_in_words() + (f"  or {ties}{more}" if ties else "")

@@ -36,7 +36,9 @@ class RigSettings(Settings):
     clock: Literal["lockstep", "real_time"] = Field(
         "real_time", description="Devices' own clock, or (virtual rigs) a sample each exchange."
     )
-    clocks: Literal["common", "own"] = Field("common", description="Of all drives, or of each one.")
+    clocks: Literal["common", "own"] = Field(
+        "common", description="common: one for all drives; own: one each."
+    )
     sampling: Literal["cyclic", "recorder"] = Field(
         "cyclic", description="Samples come with each set-point, or from the drives' own rings."
     )
