@@ -152,8 +152,8 @@ def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
     return [
         f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to"
         f" {row['ci95_high']:.3g}) puts mass above the axis at angle zero, where the link is to"
-        " hang straight down. Unless the link is overbalanced or stands up, the zero is half a turn off,"
-        " a sign is wrong, or a spring is taken for gravity"
+        " hang straight down. Unless the link is overbalanced or stands up, the zero is half a"
+        " turn off, a sign is wrong, or a spring is taken for gravity"
         # The whole interval has to be negative, as noise may change the sign of a small moment.
         for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")
     ]
