@@ -111,6 +111,6 @@ def _how_to_begin(named: bool) -> str:
         return f"put an empty {NAME} next to recordings/, then `exoid run` uses what was imported"
     return (
         f"{'' if named else 'name the missing file, '}go to an experiment's folder, name its"
-        " settings with --config, or start one with `exoid init DIR`; next to imported recordings/ an empty"
-        f" {NAME} is enough"
+        " settings with --config, or start one with `exoid init DIR`; next to imported recordings/"
+        f" an empty {NAME} is enough"
     )
