@@ -10,7 +10,6 @@ from pipelines.acquisition.machine.drive_protocol import disable
 from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.acquisition.uninterrupted import outlive
 from pipelines.errors import DeviceError, Unanswered
-from pipelines.mechanics.motion import CUFFS
 
 DISABLE_TRIES = 3
 """How often a drive is sent to disable, each time but the first on a new connection."""
@@ -160,15 +159,17 @@ class Stopping:
                 answers = await asyncio.gather(
                     *(sensor.look() for sensor in sensors), return_exceptions=True
                 )
-                forces = machine.no_force.copy()
-                for sensor, answer in zip(tuple(sensors), answers, strict=True):
-                    if isinstance(answer, BaseException):
-                        # A failed sensor, perhaps the reason of this stop, must not end the watch
-                        # of the others.
-                        self._supervisor.abort(answer)
-                        sensors.remove(sensor)
-                    elif answer is not None:
-                        forces[CUFFS.index(sensor.settings.cuff)] = answer
+                # A failed sensor, perhaps the reason of this stop, must not end the watch of the
+                # others.
+                for error in (one for one in answers if isinstance(one, BaseException)):
+                    self._supervisor.abort(error)
+                working = [
+                    (sensor, answer)
+                    for sensor, answer in zip(sensors, answers, strict=True)
+                    if not isinstance(answer, BaseException)
+                ]
+                sensors = [sensor for sensor, _ in working]
+                forces = machine.by_cuff(sensors, [answer for _, answer in working])
                 self._supervisor.safe_stop.check_cuffs(forces)
                 await asyncio.sleep(1.0 / self._supervisor.rate)
         except BaseException as error:

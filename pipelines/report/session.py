@@ -11,6 +11,7 @@ from pipelines.contracts import Joint, Table, contract_of, joints_of, parquet
 from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
+from pipelines.settings import Experiment
 
 TABLES = ("parameters", "residuals", "motion", "recording", "trajectory", "simulation")
 OF_MACHINE = (*TABLES, "verdict")
@@ -77,6 +78,11 @@ class Session:
     """The error of each file of exoid that cannot be read."""
     config: Path | None = None
     _tables: dict[Path, Table] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def experiment(self) -> Experiment | None:
+        """The settings as exoid.toml has them now; None without that file."""
+        return Experiment.load(self.config) if self.config else None
 
     @property
     def name(self) -> str:

@@ -3,11 +3,13 @@ judge."""
 
 import asyncio
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety.supervisor import Supervisor
@@ -163,6 +165,7 @@ def test_a_failed_sensor_does_not_end_the_watch_of_the_other_cuffs(force):
         no_force=np.full((4, 3), np.nan),
         sensors=[Cuff("thigh_front", failed), Cuff("shank_back", force)],
     )
+    machine.by_cuff = partial(Machine.by_cuff, machine)
     supervisor = SimpleNamespace(rate=1000.0, pressing=False, reasons=[])
     supervisor.abort = supervisor.reasons.append
 

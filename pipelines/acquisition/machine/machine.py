@@ -210,10 +210,15 @@ class Machine:
         due = [sensor for sensor in self.sensors if cycle is None or sensor.is_due(cycle)]
         if not due:
             return self.no_force
+        return self.by_cuff(due, await all_answers(sensor.look() for sensor in due))
+
+    def by_cuff(
+        self, sensors: Sequence[Sensor], answers: Sequence[tuple[float, float, float] | None]
+    ) -> NDArray:
+        """Return the answers of some sensors as forces on the cuffs, (4, 3) N; NaN without one."""
         forces = self.no_force.copy()
-        answers = await all_answers(sensor.look() for sensor in due)
-        # By cuff, in the order of the recording's columns, not of the rig file.
-        for sensor, force in zip(due, answers, strict=True):
+        # In the order of the recording's columns, not of the rig file.
+        for sensor, force in zip(sensors, answers, strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces

@@ -88,22 +88,14 @@ class HoldOut:
 
     def refitted(self, result: ValidationResult, kept: Collection[str]) -> ValidationResult:
         """Fit some causes of a result again, and score them (see ``ValidationScheme``)."""
-        return self._scored(self.fit_again(result.fit, kept))
+        return self.refitted_from(result.fit, kept)
 
-    def fit_again(self, whole: Fit, kept: Collection[str]) -> Fit:
-        """Fit some causes of a fit again, at its shapes and joint loads.
-
-        Parameters
-        ----------
-        whole : Fit
-            Of these runs.
-        kept : collection of str
-            Labels of these causes.
-        """
+    def refitted_from(self, whole: Fit, kept: Collection[str]) -> ValidationResult:
+        """Fit some causes of a fit to these runs again, and score them."""
         # The loads stay, so that the difference is due to the causes alone.
         runs = with_loads_of(self.runs, whole, self.baseline)
         rest = [cause for cause in whole.causes if cause.label in kept]
-        return fit(rest, runs, self.baseline, self.weights, whole.loads)
+        return self._scored(fit(rest, runs, self.baseline, self.weights, whole.loads))
 
     def _scored(self, fitted: Fit) -> ValidationResult:
         return ValidationResult.of(fitted, self.scored, self.baseline)
@@ -150,13 +142,9 @@ class CrossValidation:
 
     def refitted(self, result: ValidationResult, kept: Collection[str]) -> ValidationResult:
         """Fit some causes of a result again, and score them (see ``ValidationScheme``)."""
-        fits = [
-            one.fit_again(half_fit, kept)
-            for one, half_fit in zip(self._without_half, result.half_fits, strict=True)
-        ]
         parts = [
-            ValidationResult.of(one, scheme.scored, self.baseline)
-            for one, scheme in zip(fits, self._without_half, strict=True)
+            one.refitted_from(half_fit, kept)
+            for one, half_fit in zip(self._without_half, result.half_fits, strict=True)
         ]
         return _merged(self._all_runs.refitted(result, kept), parts)
 

@@ -73,19 +73,14 @@ def _folder(path: Path) -> str:
     return f"{path.parent}/"
 
 
-def _in_force(session: Session) -> Experiment:
-    """Return the settings that a command would take from the session's exoid.toml."""
-    return Experiment.load(session.config) if session.config else Experiment()
-
-
 def _design(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
-    used, now = resolved(artifact).get("design") or {}, _in_force(session).design
+    used, now = resolved(artifact).get("design") or {}, session.experiment
     # Options that took the place of the settings.
     options = [
         word
         for key in ("criterion", "harmonics", "seed")
-        if session.config and key in used and used[key] != getattr(now, key)
+        if now and key in used and used[key] != getattr(now.design, key)
         for word in (f"--{key}", str(used[key]))
     ]
     return ["design", *config, *options, "-o", str(artifact.path)], needs
@@ -121,7 +116,8 @@ def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str
 def _filter(session: Session, artifact: Artifact) -> Words | None:
     config, needs = _config(session, artifact)
     cutoff_hz = (resolved(artifact).get("filter") or {}).get("cutoff_hz", "auto")
-    changed = session.config and cutoff_hz != _in_force(session).filter.cutoff_hz
+    now = session.experiment
+    changed = now is not None and cutoff_hz != now.filter.cutoff_hz
     option = ["--cutoff-hz", str(cutoff_hz)] if changed else []
     words = ["filter", *_inputs(session, artifact), *config, *option]
     return [*words, "-o", str(artifact.path)], needs

@@ -10,7 +10,7 @@ from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 from pipelines.settings import Experiment
 
-SECTIONS = ("mechanism", "design", "filter", "identify", "diagnose", "simulate")
+SECTIONS = tuple(name for name in Experiment.model_fields if name not in ("acquire", "run"))
 """Sections of exoid.toml that a stage's file repeats."""
 REMEDY = "`exoid run` or `make` makes them again"
 
@@ -169,9 +169,9 @@ def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
 
 def _changed_settings(session: Session) -> list[str]:
     """Return a sentence for each section of exoid.toml that has changed since files were made."""
-    if session.config is None:
+    now = session.experiment
+    if session.config is None or now is None:
         return []
-    now = Experiment.load(session.config)
     by_value: dict[str, list[str]] = {}
     for one in session.artifacts:
         for name, setting in resolved(one).items():

@@ -5,7 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipelines.report.sections.provenance import SECTIONS
 from pipelines.report.session import Session
+from pipelines.settings import Experiment
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ def settings_diff(first: Session, second: Session) -> list[SettingDifference]:
 
 
 def _settings(session: Session) -> dict[str, list[str]]:
-    # Sections of exoid.toml that files repeat.
-    sections = ("mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate")
+    # Sections of exoid.toml that files repeat, in its order.
+    sections = [name for name in Experiment.model_fields if name in (*SECTIONS, "acquire")]
     by_setting: dict[str, dict[str, None]] = {}
     for artifact in session.artifacts:
         config = artifact.metadata.get("config") or {}
