@@ -24,13 +24,20 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import ASSEMBLY, Assembly
 from pipelines.dynamics.compiled_once import compiled_once
-from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring_at
+from pipelines.effects.kernel import (
+    ALLOCATING_NOTHING,
+    Instant,
+    derivative_at,
+    reaction_at,
+    spring_at,
+)
 from pipelines.mechanics.instant import vector
 
-HOT: dict[str, Any] = {"cache": True, "_nrt": False}
-"""Compiler options of the innermost functions. They allocate nothing, so that ``_nrt`` may switch
-off numba's reference counting, which would take more than half of their time."""
-INNER: dict[str, Any] = {**HOT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INNER: dict[str, Any] = {
+    **ALLOCATING_NOTHING,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 """Compiler options of functions that Python never calls; their wrappers would take long to
 compile."""
 

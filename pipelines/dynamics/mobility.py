@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import (
     DTHETA,
-    HOT,
     Q,
     accelerations,
     memory_size,
     resting_state,
     workspace,
 )
+from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.errors import InputError
 
 KNEE_ANGLES = np.linspace(-np.pi, np.pi, 121)
@@ -25,7 +25,7 @@ MOST_STEPS = 200
 below 1e-3 kg·m², less than that of rotors."""
 
 
-@njit(**HOT)
+@njit(**ALLOCATING_NOTHING)
 def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
     """Write mass matrices and mobilities, (k, J, J) each, at poses (k, J)."""
     joints = a.joints

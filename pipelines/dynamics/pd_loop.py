@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import (
     DQ,
-    HOT,
     THETA,
     Q,
     memory_size,
@@ -21,7 +20,7 @@ from pipelines.dynamics.forward import (
     step,
     workspace,
 )
-from pipelines.effects.kernel import reading_at, torque_reading_at
+from pipelines.effects.kernel import ALLOCATING_NOTHING, reading_at, torque_reading_at
 
 SUBSTEPS = 6
 """Integration steps per control period; even, so that the middle of a sample is one of them."""
@@ -138,7 +137,7 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     )
 
 
-@njit(**HOT)
+@njit(**ALLOCATING_NOTHING)
 def read_encoders(a, angle):
     """Turn true motor angles into the encoders' readings.
 

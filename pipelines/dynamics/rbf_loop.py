@@ -25,7 +25,6 @@ from pipelines.dynamics.assembly import ASSEMBLY, Assembly
 from pipelines.dynamics.compiled_once import compiled_once
 from pipelines.dynamics.forward import (
     DTHETA,
-    HOT,
     INNER,
     STAGES,
     THETA,
@@ -46,6 +45,7 @@ from pipelines.dynamics.forward import (
     workspace,
 )
 from pipelines.dynamics.pd_loop import read_encoders, whole_counts
+from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.mechanics.instant import vector
 
 PARTS = 256
@@ -141,11 +141,18 @@ class _Loop(NamedTuple):
     drive: np.ndarray
 
 
-CONTROLLER = typeof(RbfController(1.0, 1.0, 1.0, 1.0, 1.0, np.zeros(1), 1.0))
-NETWORK = typeof(_Network(np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1)))
-SEEN = typeof(_Seen(*np.zeros((5, 1))))
-TOOLS = (ASSEMBLY, CONTROLLER, WORKSPACE, STAGES, NETWORK, SEEN)
-LOOP = types.NamedTuple([*TOOLS, states, vector, vector, states, states], _Loop)
+LOOP = types.NamedTuple(
+    [
+        ASSEMBLY,
+        typeof(RbfController(1.0, 1.0, 1.0, 1.0, 1.0, np.zeros(1), 1.0)),
+        WORKSPACE,
+        STAGES,
+        typeof(_Network(np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1))),
+        typeof(_Seen(*np.zeros((5, 1)))),
+        *(states, vector, vector, states, states),
+    ],
+    _Loop,
+)
 
 
 @njit(**INNER)
@@ -301,7 +308,7 @@ def _look(loop, encoder, k, period):
         seen.angle_error[j] = angle - state[THETA, j]
 
 
-@njit(**HOT)
+@njit(**ALLOCATING_NOTHING)
 def _run(loop, kept, encoder, reference, disturbance, period, substeps, out):
     """Simulate samples into ``out`` (n, 4, J), and return their number.
 

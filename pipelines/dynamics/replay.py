@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import (
     DTHETA,
-    HOT,
     INNER,
     THETA,
     memory_rates,
@@ -23,13 +22,13 @@ from pipelines.dynamics.forward import (
     step,
     workspace,
 )
+from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.errors import InputError
 from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 
 WINDOW_S = 1.0
-EVERY_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ class ReplayResult:
 
 
 def replay(
-    model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: float = EVERY_S
+    model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: float = 0.5
 ) -> ReplayResult:
     """Simulate a model under the recorded torque, from the recorded state, over short windows.
 
@@ -154,7 +153,7 @@ def _recall(a, w, s, time, states, load, k, share, memory):
     memory_rates(a, w, t, s.state, memory, w.direction, w.passed, s.memory_rates[0])
 
 
-@njit(**HOT)
+@njit(**ALLOCATING_NOTHING)
 def _remember(a, w, s, time, states, load, temperature, memory):
     """Write the memories along a recorded stretch (n, 4, J), from rest, into ``memory`` (n, m)."""
     # Steps per sample of the effects' memories along the recorded motion, as in the regression.
@@ -175,7 +174,7 @@ def _remember(a, w, s, time, states, load, temperature, memory):
                 memory[k + 1, m] += h * s.memory_rates[0, m]
 
 
-@njit(**HOT)
+@njit(**ALLOCATING_NOTHING)
 def _window(a, w, s, time, torque, parts, state, memory, load, out):
     """Simulate one window from ``state`` on into ``out`` (n, 2, J)."""
     _note(state, out[0])

@@ -5,8 +5,17 @@ from pipelines.effects.base_tilt import BaseTilt
 from pipelines.effects.cogging import Cogging
 from pipelines.effects.coulomb_asymmetry import CoulombAsymmetry
 from pipelines.effects.cuff_compliance import CuffCompliance
-from pipelines.effects.effect import LAWS, RUNS, Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import (
+    LAWS,
+    RUNS,
+    Effect,
+    Element,
+    Family,
+    Parameter,
+    Parity,
+    Side,
+    Tie,
+)
 from pipelines.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.end_stop import EndStop
@@ -29,7 +38,6 @@ from pipelines.effects.rotor_coupling import RotorCoupling
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.spasticity import Spasticity
 from pipelines.effects.stribeck_friction import StribeckFriction
-from pipelines.effects.tie import Tie
 from pipelines.effects.time_delay import TimeDelay
 from pipelines.effects.torque_cross_talk import TorqueCrossTalk
 from pipelines.effects.torque_drift import TorqueDrift

@@ -6,11 +6,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side, Tie
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import link_behind_motor
-from pipelines.effects.tie import Tie
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0

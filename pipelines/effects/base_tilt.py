@@ -5,9 +5,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side, Tie
 from pipelines.effects.kernel import reading
-from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 

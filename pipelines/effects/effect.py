@@ -19,16 +19,14 @@ disagree.
 from abc import ABC
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum, StrEnum
+from enum import Enum, IntEnum, StrEnum, auto
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joint_units import Scale, refuse_unknown_unit, unit_at
-from pipelines.effects.element import Element
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
-from pipelines.effects.tie import Tie
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
@@ -124,6 +122,41 @@ class Parity(IntEnum):
 
     EVEN = 1
     ODD = -1
+
+
+class Element(Enum):
+    """An element of simulators' model formats; an effect of its equation has its values, in order.
+
+    ================= =====================================================================
+    RIGID_BODIES      inertial parameters of the mechanism
+    FRICTION          Coulomb and viscous friction of a joint
+    QUADRATIC_DAMPING torque of a joint per squared speed
+    ARMATURE          inertia of a joint's rotor
+    SPRING            stiffness and rest angle (``physical``) of a spring across a joint
+    MASS_ACROSS       first moment of mass across a link
+    SERIES_SPRING     stiffness and hardening of a spring between motor and link
+    TORQUE_GAIN       measured torque per torque of a joint
+    TORQUE_OFFSET     measured less true torque of a joint
+    ================= =====================================================================
+    """
+
+    RIGID_BODIES = auto()
+    FRICTION = auto()
+    QUADRATIC_DAMPING = auto()
+    ARMATURE = auto()
+    SPRING = auto()
+    MASS_ACROSS = auto()
+    SERIES_SPRING = auto()
+    TORQUE_GAIN = auto()
+    TORQUE_OFFSET = auto()
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Why recordings cannot separate two causes, and how to separate them."""
+
+    why: str
+    how_to_separate: str
 
 
 @dataclass(frozen=True)
@@ -539,17 +572,11 @@ class Effect(ABC):
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
 
     def with_parts(self, number: int) -> "Effect":
-        """Return the effect with a number of parts, such as lines of a ripple.
-
-        Most effects have one part.
-        """
+        """Return the effect with a number of parts, such as lines of a ripple; most have one."""
         return self
 
     def with_parts_named(self, names: Collection[str]) -> "Effect":
-        """Return the effect with as many parts as the names of its values require.
-
-        Most effects have one part.
-        """
+        """Return the effect with as many parts as the names of its values require."""
         return self
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:

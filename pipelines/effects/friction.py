@@ -1,7 +1,6 @@
 """Coulomb and viscous friction of a drive: the baseline of every other drive effect."""
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 

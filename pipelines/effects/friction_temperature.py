@@ -2,9 +2,8 @@
 
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side, Tie
 from pipelines.effects.kernel import reaction
-from pipelines.effects.tie import Tie
 from pipelines.mechanics.instant import REFERENCE_C
 
 

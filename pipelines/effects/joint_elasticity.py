@@ -4,8 +4,7 @@ from math import sqrt
 
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Side
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion

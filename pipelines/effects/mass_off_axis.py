@@ -2,9 +2,7 @@
 
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
-from pipelines.effects.tie import Tie
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side, Tie
 from pipelines.mechanics.mechanisms.leg import LEG
 
 

@@ -6,10 +6,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side, Tie
 from pipelines.effects.kernel import reaction
-from pipelines.effects.tie import Tie
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
 

@@ -3,9 +3,8 @@
 from math import expm1
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side, Tie
 from pipelines.effects.kernel import reaction
-from pipelines.effects.tie import Tie
 
 
 class PassiveJointTorque(Effect):

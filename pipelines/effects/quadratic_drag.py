@@ -1,7 +1,6 @@
 """Drag that grows with the square of speed."""
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion

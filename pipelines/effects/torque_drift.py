@@ -3,9 +3,8 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side, Tie
 from pipelines.effects.kernel import torque_reading
-from pipelines.effects.tie import Tie
 from pipelines.effects.torque_offset import TorqueOffset
 
 

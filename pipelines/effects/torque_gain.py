@@ -4,10 +4,8 @@ from typing import ClassVar
 
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Family, Parameter, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Side, Tie
 from pipelines.effects.kernel import torque_reading
-from pipelines.effects.tie import Tie
 from pipelines.mechanics.motion import Motion
 
 

@@ -1,7 +1,6 @@
 """A torque channel with a wrong zero."""
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
-from pipelines.effects.element import Element
+from pipelines.effects.effect import Effect, Element, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
 
 

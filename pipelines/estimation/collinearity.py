@@ -12,12 +12,6 @@ SHARE = 0.5
 """Share of a parameter's variance above which a dependence involves it."""
 
 
-def _scaled_gram(gram: NDArray) -> NDArray:
-    """Return A'A, (p, p), with the columns of A scaled to unit norm."""
-    size = np.sqrt(np.diag(gram))
-    return gram / np.outer(size, size)
-
-
 def profiled(gram: NDArray, others: NDArray) -> NDArray:
     """Return the information on some parameters if the others are unknown as well.
 
@@ -54,7 +48,9 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     """
     # Condition indices at which Belsley calls a dependence weak, and strong.
     weak, strong = 10.0, 30.0
-    eigenvalues, vectors = np.linalg.eigh(_scaled_gram(gram))
+    # Columns of unit norm, because parameters have different units.
+    size = np.sqrt(np.diag(gram))
+    eigenvalues, vectors = np.linalg.eigh(gram / np.outer(size, size))
     # Rounding can make the least eigenvalue negative, which has no condition index.
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
     index = np.sqrt(eigenvalues[-1] / eigenvalues)
@@ -73,24 +69,3 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
                 "the others compensate for an error in one"
             )
     return sentences
-
-
-def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
-    """Return the parameters in the least determined combination.
-
-    Parameters
-    ----------
-    scaled : (p, p) array
-        A'A of columns scaled to unit norm.
-    names : sequence of str
-        Name of each column.
-
-    Returns
-    -------
-    list of str
-        Those with at least 0.3 of the largest weight, that one first.
-    """
-    _, vectors = np.linalg.eigh(scaled)
-    # Eigenvalues rise, so the first vector is the combination that the data determine least.
-    weight = np.abs(vectors[:, 0])
-    return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]

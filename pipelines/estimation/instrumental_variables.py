@@ -10,6 +10,7 @@ Time-Series Analysis, 6-7). The simulation need not be right, only free of the n
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from pipelines.dynamics.closed_loop import closed_loop
 from pipelines.estimation.durbin_wu_hausman import DurbinWuHausman, durbin_wu_hausman
 from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark, estimated
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
-from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
@@ -127,7 +127,7 @@ def _solved(problem: Problem, rows: Sequence[_Rows], weights: NDArray) -> Fit:
         sensitivity,
         carry_of(problem, sensitivity, slope),
         weights,
-        _scores(problem, rows, values, weights),
+        partial(_scores, problem, rows, values, weights),
     )
 
 
@@ -140,18 +140,16 @@ def _weights(problem: Problem, rows: Sequence[_Rows], values: NDArray) -> NDArra
     return np.asarray(1.0 / np.maximum(squares / np.maximum(count, 1), LEAST_NM**2))
 
 
-def _scores(problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: NDArray) -> Scores:
+def _scores(
+    problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: NDArray
+) -> Iterator[tuple[Hashable, NDArray]]:
     every = problem.completed(values)
-
-    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
-        for (number, _), r in zip(problem.runs, rows, strict=True):
-            # Rows near reversals count zero and are kept, so that a lag stays a time.
-            pull = np.where(r.usable, residual_of(r.measured, every), 0.0) * weights
-            scores = np.einsum("mj,mjk->mk", pull, r.instruments[:, :, problem.fitted])
-            for segment, part in by_segment(r.measured.segment, scores):
-                yield (number, segment), part
-
-    return go_through
+    for (number, _), r in zip(problem.runs, rows, strict=True):
+        # Rows near reversals count zero and are kept, so that a lag stays a time.
+        pull = np.where(r.usable, residual_of(r.measured, every), 0.0) * weights
+        scores = np.einsum("mj,mjk->mk", pull, r.instruments[:, :, problem.fitted])
+        for segment, part in by_segment(r.measured.segment, scores):
+            yield (number, segment), part
 
 
 def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:

@@ -9,6 +9,7 @@ for equal intervals.
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
-from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
@@ -107,7 +107,7 @@ class IterativelyReweighted(Estimator):
             sensitivity,
             carry_of(problem, sensitivity, sums.slope[problem.fitted]),
             scale**-2.0,
-            _scores(problem, values, scale),
+            partial(_scores, problem, values, scale),
             {
                 "iterations": first.iterations + second.iterations,
                 "settled": settled,
@@ -188,15 +188,13 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
     )
 
 
-def _scores(problem: Problem, values: NDArray, scale: NDArray) -> Scores:
+def _scores(
+    problem: Problem, values: NDArray, scale: NDArray
+) -> Iterator[tuple[Hashable, NDArray]]:
     every = problem.completed(values)
-
-    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
-        for number, r in problem.regressions():
-            residual = residual_of(r, every)
-            pull = np.where(r.usable, Bisquare.weight(residual / scale) * residual, 0.0) / scale**2
-            scores = np.einsum("mj,mjk->mk", pull, r.regressor[:, :, problem.fitted])
-            for segment, rows in by_segment(r.segment, scores):
-                yield (number, segment), rows
-
-    return go_through
+    for number, r in problem.regressions():
+        residual = residual_of(r, every)
+        pull = np.where(r.usable, Bisquare.weight(residual / scale) * residual, 0.0) / scale**2
+        scores = np.einsum("mj,mjk->mk", pull, r.regressor[:, :, problem.fitted])
+        for segment, rows in by_segment(r.segment, scores):
+            yield (number, segment), rows

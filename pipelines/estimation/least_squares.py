@@ -6,13 +6,13 @@ more for the covariance.
 """
 
 from collections.abc import Hashable, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.estimation.compressed import Compressed, normal_equations, residual_rms
 from pipelines.estimation.estimator import Estimator, Fit, carry_of
-from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
@@ -59,7 +59,7 @@ class WeightedLeastSquares(Estimator):
             sensitivity,
             carry_of(problem, sensitivity, slope),
             weights,
-            _scores_of(problem, values, weights),
+            partial(_scores, problem, values, weights),
             {"joint_weights_1_nm2": weights.tolist()},
         )
 
@@ -82,31 +82,14 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
     passes = 0
 
 
-def _scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
-    """Return the scores of least squares: each block's part of the normal equations' residual.
-
-    Parameters
-    ----------
-    problem : Problem
-        Which rows and columns are fitted.
-    values : (k,) array
-        Fitted values.
-    weights : (J,) array
-        Weight of each joint, 1/(N·m)².
-
-    Returns
-    -------
-    Scores
-        Pieces of (m, k) scores.
-    """
+def _scores(
+    problem: Problem, values: NDArray, weights: NDArray
+) -> Iterator[tuple[Hashable, NDArray]]:
+    """Yield the scores of least squares: each block's part of the normal equations' residual."""
     every = problem.completed(values)
-
-    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
-        for number, r in problem.regressions():
-            # Rows near reversals count zero and are kept, so that a lag stays a time.
-            residual = np.where(r.usable, residual_of(r, every), 0.0)
-            scores = np.einsum("mj,mjk,j->mk", residual, r.regressor[:, :, problem.fitted], weights)
-            for segment, rows in by_segment(r.segment, scores):
-                yield (number, segment), rows
-
-    return go_through
+    for number, r in problem.regressions():
+        # Rows near reversals count zero and are kept, so that a lag stays a time.
+        residual = np.where(r.usable, residual_of(r, every), 0.0)
+        scores = np.einsum("mj,mjk,j->mk", residual, r.regressor[:, :, problem.fitted], weights)
+        for segment, rows in by_segment(r.segment, scores):
+            yield (number, segment), rows

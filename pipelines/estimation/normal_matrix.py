@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import NotIdentifiable
-from pipelines.estimation.collinearity import worst_direction
 
 
 def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
@@ -42,7 +41,9 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
     eigenvalues = np.linalg.eigvalsh(scaled)
     # The normal matrix has the square of the regressor's condition number, hence the root.
     if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > singular:
-        mixed = worst_direction(scaled, names)
+        # Eigenvalues rise, so the first vector is the combination that the data determine least.
+        weight = np.abs(np.linalg.eigh(scaled)[1][:, 0])
+        mixed = [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
             " others. Excite more harmonics, move all joints at once, or record longer"

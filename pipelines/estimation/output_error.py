@@ -7,7 +7,7 @@ sticking joints, and keeps noise of the angles in the residual. It costs some hu
 each run.
 """
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,6 @@ from scipy.optimize import least_squares
 from pipelines.dynamics.replay import replay
 from pipelines.estimation.estimator import Estimator, Fit, carry_of, convergence_remark
 from pipelines.estimation.least_squares import WeightedLeastSquares
-from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
@@ -113,14 +112,7 @@ def _searched(
 ) -> tuple[NDArray, int, bool]:
     """Minimize the weighted squared error.
 
-    Returns
-    -------
-    values : (k,) array
-        Values at the end of the search.
-    simulations : int
-        Number of simulations of all runs.
-    converged : bool
-        Whether the search converged.
+    Return the values (k,), the number of simulations of all runs, and whether it converged.
     """
     # Relative decrease of the squared error at convergence; less than a tenth of a standard error.
     settled = 1e-5
@@ -191,7 +183,7 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> 
         sensitivity,
         carry_of(problem, sensitivity, np.asarray(slope)),
         weights,
-        _by_run(scores),
+        lambda: enumerate(scores),
         about,
     )
 
@@ -211,10 +203,3 @@ def _window_scores(
     return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[
         ..., 0
     ]
-
-
-def _by_run(scores: Sequence[NDArray]) -> Scores:
-    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
-        yield from enumerate(scores)
-
-    return go_through

@@ -263,24 +263,7 @@ class _Grid:
     def filtered(
         self, time: NDArray, angle: NDArray, cutoff_hz: float, order: int
     ) -> list[NDArray]:
-        """Return angle, velocity and acceleration at the samples' own times.
-
-        Parameters
-        ----------
-        time : (n,) array
-            s.
-        angle : (n, J) array
-            rad.
-        cutoff_hz : float
-            Cut-off of the low-pass, Hz.
-        order : int
-            Order of the low-pass, one way.
-
-        Returns
-        -------
-        list
-            Three (n, J) arrays: rad, rad/s, rad/s².
-        """
+        """Return angle, velocity and acceleration (n, J) at the samples' own times."""
         grid, uniform = self._sampled(time, angle)
         smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
         states = [smooth, *(derivative(smooth, self._rate_hz, order) for order in (1, 2))]
@@ -288,22 +271,7 @@ class _Grid:
         return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
 
     def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
-        """Return the angles at uniform times.
-
-        Parameters
-        ----------
-        time : (n,) array
-            s.
-        angle : (n, J) array
-            rad.
-        begin_s, end_s : float
-            First time, and the time before which to end, s.
-
-        Returns
-        -------
-        (m, J) array
-            rad.
-        """
+        """Return the angles (m, J) at uniform times from ``begin_s`` until before ``end_s``."""
         grid, uniform = self._sampled(time, angle)
         return uniform[(grid >= begin_s) & (grid < end_s)]
 

@@ -17,13 +17,7 @@ from pipelines.mechanics.mechanisms.leg import LEG
 
 
 def _collected() -> tuple[Mechanism, ...]:
-    """Return every mechanism in the files of mechanisms/, in the order of their names, each once.
-
-    Raises
-    ------
-    InputError
-        If two mechanisms have the same joints and gravity.
-    """
+    """Return every mechanism in the files of mechanisms/, in order of their names, each once."""
     names = sorted(module.name for module in iter_modules(mechanisms.__path__))
     modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
     values = [value for module in modules for value in vars(module).values()]

@@ -317,11 +317,6 @@ def _period(table: Table) -> float | None:
     """Return the period of a recording's motion, s.
 
     None if it is unknown, or much longer than the recording.
-
-    Raises
-    ------
-    InputError
-        If the period is shorter than a few samples.
     """
     # Least number of samples in a period.
     shortest_period = 4

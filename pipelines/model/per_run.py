@@ -1,6 +1,5 @@
 """Values that differ from run to run: an encoder's zero, an onset, a phase."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,11 @@ def own_term(term: Term, table: Table, sha256: str | None) -> Term | None:
     if values is None:
         return term
     # A value of None marks a term that this run does not have.
-    return None if None in values.values() else _with(term, values)
+    if None in values.values():
+        return None
+    physical = term.effect.physical(term.values)
+    of_rows = zip([p.name for p in term.effect.parameters], physical, strict=True)
+    return term_from(term.effect, dict(of_rows) | values)
 
 
 def guess(term: Term, table: Table, sha256: str | None, recording: Path | None) -> str | None:
@@ -94,11 +97,3 @@ def _runs(term: Term, table: Table) -> list[dict[str, Any]]:
 
 def _stated(term: Term, table: Table, sha256: str | None) -> dict[str, float | None] | None:
     return next((one["values"] for one in _runs(term, table) if one["sha256"] == sha256), None)
-
-
-def _with(term: Term, values: Mapping[str, float | None]) -> Term:
-    """Return a term with other values of some parameters."""
-    names = [p.name for p in term.effect.parameters]
-    return term_from(
-        term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | dict(values)
-    )

@@ -29,12 +29,10 @@ class Cutoff:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The power spectral density of one channel, with the level of its noise."""
+    """The level of one channel's noise, and the frequencies at which its signal ends."""
 
-    frequency_hz: NDArray
-    density: NDArray
-    """(f,) unit²/Hz."""
     floor: float
+    """unit²/Hz."""
     meets_floor_hz: float
     motion_hz: float
     """Frequency below which nearly all of the signal's power lies."""
@@ -74,7 +72,7 @@ def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
     # Without this difference the noise of the whole band would count as motion.
     power = np.cumsum(np.maximum(density - floor, 0.0))
     motion = frequency[np.searchsorted(power, slow_share * power[-1])] if power[-1] > 0 else 0.0
-    return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
+    return Spectrum(floor, float(meets), float(min(motion, meets)))
 
 
 def choose_cutoff(
