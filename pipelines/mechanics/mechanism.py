@@ -1,7 +1,7 @@
 """A mechanism: its joints, and the torque that its rigid bodies require of them.
 
-Each mechanism is one file with its regressor, torque = A(q, dq, ddq) X. Mass matrix, Coriolis
-matrix and gravity are computed from it here.
+Each mechanism is one file with its regressor, torque = A(q, dq, ddq) X. The mass matrix
+is computed from it here.
 """
 
 from collections.abc import Callable, Mapping
@@ -109,54 +109,6 @@ class Mechanism:
         return np.column_stack(
             [self._torque(q, still, unit, X, weightless) - at_rest for unit in np.eye(len(still))]
         )
-
-    def coriolis_matrix(self, q, dq, X, geometry: Geometry) -> NDArray:
-        """Return the Coriolis matrix C(q, dq), (J, J) N·m·s/rad, in Christoffel form.
-
-        dM/dt - 2 C is then skew-symmetric. The velocity torque is a quadratic form in dq, and its
-        polarisation is the Christoffel matrix.
-
-        Parameters
-        ----------
-        q, dq : (J,) array
-            Angles, rad, and velocities, rad/s.
-        X : (p,) array
-            Inertial parameters.
-        geometry : Geometry
-            Lengths.
-        """
-        still, weightless = np.zeros(len(self.kinds)), replace(geometry, gravity_m_s2=0.0)
-        dq = np.asarray(dq, dtype=float)
-        at_rest = self._torque(q, still, still, X, weightless)
-
-        def quadratic(velocity):
-            # The polarisation needs a pure quadratic form, without any torque at rest.
-            return self._torque(q, velocity, still, X, weightless) - at_rest
-
-        units = np.eye(len(still))
-        return np.column_stack(
-            [0.5 * (quadratic(dq + unit) - quadratic(dq) - quadratic(unit)) for unit in units]
-        )
-
-    def gravity_torque(self, q, X, geometry: Geometry) -> NDArray:
-        """Return the torque G(q) that holds the machine at rest.
-
-        Parameters
-        ----------
-        q : (J,) array
-            Angles, rad.
-        X : (p,) array
-            Inertial parameters, SI units.
-        geometry : Geometry
-            Lengths, m, and gravity, m/s².
-
-        Returns
-        -------
-        (J,) array
-            N·m.
-        """
-        still = np.zeros(len(self.kinds))
-        return self._torque(q, still, still, X, geometry)
 
     def least_inertia(self, X, geometry: Geometry) -> tuple[float, float, NDArray]:
         """Return the extreme eigenvalues of the inertia form of X (p,).

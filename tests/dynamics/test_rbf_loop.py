@@ -16,6 +16,7 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term
+from tests.mechanics.equations import coriolis_matrix, gravity_torque
 
 X = np.array([10.3016, 3.0157, 2.2664, 5.5354])
 GEOMETRY = Geometry()
@@ -76,8 +77,8 @@ def by_scipy(c: RbfController, seconds: float):
     def rates(t, state):
         q, dq, r, H, torque = parts(t, state)
         rest = (
-            LEG.coriolis_matrix(q, dq, X, GEOMETRY) @ dq
-            + LEG.gravity_torque(q, X, GEOMETRY)
+            coriolis_matrix(LEG, q, dq, X, GEOMETRY) @ dq
+            + gravity_torque(LEG, q, X, GEOMETRY)
             + 5.0 * dq
         )
         ddq = np.linalg.solve(LEG.mass_matrix(q, X, GEOMETRY), torque - 2 * np.sin(2 * t) - rest)

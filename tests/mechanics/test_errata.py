@@ -13,6 +13,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG, potential_energy, regressor_at
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings import datasets
+from tests.mechanics.equations import coriolis_matrix, gravity_torque
 
 GEOMETRY = Geometry()
 LENGTH, GRAVITY = GEOMETRY.thigh_length_m, GEOMETRY.gravity_m_s2
@@ -45,7 +46,7 @@ def energy_drift(gravity):
         q, dq = state[:2], state[2:]
         ddq = np.linalg.solve(
             LEG.mass_matrix(q, TABLE3, GEOMETRY),
-            -LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq - gravity(q),
+            -coriolis_matrix(LEG, q, dq, TABLE3, GEOMETRY) @ dq - gravity(q),
         )
         return np.concatenate([dq, ddq])
 
@@ -60,7 +61,7 @@ def energy_drift(gravity):
 
 
 def test_a_free_swing_keeps_its_energy_with_the_thighs_gravity_at_the_hip_angle_only():
-    drift, swing = energy_drift(lambda q: LEG.gravity_torque(q, TABLE3, GEOMETRY))
+    drift, swing = energy_drift(lambda q: gravity_torque(LEG, q, TABLE3, GEOMETRY))
     assert drift < 1e-4 * swing
     drift, swing = energy_drift(printed_gravity)
     assert drift > swing
@@ -78,7 +79,7 @@ def test_the_hips_inertia_holds_the_shanks_centre_at_the_shanks_mass(segments):
 def test_the_printed_coriolis_matrix_is_not_the_one_that_takes_no_energy(states):
     worst = 0.0
     for q, dq, _ in states:
-        mended = LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY)
+        mended = coriolis_matrix(LEG, q, dq, TABLE3, GEOMETRY)
         assert_allclose(printed_coriolis(q, dq) @ dq, mended @ dq, atol=1e-12)
         ahead, behind = (
             LEG.mass_matrix(q + sign * 1e-6 * dq, TABLE3, GEOMETRY) for sign in (1, -1)
@@ -142,9 +143,9 @@ def test_row_two_of_the_regressor_has_eight_columns_of_which_the_last_is_the_kne
         parameters = np.append(TABLE3, FRICTION)
         torque = (
             LEG.mass_matrix(q, TABLE3, GEOMETRY) @ ddq
-            + LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq
+            + coriolis_matrix(LEG, q, dq, TABLE3, GEOMETRY) @ dq
         )
-        torque = torque + LEG.gravity_torque(q, TABLE3, GEOMETRY)
+        torque = torque + gravity_torque(LEG, q, TABLE3, GEOMETRY)
         knee_torque = torque[1] + FRICTION[2] * np.sign(dq[1]) + FRICTION[3] * dq[1]
         mended = np.array([A21, A22, A23, A24, A25, A26, A27, A28])
         printed = np.array([A21, A21, A22, A23, A24, A25, A26, A27])

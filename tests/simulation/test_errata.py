@@ -10,6 +10,7 @@ from pipelines.mechanics.gait import gait
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.settings.simulate import SimulateSettings
 from pipelines.simulation.sweep import sweep
+from tests.mechanics.equations import coriolis_matrix, gravity_torque
 
 X = np.array([10.3016, 3.0157, 2.2664, 5.5354])
 LAMBDA = 10.0
@@ -26,8 +27,8 @@ class Tracking:
         self.q, self.dq = draw.uniform(-1, 1, (2, 2))
         self.torque, self.disturbance, self.friction = draw.uniform(-20, 20, (3, 2))
         self.M = LEG.mass_matrix(self.q, X, geometry)
-        self.C = LEG.coriolis_matrix(self.q, self.dq, X, geometry)
-        self.G = LEG.gravity_torque(self.q, X, geometry)
+        self.C = coriolis_matrix(LEG, self.q, self.dq, X, geometry)
+        self.G = gravity_torque(LEG, self.q, X, geometry)
         push = self.torque - self.disturbance - self.friction
         self.ddq = np.linalg.solve(self.M, push - self.C @ self.dq - self.G)
         self.e, self.de, self.dde = self.qd - self.q, self.dqd - self.dq, self.ddqd - self.ddq
@@ -131,8 +132,8 @@ def test_the_loop_depends_on_time_so_that_lasalles_theorem_says_nothing_of_it(ta
         g = table3.geometry
         return (
             LEG.mass_matrix(qd, X, g) @ ddqd
-            + LEG.coriolis_matrix(qd, dqd, X, g) @ dqd
-            + LEG.gravity_torque(qd, X, g)
+            + coriolis_matrix(LEG, qd, dqd, X, g) @ dqd
+            + gravity_torque(LEG, qd, X, g)
         )
 
     assert (

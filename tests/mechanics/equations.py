@@ -1,0 +1,35 @@
+"""Coriolis matrix and gravity of a mechanism, each from its regressor."""
+
+from dataclasses import replace
+
+import numpy as np
+
+
+def torque(mechanism, q, dq, ddq, X, geometry):
+    """Return the drives' torque at one instant, (J,)."""
+    q, dq, ddq = (np.array(v, dtype=float)[np.newaxis] for v in (q, dq, ddq))
+    return mechanism.regressor(q, dq, ddq, geometry)[0] @ np.asarray(X, dtype=float)
+
+
+def coriolis_matrix(mechanism, q, dq, X, geometry):
+    """Return C(q, dq), (J, J), in Christoffel form, with which dM/dt - 2 C is skew-symmetric.
+
+    The velocity torque is a quadratic form in dq, and its polarisation is the Christoffel matrix.
+    """
+    still, weightless = np.zeros(len(mechanism.kinds)), replace(geometry, gravity_m_s2=0.0)
+    dq = np.asarray(dq, dtype=float)
+    at_rest = torque(mechanism, q, still, still, X, weightless)
+
+    def quadratic(velocity):
+        return torque(mechanism, q, velocity, still, X, weightless) - at_rest
+
+    units = np.eye(len(still))
+    return np.column_stack(
+        [0.5 * (quadratic(dq + unit) - quadratic(dq) - quadratic(unit)) for unit in units]
+    )
+
+
+def gravity_torque(mechanism, q, X, geometry):
+    """Return the torque G(q) that holds the machine at rest, (J,)."""
+    still = np.zeros(len(mechanism.kinds))
+    return torque(mechanism, q, still, still, X, geometry)
