@@ -16,8 +16,7 @@ def polish(
     spread: NDArray,
     costs: Callable[[NDArray], NDArray],
     rng: np.random.Generator,
-    generations: int,
-    out_of_time: Callable[[], bool] = lambda: False,
+    out_of_time: Callable[[], bool],
 ) -> tuple[NDArray, float]:
     """Minimize from ``start`` until the cost stagnates.
 
@@ -31,8 +30,6 @@ def polish(
         Returns the costs (P,) of candidates (P, D), and may repair them in place.
     rng : Generator
         Random numbers.
-    generations : int
-        Most generations.
     out_of_time : callable
         Returns whether to stop.
 
@@ -43,7 +40,7 @@ def polish(
     cost : float
         Its cost.
     """
-    population = 24
+    population, generations = 24, 2000
     # The decomposition costs as much as several candidates, and the covariance changes slowly.
     generations_per_decomposition = 5
     # Generations without this relative gain after which the cost stagnates.

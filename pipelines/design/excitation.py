@@ -76,6 +76,5 @@ def design(
         The best excitation and its quality.
     """
     geometry = geometry or Geometry()
-    result = search(settings, geometry, report)
-    reached = quality(result.trajectory, settings, geometry)
-    return Design(result.trajectory, reached, settings, result.stopped_by)
+    trajectory, stopped_by = search(settings, geometry, report)
+    return Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,7 @@ from scipy.linalg import null_space
 
 from pipelines.design.evolution import polish
 from pipelines.design.fitness import Problem, costs, expand, problem
-from pipelines.design.swarm import Swarm, assess, fly
+from pipelines.design.swarm import Swarm, fly
 from pipelines.errors import NotIdentifiable
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
@@ -20,19 +19,9 @@ from pipelines.settings.design import DesignSettings
 Report = Callable[[float, str], None]
 
 
-@dataclass(frozen=True)
-class SearchResult:
-    """Result of a search."""
-
-    trajectory: FourierTrajectory
-    stopped_by: str
-    """``stagnation``, ``iterations``, or ``seconds``; in the last case the result depends on the
-    computer's speed."""
-
-
 def search(
     settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None
-) -> SearchResult:
+) -> tuple[FourierTrajectory, str]:
     """Search for the excitation that is best by a criterion and keeps its bounds at every time.
 
     Parameters
@@ -43,6 +32,14 @@ def search(
         Lengths and gravity.
     report : callable
         Called with the share done, 0 to 1, and the best value so far.
+
+    Returns
+    -------
+    trajectory : FourierTrajectory
+        The best excitation.
+    stopped_by : str
+        ``stagnation``, ``iterations``, or ``seconds``; in the last case the result depends on the
+        computer's speed.
 
     Raises
     ------
@@ -77,7 +74,6 @@ def search(
             0.05 * spread,
             lambda positions: costs(positions, fine),
             rng,
-            generations=2000,
             out_of_time=lambda: time.monotonic() > deadline,
         )
         if cost < best_cost:
@@ -88,9 +84,7 @@ def search(
             "no excitation within the bounds separates the parameters; widen [design.bounds] or"
             " add harmonics"
         )
-    return SearchResult(
-        _trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by
-    )
+    return _trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by
 
 
 def _problem(
@@ -166,9 +160,9 @@ def _first_swarm(
         low, high = problem.bounds[0].T
         position[:, -2:] = rng.uniform(low, high, size=(settings.particles, 2))
     velocity = 0.3 * rng.standard_normal(shape) * spread
-    swarm = Swarm(position, velocity, position.copy(), np.empty(settings.particles))
-    assess(swarm, problem)
-    return swarm
+    # This repairs the positions in place.
+    best_cost = costs(position, problem)
+    return Swarm(position, velocity, position.copy(), best_cost)
 
 
 def _let_fly(

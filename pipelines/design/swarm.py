@@ -6,11 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.design.fitness import Problem, cost, costs, workspace
-
-# Constriction makes the swarm contract (Clerc and Kennedy, 2002, IEEE Trans. Evol. Comput. 6(1)).
-INERTIA = 0.7298
-PULL = 1.49618
+from pipelines.design.fitness import cost, workspace
 
 
 class Swarm(NamedTuple):
@@ -23,20 +19,6 @@ class Swarm(NamedTuple):
     """(P, D): the best position of each particle."""
     best_cost: NDArray
     """(P,)."""
-
-
-def assess(swarm: Swarm, problem: Problem) -> None:
-    """Repair and evaluate every particle at its position.
-
-    Parameters
-    ----------
-    swarm : Swarm
-        P particles; best costs and positions are written.
-    problem : Problem
-        Bounds and criterion.
-    """
-    swarm.best_cost[:] = costs(swarm.position, problem)
-    swarm.best_position[:] = swarm.position
 
 
 @njit(cache=True)
@@ -56,6 +38,9 @@ def fly(swarm, problem, ring, iterations, rng):
     rng : numpy.random.Generator
         Source of random numbers.
     """
+    # Constriction makes the swarm contract (Clerc and Kennedy, 2002, IEEE Trans. Evol. Comput.
+    # 6(1)).
+    inertia, pull = 0.7298, 1.49618
     work = workspace(problem)
     particles, dimensions = swarm.position.shape
     # Without a ring, all particles follow the best one.
@@ -71,7 +56,7 @@ def fly(swarm, problem, ring, iterations, rng):
             for d in range(dimensions):
                 own = swarm.best_position[i, d] - x[d]
                 theirs = swarm.best_position[leader, d] - x[d]
-                v[d] = INERTIA * v[d] + PULL * (rng.random() * own + rng.random() * theirs)
+                v[d] = inertia * v[d] + pull * (rng.random() * own + rng.random() * theirs)
                 x[d] += v[d]
             # It repairs x in place, so that the particle itself returns into the bounds.
             value = cost(x, problem, work)

@@ -16,10 +16,6 @@ from pipelines.dynamics.forward import (
 from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.errors import InputError
 
-KNEE_ANGLES = np.linspace(-np.pi, np.pi, 121)
-"""Knee angles at which a leg's mass matrix is evaluated, rad. It depends on no other angle, and is
-even in this one only while the shank's mass is on its axis."""
-
 MOST_STEPS = 200
 """Most integration steps per sample. At the default gain and rate, more correspond to an inertia
 below 1e-3 kg·m², less than that of rotors."""
@@ -49,9 +45,10 @@ def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
 def _poses(joints: int) -> NDArray:
     """Return joint angles, (k, J) rad; no mass matrix depends on the first joint's."""
     if joints < 3:
-        poses = np.zeros((len(KNEE_ANGLES), joints))
-        # One joint has the same mass at each of them.
-        poses[:, -1] = KNEE_ANGLES
+        # A leg's mass matrix is even in the knee's angle only while the shank's mass is on its
+        # axis. One joint has the same mass at each angle.
+        poses = np.zeros((121, joints))
+        poses[:, -1] = np.linspace(-np.pi, np.pi, len(poses))
         return poses
     # Only here: to import all of scipy.stats takes a third of a second.
     from scipy.stats import qmc

@@ -56,7 +56,6 @@ def make_drives(
     counts_per_turn: NDArray,
     rate_hz: float,
     sample_rate_hz: float,
-    speed_cutoff_hz: float = 100.0,
 ) -> Drives:
     """Return the drives for the compiled loop.
 
@@ -70,9 +69,9 @@ def make_drives(
         Rate of the control loop; it is rounded to a multiple of the sample rate.
     sample_rate_hz : float
         Sample rate.
-    speed_cutoff_hz : float
-        Cut-off of the speed's low-pass.
     """
+    # Cut-off of the speed's low-pass.
+    speed_cutoff_hz = 100.0
     periods = max(1, round(rate_hz / sample_rate_hz))
     period = 1.0 / (sample_rate_hz * periods)
     counts = np.asarray(counts_per_turn, float)

@@ -51,11 +51,6 @@ from pipelines.mechanics.instant import vector
 PARTS = 256
 """Number of parts into which a step with a switch can be divided, a power of two."""
 
-ROUNDING = 1e-6
-"""Greatest speed of a moving joint against its direction of friction, rad/s."""
-CREEP = 1e-3
-"""Greatest speed of a joint that friction holds, rad/s: torque changes within a step."""
-
 TURN = 2.0 * np.pi
 """Angle, rad, at which a joint counts as running away."""
 
@@ -185,10 +180,14 @@ def _control(c, seen, net, state, wanted, weights, torque, network, weight_rates
 @njit(cache=True, inline="always")
 def _keeps_going(direction, state):
     """Return whether every motor moves in its friction's direction, or is held by friction."""
+    # Greatest speed of a moving joint against its direction of friction, rad/s.
+    rounding = 1e-6
+    # Greatest speed of a joint that friction holds, rad/s: torque changes within a step.
+    creep = 1e-3
     agrees = True
     for j in range(direction.shape[0]):
         v = state[DTHETA, j]
-        agrees &= v * direction[j] >= -ROUNDING if abs(direction[j]) == 1.0 else abs(v) < CREEP
+        agrees &= v * direction[j] >= -rounding if abs(direction[j]) == 1.0 else abs(v) < creep
     return agrees
 
 

@@ -10,23 +10,20 @@ from numpy.typing import NDArray
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
-AMPLITUDE, ORDERS = (-4.0, 4.0), (4.0, 400.0)
-
 
 def _amplitudes(number: str) -> tuple[Parameter, ...]:
     return (
-        Parameter(f"sine{number}", "N·m", "amplitude of sin(n q)", "A", AMPLITUDE),
-        Parameter(f"cosine{number}", "N·m", "amplitude of cos(n q)", "B", AMPLITUDE),
+        Parameter(f"sine{number}", "N·m", "amplitude of sin(n q)", "A", (-4.0, 4.0)),
+        Parameter(f"cosine{number}", "N·m", "amplitude of cos(n q)", "B", (-4.0, 4.0)),
     )
 
 
 def _cycles(number: str) -> Parameter:
     meaning = "waves per turn of the joint"
-    return Parameter(f"cycles_per_turn{number}", "1/turn", meaning, "n", ORDERS)
+    return Parameter(f"cycles_per_turn{number}", "1/turn", meaning, "n", (4.0, 400.0))
 
 
 def _reported(number: str) -> tuple[Parameter, ...]:
-    turn = (-np.pi, np.pi)
     return (
         Parameter(f"amplitude{number}", "N·m", "half of peak to peak", "A", (0.3, 4.0)),
         _cycles(number),
@@ -35,7 +32,7 @@ def _reported(number: str) -> tuple[Parameter, ...]:
             "rad",
             "phase of the wave at angle zero",
             "phi",
-            turn,
+            (-np.pi, np.pi),
             of_joint=False,
         ),
     )

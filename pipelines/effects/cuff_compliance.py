@@ -8,10 +8,6 @@ from pipelines.effects.kernel import spring
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
-MACHINE_INERTIA = 0.02
-"""Inertia on the machine's side, kg·m²; a joint needs some even if a model assigns all mass to the
-limb."""
-
 
 class CuffCompliance(Effect):
     """Soft tissue and straps: the limb lags the exoskeleton by torque over stiffness.
@@ -70,7 +66,8 @@ class CuffCompliance(Effect):
         ),
     )
     at_cuff = True
-    motor_inertia = MACHINE_INERTIA
+    # Of the machine's side: a joint needs some even if a model assigns all mass to the limb.
+    motor_inertia = 0.02
     known_to = 0.05
     swings = True
 

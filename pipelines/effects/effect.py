@@ -31,9 +31,6 @@ from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
 
-WIDE = 4.0
-"""Ratio of a typical range's ends above which a parameter varies by factors."""
-
 
 class Side(StrEnum):
     """Where an effect acts."""
@@ -202,7 +199,7 @@ class Parameter:
     def by_factors(self) -> bool:
         """Whether it varies by factors: its typical range is positive and wide."""
         low, high = self.typical
-        return low > 0.0 and high / low > WIDE
+        return low > 0.0 and high / low > 4.0
 
     def off_middle(self, value: float) -> float:
         """Return the distance of a value from the middle of the typical range.
@@ -631,24 +628,18 @@ class Effect(ABC):
         temperature = motion.interpolated_temperature
         of_motion = motion.time, motion.q, motion.dq, motion.ddq, load, temperature
         arrays = [np.ascontiguousarray(array) for array in of_motion]
-        joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
+        fixed, joints = (values, self.column(motion)), len(motion.joints)
+        reaction, geometry = address(self.reaction), motion.geometry.array()
         if self.derivative is None:
-            columns_along(
-                address(self.reaction), values, joint, *arrays, geometry, np.zeros(2 * joints), out
-            )
+            columns_along(reaction, *fixed, *arrays, geometry, np.zeros(2 * joints), out)
             return
         # After a gap the memory is unknown, and settles again.
         for stretch in motion.segments():
+            parts = (array[stretch] for array in arrays)
+            scratch, memory = np.zeros((11, joints)), np.zeros((3, self.states))
+            kernels = reaction, address(self.derivative)
             columns_along_with_memory(
-                address(self.reaction),
-                address(self.derivative),
-                values,
-                joint,
-                *(a[stretch] for a in arrays),
-                geometry,
-                np.zeros((11, joints)),
-                np.zeros((3, self.states)),
-                out[stretch],
+                *kernels, *fixed, *parts, geometry, scratch, memory, out[stretch]
             )
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:
@@ -714,24 +705,15 @@ class Effect(ABC):
 
     def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         out = np.empty_like(torque)
-        joint = self.column(motion)
-        time, temperature = (
-            np.ascontiguousarray(x) for x in (motion.time, motion.interpolated_temperature)
-        )
+        sensor = address(self.torque_reading), values, self.column(motion)
+        time = np.ascontiguousarray(motion.time)
+        temperature = np.ascontiguousarray(motion.interpolated_temperature)
         # A sensor's memory does not reach across a gap.
-        for stretch in motion.segments():
-            read_along(
-                address(self.torque_reading),
-                values,
-                joint,
-                time[stretch],
-                temperature[stretch],
-                torque[stretch],
-                np.zeros(len(motion.joints)),
-                # A memory for each torque, because the columns pass the sensor independently.
-                np.zeros((torque.shape[2], self.reading_states)),
-                out[stretch],
-            )
+        for s in motion.segments():
+            # A memory for each torque, because the columns pass the sensor independently.
+            memory = np.zeros((torque.shape[2], self.reading_states))
+            at_once = np.zeros(len(motion.joints))
+            read_along(*sensor, time[s], temperature[s], torque[s], at_once, memory, out[s])
         return out
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:

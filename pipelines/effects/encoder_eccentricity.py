@@ -12,9 +12,6 @@ from pipelines.effects.kernel import reading
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
-NEWTON_STEPS = 8
-"""Steps from the measured angle to the true one; each squares the error, which begins below 0.1
-rad."""
 PHASE = (-np.pi, np.pi)
 
 
@@ -94,8 +91,9 @@ class EncoderEccentricity(Effect):
         values, j = self.completed(shape), self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         true = q[:, j].copy()
-        # The error is a function of the true angle, and only the reading is known.
-        for _ in range(NEWTON_STEPS):
+        # The error is a function of the true angle, and only the reading is known. Each of Newton's
+        # steps squares the distance to it, which begins below 0.1 rad.
+        for _ in range(8):
             error, slope, _ = _errors(true, values)
             true -= (true + error - q[:, j]) / (1.0 + slope)
         _, slope, curvature = _errors(true, values)

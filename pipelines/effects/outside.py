@@ -25,18 +25,14 @@ def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effec
     InputError
         If one cannot be loaded, is not an effect, or has the name of another.
     """
-    group = "exoid.effects"
     taken = {effect.name: effect.__module__ for effect in known}
     effects = []
     # Sorted, because the order of installed packages differs between computers.
-    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+    for entry in sorted(entry_points(group="exoid.effects"), key=lambda entry: entry.name):
         effect = _loaded(entry)
         if effect.name in taken:
-            raise _broken(
-                entry,
-                f"its name {effect.name} is already used by {taken[effect.name]}",
-                "rename it",
-            )
+            reason = f"its name {effect.name} is already used by {taken[effect.name]}"
+            raise _broken(entry, reason, "rename it")
         taken[effect.name] = effect.__module__
         effects.append(effect)
     return tuple(effects)
@@ -47,20 +43,15 @@ def _loaded(entry: EntryPoint) -> type[Effect]:
         effect = entry.load()
     # The code of another package may raise anything when it is imported.
     except Exception as error:
-        raise _broken(
-            entry, f"loading it failed: {type(error).__name__}: {error}", "correct it"
-        ) from error
+        reason = f"loading it failed: {type(error).__name__}: {error}"
+        raise _broken(entry, reason, "correct it") from error
     if not (inspect.isclass(effect) and issubclass(effect, Effect)):
-        raise _broken(
-            entry,
-            f"it is {effect!r}, expected a subclass of pipelines.effects.Effect",
-            "correct it",
-        )
+        reason = f"it is {effect!r}, expected a subclass of pipelines.effects.Effect"
+        raise _broken(entry, reason, "correct it")
     silent = [name for name in STATED if not hasattr(effect, name)]
     if silent:
-        raise _broken(
-            entry, f"{effect.__name__} does not state {', '.join(silent)}", "add what is missing"
-        )
+        reason = f"{effect.__name__} does not state {', '.join(silent)}"
+        raise _broken(entry, reason, "add what is missing")
     return effect
 
 

@@ -11,16 +11,6 @@ from pipelines.effects.kernel import reaction
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
 
-CONFIRM_A_SLIDES = (
-    "remove the drive, or switch it off, and hold the joint at several positions with a spring"
-    " balance: the force of a spring grows with the travel, that of a weight is constant"
-)
-
-CONFIRM_WITHOUT_GRAVITY = (
-    "put a spirit level on the axis first, because gravity about a leaning axis resembles a spring;"
-    " then switch the drive off and hold the joint at several angles"
-)
-
 
 class ParallelSpring(Effect):
     """A torque proportional to the joint's angle: a balancing spring, a cable, a cover."""
@@ -85,10 +75,20 @@ class ParallelSpring(Effect):
         super().__post_init__()
         if self.joint is None or self.on == THE_LEG:
             return
+        confirm = self.confirm
         if self.on.joint(self.joint).kind == "prismatic":
-            object.__setattr__(self, "confirm", CONFIRM_A_SLIDES)
+            confirm = (
+                "remove the drive, or switch it off, and hold the joint at several positions with a"
+                " spring balance: the force of a spring grows with the travel, that of a weight is"
+                " constant"
+            )
         elif self.on.mechanism.has_gravity is False:
-            object.__setattr__(self, "confirm", CONFIRM_WITHOUT_GRAVITY)
+            confirm = (
+                "put a spirit level on the axis first, because gravity about a leaning axis"
+                " resembles a spring; then switch the drive off and hold the joint at several"
+                " angles"
+            )
+        object.__setattr__(self, "confirm", confirm)
         if TorqueOffset.absorbed_as in self.on.mechanism.absorbs:
             assert self.reported is not None
             stiffness, rest = self.reported

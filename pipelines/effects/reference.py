@@ -58,12 +58,8 @@ def _where(effect: type[Effect]) -> str:
         return "whole leg"
     if effect.joints is None:
         return "each"
-    return " ".join(
-        [
-            ", ".join(effect.joints),
-            *(f"({joint}: in {into})" for joint, into in effect.absorbed.items()),
-        ]
-    )
+    absorbed = (f"({joint}: in {into})" for joint, into in effect.absorbed.items())
+    return " ".join([", ".join(effect.joints), *absorbed])
 
 
 def _typical_size(effect: type[Effect]) -> str:
@@ -79,15 +75,12 @@ def typical_range(parameter: Parameter) -> str:
     return f"{low:.3g} to {high:.3g}{unit}"
 
 
-def _laws_in_words(effect: type[Effect]) -> str:
-    """Return the names of the smooth laws that contain an effect approximately."""
-    return ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
-
-
 def _page(effect: type[Effect]) -> str:
     """Return an effect's page as Markdown."""
     stated = facts(effect)
     rows = [_row(parameter) for parameter in effect().parameters]
+    laws = ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
+    differs = f"**How the real one may differ:** {effect.forms_differ}."
     return "\n".join(
         [
             f"# {stated['title']}",
@@ -107,8 +100,8 @@ def _page(effect: type[Effect]) -> str:
             "",
             f"**Looks like:** {stated['looks_like']}.",
             "",
-            *_paragraph("How the real one may differ", stated["forms_differ"]),
-            f"**Family:** {stated['family']}; **resembles** the laws: {_laws_in_words(effect)}.",
+            *([differs, ""] if effect.forms_differ else []),
+            f"**Family:** {stated['family']}; **resembles** the laws: {laws}.",
             "",
             f"**To confirm it on the rig:** {stated['confirm']}.",
             "",
@@ -116,10 +109,6 @@ def _page(effect: type[Effect]) -> str:
             "",
         ]
     )
-
-
-def _paragraph(title: str, text: str) -> list[str]:
-    return [f"**{title}:** {text}.", ""] if text else []
 
 
 def _row(parameter: Parameter) -> str:

@@ -72,21 +72,14 @@ def behind_spring(
     torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
     along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]
     least = least_inertia * effect.scale.of("kg·m²")
+    spring = address(effect.spring), np.array(values, dtype=float)
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
     # Joints that no twist turns need no filter.
     joints = np.flatnonzero(direction.any(axis=0))
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
         parts = (part[stretch] for part in along)
-        swing_along(
-            address(effect.spring),
-            np.array(values, dtype=float),
-            ratio,
-            least,
-            h,
-            *parts,
-            twist[stretch],
-        )
+        swing_along(*spring, ratio, least, h, *parts, twist[stretch])
         # A stretch too short for the filter keeps the motion before the spring.
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue

@@ -8,9 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-SHARE = 0.5
-"""Share of a parameter's variance above which a dependence involves it."""
-
 
 def profiled(gram: NDArray, others: NDArray) -> NDArray:
     """Return the information on some parameters if the others are unknown as well.
@@ -48,6 +45,8 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     """
     # Condition indices at which Belsley calls a dependence weak, and strong.
     weak, strong = 10.0, 30.0
+    # Share of a parameter's variance above which a dependence involves it.
+    involves = 0.5
     # Columns of unit norm, because parameters have different units.
     size = np.sqrt(np.diag(gram))
     eigenvalues, vectors = np.linalg.eigh(gram / np.outer(size, size))
@@ -59,7 +58,8 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     shares = variance / variance.sum(axis=1, keepdims=True)
     sentences = []
     for k in np.flatnonzero(index > weak):
-        involved = [name for name, share in zip(names, shares[:, k], strict=True) if share > SHARE]
+        of_k = zip(names, shares[:, k], strict=True)
+        involved = [name for name, share in of_k if share > involves]
         # A dependence harms only where it involves two parameters or more (Belsley's rule).
         if len(involved) > 1:
             how = "hardly separates" if index[k] > strong else "separates only weakly"

@@ -20,8 +20,6 @@ from scipy.special import fdtrc
 from pipelines.estimation.estimator import Fit
 from pipelines.estimation.long_run import long_run_covariance
 
-LEVEL = 0.05
-
 
 @dataclass(frozen=True)
 class DurbinWuHausman:
@@ -40,7 +38,7 @@ class DurbinWuHausman:
     @property
     def rejects(self) -> bool:
         """Whether the estimators differ at a significance level of 5 %."""
-        return self.p_value < LEVEL
+        return self.p_value < 0.05
 
     def as_json(self) -> dict[str, Any]:
         """Return the test for a file's metadata.

@@ -17,8 +17,6 @@ from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
 
-PASSES = 3
-"""Number of times that the joints are weighted again."""
 LEAST_NM = 1e-6
 """Least residual of a joint for its weight, N·m; a perfect fit would have infinite weight."""
 
@@ -29,7 +27,8 @@ class WeightedLeastSquares(Estimator):
     name = "weighted_least_squares"
     short = "wls"
     title = "weighted least squares"
-    passes = PASSES
+    passes = 3
+    """Number of times that the joints are weighted again."""
 
     def fit(self, problem: Problem) -> Fit:
         """Fit all runs at once.

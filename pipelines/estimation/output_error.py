@@ -24,8 +24,6 @@ from pipelines.estimation.realizable import nearest
 WINDOW_S = 0.5
 """Length of a window. Longer ones are more sensitive to noise of the torque, shorter ones to noise
 of the first state."""
-PASSES = 2
-"""Number of times that the joints are weighted again."""
 STEP = 0.5
 """Step for derivatives, in standard errors of the start. It is small enough that a joint does not
 stick noticeably longer or shorter."""
@@ -60,7 +58,8 @@ class OutputError(Estimator):
         # A search can only start from a model that can be simulated.
         values = nearest(problem, start.values, start.normal)
         simulations = 0
-        for _ in range(PASSES):
+        # The joints are weighted again once.
+        for _ in range(2):
             weights = _weights(_errors(problem, problem.completed(values)))
             values, more, settled = _searched(problem, values, size, weights)
             simulations += more

@@ -24,12 +24,6 @@ from pipelines.estimation.estimator import Estimator, Fit
 from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.problem import Problem
 
-MARGIN = 1e-6
-"""Least eigenvalue of a body's inertia form over its trace, so that rounding does not cross the
-boundary."""
-MOVED = 1e-3
-"""Change of a value that makes a constraint active, in standard errors of independent blocks."""
-
 
 class Realizable(Estimator):
     """Weighted least squares on the models that can exist."""
@@ -52,7 +46,8 @@ class Realizable(Estimator):
         """
         free = WeightedLeastSquares().fit(problem)
         values = nearest(problem, free.values, free.normal)
-        moved = np.abs(values - free.values) > MOVED * np.sqrt(np.diag(free.sensitivity))
+        # A larger change, in standard errors of independent blocks, is an active constraint's.
+        moved = np.abs(values - free.values) > 1e-3 * np.sqrt(np.diag(free.sensitivity))
         if not moved.any():
             return replace(free, about={**free.about, "constrained": False})
         rises = [residual_rms(problem.rows, problem.completed(v)) for v in (free.values, values)]
@@ -120,11 +115,14 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
 
     ``step`` is the step from ``values`` in units of ``size``.
     """
+    # Least eigenvalue of a body's inertia form over its trace, so that rounding does not cross the
+    # boundary.
+    margin = 1e-6
     every = problem.completed(values)
     for form in _inertia_forms(problem):
         # Semidefinite if and only if the least eigenvalue is at least this share of the trace. The
         # bound stays linear in the parameters, as the program requires.
-        leading = form - MARGIN * np.trace(form, axis1=1, axis2=2)[
+        leading = form - margin * np.trace(form, axis1=1, axis2=2)[
             :, np.newaxis, np.newaxis
         ] * np.eye(form.shape[1])
         rows = np.array([_triangle(matrix) for matrix in leading]).T
@@ -132,13 +130,10 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
             (rows[:, problem.fitted] * size, rows @ every),
             clarabel.PSDTriangleConeT(form.shape[1]),
         )
-    signed = [i for i, column in enumerate(problem.fitted) if _takes_energy(problem, column)]
+    columns = problem.training.layout.columns
+    signed = [i for i, place in enumerate(problem.fitted) if columns[place].effect.dissipative]
     if signed:
         yield (np.diag(size)[signed], values[signed]), clarabel.NonnegativeConeT(len(signed))
-
-
-def _takes_energy(problem: Problem, column: int) -> bool:
-    return problem.training.layout.columns[column].effect.dissipative
 
 
 def _inertia_forms(problem: Problem) -> Iterator[NDArray]:

@@ -23,11 +23,6 @@ from pipelines.model import BASELINE, Term, terms_next_to_bodies
 from pipelines.model.per_run import guess, own_term
 from pipelines.wording.label import effect_at
 
-REASON = (
-    "others have shapes from a diagnosis (--causes), or cannot be separated from rigid body and"
-    " friction"
-)
-
 
 @dataclass(frozen=True)
 class Extension:
@@ -95,8 +90,12 @@ def chosen(labels: Iterable[str], machine: Machine, runs: Sequence[Run] = ()) ->
     InputError
         If there is no such effect at such a joint, or its shape is unknown.
     """
+    reason = (
+        "others have shapes from a diagnosis (--causes), or cannot be separated from rigid body and"
+        " friction"
+    )
     unique = dict.fromkeys(labels)
-    effects = [effect_at(label, machine, _has_no_shape, "--effect", REASON) for label in unique]
+    effects = [effect_at(label, machine, _has_no_shape, "--effect", reason) for label in unique]
     return tuple(Term(effect, _without_amplitudes(effect, runs)) for effect in effects)
 
 
@@ -111,10 +110,7 @@ def _without_amplitudes(effect: Effect, runs: Sequence[Run]) -> NDArray:
         return values
     motions = [piece.motion for run in train for piece in run.pieces(0)]
     angles = [m.q[m.valid, effect.column(m)] for m in motions if m.valid.any()]
-    low, high = (
-        min(float(q.min()) for q in angles),
-        max(float(q.max()) for q in angles),
-    )
+    low, high = min(float(q.min()) for q in angles), max(float(q.max()) for q in angles)
     for i, end in ends:
         values[i] = low if end < 0 else high
     return values
@@ -239,8 +235,8 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
     maps = [np.zeros((0, len(covariance)))]
     for term, rows in terms:
         effect, place = term.effect, dict(zip(rows["name"], rows.index, strict=True))
-        # The table has physical values; the pseudoinverse
-        # leads back to fitted ones, whose shapes are last.
+        # The table has physical values; the pseudoinverse leads back to fitted ones, whose shapes
+        # are last.
         back = np.linalg.pinv(effect.jacobian(term.values))[len(effect.linear) :]
         onto = np.zeros((len(back), len(covariance)))
         for i, parameter in enumerate(effect.parameters):

@@ -28,9 +28,9 @@ from pipelines.estimation.regression import mask_in_words
 from pipelines.estimation.sandwich import sandwich
 from pipelines.identification.extension import Extension, refuse_unread
 from pipelines.identification.parameter_rows import rows
-from pipelines.identification.runs import Runs, checked
+from pipelines.identification.runs import train_and_validate
 from pipelines.identification.validation import Validation, validate
-from pipelines.mechanics.run import Run
+from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
 
@@ -39,8 +39,6 @@ BIASED = (
     f" {CUTOFF_HZ:g}, and check encoder counts and time stamps"
 )
 LOW_PASSED = f"{IN_WORDS}, so nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the diagnosis"
-STEP = 0.25
-"""Difference step of a shape, in its standard errors."""
 ROUNDS = 12
 """Most iterations of loads and rigid bodies."""
 NOT_CONVERGED = (
@@ -141,12 +139,12 @@ def identify(
         If the motion cannot separate the parameters.
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
-    runs = checked(on_one_scale(motions))
-    loud = is_loud(runs.of("train"))
-    refuse_unread(extension.terms, [*runs.of("train"), *runs.of("validate")])
-    training, has_converged = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
+    train, judged = train_and_validate(on_one_scale(motions))
+    loud = is_loud(train)
+    refuse_unread(extension.terms, [*train, *judged])
+    training, has_converged = _training(train, extension, reversals, CUTOFF_HZ if loud else None)
     # Torques that depend on load need it in validation runs too, from the fitted bodies.
-    judged = [training.loaded(run) for run in runs.of("validate")]
+    judged = [training.loaded(run) for run in judged]
     steps = {
         kind: Step(one.problem, estimated(one.fit))
         for kind, one in _in_steps(training, estimator).items()
@@ -159,7 +157,7 @@ def identify(
     known_error = np.where(error > 0.0, error, np.nan)
     table = table_of(table_rows, known_error, _critical(table_rows, steps, extension))
     # One fit of all columns is the check: friction that changes with a wearer shows there.
-    everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
+    everything = Problem(training, training.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
         covariance=covariance,
@@ -174,11 +172,11 @@ def identify(
             for kind, step in steps.items()
             for sentence in collinearities(step.fit.normal, step.problem.names)
         ],
-        unrealizable=_unrealizable(table, runs),
+        unrealizable=_unrealizable(table, train[0]),
         method=_method(estimator, steps, training),
         remarks=[
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
-            *upside_down(table, runs.motions[0].machine),
+            *upside_down(table, train[0].machine),
             *extension.remarks,
             *[NOT_CONVERGED] * (not has_converged),
             *[LOW_PASSED.format("fitted or scored" if estimator.masks else "scored")]
@@ -189,24 +187,23 @@ def identify(
 
 
 def _training(
-    runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None
+    train: Sequence[Run], extension: Extension, reversals: bool, cutoff_hz: float | None
 ) -> tuple[Training, bool]:
     """Return runs and model to fit, with loads, and whether loads and bodies have converged.
 
     A model without extension is fitted piece by piece, without a cut-off.
     """
-    train = tuple(runs.of("train"))
-    plain = Model.of(baseline(runs.motions[0].machine, runs.kinds))
+    plain = Model.of(baseline(train[0].machine, kinds_of(train)))
     model = Model((*plain, *extension.terms))
     own = {file: (*plain, *terms) for file, terms in extension.own.items()}
     if not extension.terms and not extension.bodies:
-        return Training(train, model, reversals=reversals), True
-    train = tuple(run.whole() for run in train)
-    training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
+        return Training(tuple(train), model, reversals=reversals), True
+    whole = tuple(run.whole() for run in train)
+    training = Training(whole, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
     bodies = extension.bodies
     # Loads need bodies before the first fit; those of the plain model start the iteration.
     if not set(_body_keys(training)) <= set(bodies):
-        alone = Training(train, plain, reversals=reversals, cutoff_hz=cutoff_hz)
+        alone = Training(whole, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
     return _with_consistent_loads(training, bodies)
 
@@ -341,7 +338,7 @@ def _sensitivity(
     now = abs(training.model.terms[term].shape[shape])
     # An uncertain backlash or stiffness must stay positive.
     # The step is a part of the error, over which the fit must be linear for the interval to hold.
-    step = min(STEP * error, 0.5 * now or np.inf)
+    step = min(0.25 * error, 0.5 * now or np.inf)
     # Two fits for each shape cost too much with a method that simulates, so all use least squares.
     ahead, behind = (
         _values(_in_steps(training.reshaped(term, shape, moved, files), WeightedLeastSquares()))
@@ -392,10 +389,10 @@ def _critical(
     return critical
 
 
-def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
+def _unrealizable(table: pd.DataFrame, run: Run) -> list[str]:
     # Friction that is negative within its interval may be noise.
     driving = table[(table["effect"] == Friction.name) & (table["ci95_high"] < 0.0)]
-    return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
+    return unrealizable(table, run.machine, run.geometry) + [
         f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']}"
         f" ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) and drives the joint. Check the signs"
         " of its torque and angle, or look for a missing effect with exoid diagnose"

@@ -4,16 +4,6 @@ import numpy as np
 
 from pipelines.mechanics.fourier import FourierTrajectory
 
-OMEGA = np.pi
-"""Angular frequency, rad/s: one stride in two seconds."""
-
-MEAN = np.array([0.18, -0.46])
-"""Mean angle of hip and knee, rad."""
-
-AMPLITUDE = np.array([[0.40, -0.06, 0.0], [-0.28, -0.24, -0.06]])
-PHASE = np.array([[-0.2, 0.6, 0.0], [1.8, 2.6, 3.0]])
-"""Phase of the cosine of each harmonic, joint x harmonic, rad."""
-
 
 def gait() -> FourierTrajectory:
     """Return the reference case of docs/simulation.md.
@@ -25,7 +15,13 @@ def gait() -> FourierTrajectory:
     FourierTrajectory
         Of hip and knee, rad and s.
     """
-    # From cos(x + p) = cos p cos x - sin p sin x.
+    # Of hip and knee and each harmonic, rad.
+    amplitude = np.array([[0.40, -0.06, 0.0], [-0.28, -0.24, -0.06]])
+    phase = np.array([[-0.2, 0.6, 0.0], [1.8, 2.6, 3.0]])
+    # From cos(x + p) = cos p cos x - sin p sin x. A stride takes two seconds.
     return FourierTrajectory(
-        theta0=MEAN, a=-AMPLITUDE * np.sin(PHASE), b=AMPLITUDE * np.cos(PHASE), omega=OMEGA
+        theta0=np.array([0.18, -0.46]),
+        a=-amplitude * np.sin(phase),
+        b=amplitude * np.cos(phase),
+        omega=np.pi,
     )

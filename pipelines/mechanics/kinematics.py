@@ -22,9 +22,6 @@ from pipelines.signals.low_pass import derivative, low_pass, reach, shortest
 
 SPLINE_REACH = 40
 """Samples over which a cut influences a cubic spline; the influence falls by 3.7 with each."""
-SLOWEST_HZ, FASTEST_HZ = 12.0, 1e6
-"""Accepted sample rates. Motion below 5 Hz is visible in all of them; a higher rate is a misread
-clock."""
 WINDOW = 2**16
 """Rows that are filtered at a time; the filter's margin should be a small part of them."""
 
@@ -139,12 +136,14 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
 
 
 def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
-    if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+    # Motion below 5 Hz is visible in all of these; a higher rate is a misread clock.
+    slowest_hz, fastest_hz = 12.0, 1e6
+    if not slowest_hz <= rate_hz <= fastest_hz:
         where = "sample_rate_hz in the rig file"
         if imported:
             where = "time.unit in the map, and import again"
         raise InputError(
-            f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g}"
+            f"is sampled at {rate_hz:.4g} Hz, expected {slowest_hz:g} Hz to {fastest_hz / 1e6:g}"
             f" MHz, which show a joint's motion; correct {where}, or record it again"
         )
 

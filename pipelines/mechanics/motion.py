@@ -20,9 +20,6 @@ from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
-KEPT = ("transmitted", "interpolated_temperature", "held_forces")
-"""Cached properties that do not depend on the kinematics, and are costly to compute."""
-
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
 
@@ -234,24 +231,20 @@ class Motion:
         """Load of a body along this motion, per unit of each inertial parameter."""
         return LoadColumns(self.machine.mechanism, self.q, self.dq, self.ddq, self.geometry)
 
-    @property
-    def _load_cutoff_hz(self) -> float:
-        # Cut-off of a load before it is differentiated twice. Noise at 25 Hz would otherwise have
-        # 600 times the weight of noise at 1 Hz.
-        load_cutoff_hz = 5.0
-        # After averaging over long blocks, a motion's rate may be below the cut-off of loads.
-        return min(self.cutoff_hz, load_cutoff_hz, 0.4 * self.sample_rate_hz)
-
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Smooth and differentiate; the derivatives of the raw torque are noise."""
+        # Cut-off of a load before it is differentiated twice. Noise at 25 Hz would otherwise have
+        # 600 times the weight of noise at 1 Hz. After averaging over long blocks, a motion's rate
+        # may be below it.
+        rate_hz = self.sample_rate_hz
+        cutoff_hz = min(self.cutoff_hz, 5.0, 0.4 * rate_hz)
         # A stretch too short for the filter keeps its torque, with rates of zero.
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
-            if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self._load_cutoff_hz):
-                continue
-            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, self._load_cutoff_hz)
-            rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)
-            curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
+            if stretch.stop - stretch.start >= shortest(rate_hz, cutoff_hz):
+                smooth[stretch] = low_pass(torque[stretch], rate_hz, cutoff_hz)
+                rate[stretch] = derivative(smooth[stretch], rate_hz, 1)
+                curvature[stretch] = derivative(smooth[stretch], rate_hz, 2)
         return smooth, rate, curvature
 
     def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
@@ -281,7 +274,9 @@ class Motion:
         """
         motion = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them again costs more than the correction.
-        kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
+        kept = ["transmitted", "interpolated_temperature", "held_forces"]
+        if self.limb_load is not None:
+            kept.append("on_limb")
         cached = vars(self)
         vars(motion).update({name: cached[name] for name in kept if name in cached})
         return motion

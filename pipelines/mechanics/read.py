@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 from pipelines.contracts import MOTION, RECORDING, contract_of
@@ -15,7 +16,6 @@ from pipelines.mechanics.machine import MECHANISMS, mechanisms_of
 from pipelines.mechanics.motion import Motion, motion_from_table
 from pipelines.mechanics.run import Run, StoredRun
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.mechanics.unseen import refuse_seen
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
@@ -129,7 +129,7 @@ def read_motions(
         replace(read_motion(path, settings, default_geometry), file=name)
         for path, name in zip(paths, _distinct_names(paths), strict=True)
     ]
-    refuse_seen(named)
+    _refuse_seen(named)
     return on_one_scale(named)
 
 
@@ -162,7 +162,7 @@ def read_runs(
         StoredRun(_motion_rows(path, settings), default_geometry, name)
         for path, name in zip(paths, _distinct_names(paths), strict=True)
     ]
-    refuse_seen(runs)
+    _refuse_seen(runs)
     return on_one_scale(runs)
 
 
@@ -182,6 +182,34 @@ def _refuse_twins(paths: Sequence[Path]) -> None:
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")
+
+
+def _refuse_seen(runs: Sequence[Run]) -> None:
+    """Refuse a training and a validation run that were imported from the same rows of a log.
+
+    Runs that were not imported are accepted, because their rows are unknown.
+    """
+    # Rows that may overlap between adjacent spans, because an import sorts as many that arrived
+    # late.
+    in_order = 20
+    for one, other in combinations(runs, 2):
+        shared = _shared_rows(one, other) if one.purpose != other.purpose else 0
+        if shared > in_order:
+            raise InputError(
+                f"{other.file} ({other.purpose}) and {one.file} ({one.purpose}) have {shared} rows"
+                f" of {one.metadata['imported']['source']} in common, expected none: validation"
+                " needs data that no fit has seen; import them again with spans that do not"
+                " overlap"
+            )
+
+
+def _shared_rows(one: Run, other: Run) -> int:
+    first, second = (run.metadata.get("imported", {}) for run in (one, other))
+    if not set(first.get("sha256", ())) & set(second.get("sha256", ())):
+        return 0
+    # Rows are given by the first and the last one, both included.
+    begin, end = max(first["rows"][0], second["rows"][0]), min(first["rows"][1], second["rows"][1])
+    return int(max(0, end - begin + 1))
 
 
 def _distinct_names(paths: Sequence[Path]) -> list[str]:

@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError
 
-JITTER = 0.02
-"""Deviation from the uniform grid, in sample periods, above which samples are interpolated."""
-
 
 @dataclass(frozen=True)
 class Stretches:
@@ -109,8 +106,9 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
         start=np.array(starts, dtype=np.int64),
         stop=np.array([*starts[1:], row], dtype=np.int64),
         origin_s=np.array(origins),
-        # The first entry precedes the first row, and is empty.
-        uniform=np.array([*strayed[1:], stray]) < JITTER / rate_hz,
+        # The first entry precedes the first row, and is empty. Samples farther from the uniform
+        # grid are interpolated.
+        uniform=np.array([*strayed[1:], stray]) < 0.02 / rate_hz,
     )
 
 

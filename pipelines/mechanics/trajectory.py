@@ -16,8 +16,6 @@ from pipelines.settings.base import Settings, load_toml
 from pipelines.validation.suggestion import similar_file
 
 Trajectory = FourierTrajectory | SampledTrajectory
-
-
 Row = tuple[float, ...]
 
 
@@ -49,14 +47,14 @@ class CoefficientFile(Settings):
 
     @model_validator(mode="after")
     def _radians_are_radians(self) -> Self:
-        for name in "ab":
-            for joint, row in enumerate(getattr(self, name)):
-                for k, value in enumerate(row):
-                    if self.unit == "rad" and abs(value) > LARGEST_ANGLE_RAD:
-                        raise ValueError(
-                            f'{name}[{joint}][{k}]: found {value} with unit = "rad", which looks'
-                            ' like degrees; write unit = "deg"'
-                        )
+        rows = [(f"{name}[{i}]", row) for name in "ab" for i, row in enumerate(getattr(self, name))]
+        for name, row in rows if self.unit == "rad" else ():
+            for k, value in enumerate(row):
+                if abs(value) > LARGEST_ANGLE_RAD:
+                    raise ValueError(
+                        f'{name}[{k}]: found {value} with unit = "rad", which looks like degrees;'
+                        ' write unit = "deg"'
+                    )
         return self
 
 
@@ -102,10 +100,8 @@ def _trajectory_from_table(table: Table) -> Trajectory:
     Its coefficients are used if it has them, and its samples otherwise. Samples repeat if the
     metadata hold ``omega_rad_s``, and run once if they do not.
     """
-    coefficients = ("omega_rad_s", "theta0_rad", "a", "b")
     metadata = table.metadata
-    missing = [key for key in coefficients if metadata.get(key) is None]
-    if missing:
+    if any(metadata.get(key) is None for key in ("omega_rad_s", "theta0_rad", "a", "b")):
         return _sampled(table)
     trajectory = FourierTrajectory(
         theta0=np.array(metadata["theta0_rad"], dtype=float),

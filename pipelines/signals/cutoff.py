@@ -11,12 +11,6 @@ from pipelines.signals.welch import Welch
 
 # Length of a window, s; a shorter recording is one window as a whole.
 WINDOW_S = 10.0
-HIGHEST_HZ = 12.5
-"""Highest cut-off, within the limits of ``HIGHEST_SHARE``. Above it is only the motion of joints
-that stick at reversals, and no fit uses that."""
-HIGHEST_SHARE = (0.125, 0.25)
-"""Limits of the highest cut-off as shares of the Nyquist frequency. They act above 200 Hz and below
-100 Hz."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +94,11 @@ def choose_cutoff(
     for piece in pieces:
         welch.add(piece)
     spectra = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
-    least, most = (share * rate_hz / 2 for share in HIGHEST_SHARE)
-    highest = min(max(HIGHEST_HZ, least), most)
+    # Limits of the highest cut-off, as shares of the Nyquist frequency. They act above 200 Hz and
+    # below 100 Hz.
+    least, most = (share * rate_hz / 2 for share in (0.125, 0.25))
+    # Above 12.5 Hz is only the motion of joints that stick at reversals, and no fit uses that.
+    highest = min(max(12.5, least), most)
     # The noisiest channel decides, because the acceleration of one joint enters the torque of
     # both.
     noisiest = int(np.argmin([s.meets_floor_hz for s in spectra]))

@@ -14,7 +14,7 @@ import numpy as np
 from pipelines.design.excitation import design
 from pipelines.design.fitness import cost, costs, expand, problem, workspace
 from pipelines.design.search import basis_of, spread_of
-from pipelines.design.swarm import Swarm, assess, fly
+from pipelines.design.swarm import Swarm, fly
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
@@ -139,8 +139,8 @@ def exoid_swarm() -> float:
     """Let exoid's swarm fly, ring topology, fine grid."""
     rng = np.random.default_rng(0)
     position = rng.standard_normal((PARTICLES, len(SPREAD))) * SPREAD
-    swarm = Swarm(position, 0.3 * position[::-1], position.copy(), np.empty(PARTICLES))
-    assess(swarm, OF)
+    velocity, best_cost = 0.3 * position[::-1], costs(position, OF)
+    swarm = Swarm(position, velocity, position.copy(), best_cost)
     fly(swarm, OF, True, ITERATIONS - 1, rng)
     return float(swarm.best_cost.min())
 
