@@ -6,7 +6,6 @@ from pipelines.effects.cogging import Cogging
 from pipelines.effects.coulomb_asymmetry import CoulombAsymmetry
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.effect import (
-    LAWS,
     RUNS,
     Effect,
     Element,
@@ -86,7 +85,6 @@ EFFECTS += effects_of_other_packages(EFFECTS)
 
 __all__ = [
     "EFFECTS",
-    "LAWS",
     "RUNS",
     "Effect",
     "Element",

@@ -107,13 +107,10 @@ class Backlash(Effect):
             Of the links, n samples.
         """
         values = self.completed(shape)
-        if motion.link_swing is not None and values[1] < max(self.shape[1].forms):
-            return link_behind_motor(motion, motion.link_swing, self, values, STRIKING_RATIO)
+        if motion.body is not None and values[1] < max(self.shape[1].forms):
+            return link_behind_motor(motion, motion.body, self, values, STRIKING_RATIO)
         # A smooth sign: near zero torque, noise would throw the link from side to side.
         j, q = self.column(motion), motion.q.copy()
-        q[:, j] -= (
-            0.5
-            * shape[0]
-            * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
-        )
+        side = np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
+        q[:, j] -= 0.5 * shape[0] * side
         return motion.with_state(q, motion.dq, motion.ddq)

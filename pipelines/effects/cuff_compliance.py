@@ -96,10 +96,9 @@ class CuffCompliance(Effect):
         """
         stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
-        if motion.limb_swing is not None:
-            return behind_spring(
-                motion, motion.limb_swing, direction, self, (stiffness, held, hardening)
-            )
+        if motion.limb_body is not None:
+            values = (stiffness, held, hardening)
+            return behind_spring(motion, motion.limb_body, direction, self, values)
         # Torque along the twist over stiffness; hardening and the limb's mass are neglected.
         q, dq, ddq = (
             state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness

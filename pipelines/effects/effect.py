@@ -19,7 +19,7 @@ disagree.
 from abc import ABC
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum, IntEnum, StrEnum, auto
+from enum import Enum, IntEnum, StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -54,45 +54,6 @@ class Family(StrEnum):
     PERSON = "person"
 
 
-LAWS = (
-    "angle",
-    "other_angle",
-    "both_angles",
-    "speed",
-    "other_speed",
-    "load",
-    "other_load",
-    "friction_by_angle",
-    "friction_by_other_angle",
-    "inertia_by_angle",
-    "gain_over_time",
-    "friction_over_time",
-    "time",
-    "hum",
-    "bursts",
-    "across_joints",
-    "quantisation",
-)
-"""Names of the smooth laws that ``Effect.resembles`` may list.
-
-======================= ==========================================================================
-angle, other_angle      a torque that depends on the joint's own angle, or on the other joint's
-both_angles             a torque that depends on the sum of both angles, as gravity does
-speed, other_speed      a torque that depends on the joint's own speed, or on the other joint's
-load, other_load        a torque or a friction that depends on the transmitted torque
-friction_by_angle       friction whose size depends on the joint's own angle
-friction_by_other_angle friction whose size depends on the other joint's angle
-inertia_by_angle        an inertia that depends on the joint's own angle
-gain_over_time          a share of the whole torque that changes slowly with time
-friction_over_time      friction that changes slowly with time
-time                    a torque that wanders with time, in each run in its own way
-hum                     a line at a fixed frequency
-bursts                  knocks at random times, each of which fades within a second
-across_joints           torques of both joints, the slopes of one elastic energy of both angles
-quantisation            error of a measured torque that is rounded to coarse steps
-======================= ==========================================================================
-"""
-
 FAMILY_OF_SIDE = {
     Side.DRIVE: Family.SPEED,
     Side.STRUCTURE: Family.ANGLE,
@@ -124,28 +85,18 @@ class Parity(IntEnum):
 class Element(Enum):
     """An element of simulators' model formats; an effect of its equation has its values, in order.
 
-    ================= =====================================================================
-    RIGID_BODIES      inertial parameters of the mechanism
-    FRICTION          Coulomb and viscous friction of a joint
-    QUADRATIC_DAMPING torque of a joint per squared speed
-    ARMATURE          inertia of a joint's rotor
-    SPRING            stiffness and rest angle (``physical``) of a spring across a joint
-    MASS_ACROSS       first moment of mass across a link
-    SERIES_SPRING     stiffness and hardening of a spring between motor and link
-    TORQUE_GAIN       measured torque per torque of a joint
-    TORQUE_OFFSET     measured less true torque of a joint
-    ================= =====================================================================
+    A spring has its rest angle, as in ``physical``.
     """
 
-    RIGID_BODIES = auto()
-    FRICTION = auto()
-    QUADRATIC_DAMPING = auto()
-    ARMATURE = auto()
-    SPRING = auto()
-    MASS_ACROSS = auto()
-    SERIES_SPRING = auto()
-    TORQUE_GAIN = auto()
-    TORQUE_OFFSET = auto()
+    RIGID_BODIES = "inertial parameters of the mechanism"
+    FRICTION = "Coulomb and viscous friction of a joint"
+    QUADRATIC_DAMPING = "torque of a joint per squared speed"
+    ARMATURE = "inertia of a joint's rotor"
+    SPRING = "stiffness and rest angle of a spring across a joint"
+    MASS_ACROSS = "first moment of mass across a link"
+    SERIES_SPRING = "stiffness and hardening of a spring between motor and link"
+    TORQUE_GAIN = "measured torque per torque of a joint"
+    TORQUE_OFFSET = "measured less true torque of a joint"
 
 
 @dataclass(frozen=True)
@@ -269,9 +220,9 @@ class Effect(ABC):
     any_form: ClassVar[str] = ""
     """Smooth law that equals this effect whatever its form; empty if only similar forms do."""
     resembles: ClassVar[tuple[str, ...]]
-    """Smooth laws of its joint (``LAWS``) that contain it approximately. A verdict reports such a
-    law if the real effect is too far from the equation. By default those of its family
-    (``LAWS_OF_FAMILY``)."""
+    """Smooth laws of its joint that contain it approximately (``wording/law.py``). A verdict
+    reports such a law if the real effect is too far from the equation. By default those of its
+    family (``LAWS_OF_FAMILY``)."""
     forms_differ: ClassVar[str] = ""
     """How the real effect may differ from the equation: a sentence without its full stop, or
     empty."""

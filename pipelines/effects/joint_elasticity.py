@@ -77,10 +77,8 @@ class JointElasticity(Effect):
         # Damping ratio of the link's swing behind a measured motion. A larger one damps the true
         # swing, a smaller one lets errors persist.
         swing_ratio = 0.05
-        if motion.link_swing is not None:
-            return link_behind_motor(
-                motion, motion.link_swing, self, self.completed(shape), swing_ratio
-            )
+        if motion.body is not None:
+            return link_behind_motor(motion, motion.body, self, self.completed(shape), swing_ratio)
         # Torque over stiffness; hardening and the link's mass are neglected.
         j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()

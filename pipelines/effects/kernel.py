@@ -16,7 +16,7 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.types import float64, int64, void
 from numba.extending import intrinsic
 
-from pipelines.mechanics.instant import INSTANT, REACTION, Instant, vector
+from pipelines.mechanics.instant import INSTANT, REACTION, Instant, compiler_of, vector
 from pipelines.mechanics.instant import reaction as reaction
 
 # Kernels as arguments are numba's "first-class functions", which it calls experimental; the
@@ -45,26 +45,15 @@ the motors in °C, NaN where it was not measured.
 """
 
 
-def derivative(function):
-    """Compile the rate of an effect's memory."""
-    return staticmethod(njit(DERIVATIVE, cache=True)(function))
-
-
-def spring(function):
-    """Compile a transmission's torque."""
-    return staticmethod(njit(SPRING, cache=True)(function))
-
-
-def reading(function):
-    """Compile an encoder's reading of the angle."""
-    return staticmethod(njit(READING, cache=True)(function))
+derivative, spring, reading = map(compiler_of, (DERIVATIVE, SPRING, READING))
+"""Decorators of the kernels of these signatures."""
 
 
 def torque_reading(function):
     """Compile a torque sensor's reading; the argument temperature is optional."""
     if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
         return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
-    return staticmethod(njit(TORQUE_READING, cache=True)(function))
+    return compiler_of(TORQUE_READING)(function)
 
 
 def _at_any_temperature(kernel):
@@ -115,18 +104,8 @@ _MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperatur
 # argument.
 _ALONG = void(int64, vector, int64, *_MOTION, vector, _columns)
 _ALONG_WITH_MEMORY = void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns)
-_READ_ALONG = void(
-    int64,
-    vector,
-    int64,
-    vector,
-    _table,
-    types.Array(float64, 3, "A"),
-    vector,
-    _table,
-    types.Array(float64, 3, "A"),
-)
-
+_strided = types.Array(float64, 3, "A")
+_READ_ALONG = void(int64, vector, int64, vector, _table, _strided, vector, _table, _strided)
 _SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
 

@@ -10,22 +10,21 @@ from numpy.typing import NDArray
 from pipelines.effects.effect import Effect
 from pipelines.effects.kernel import address, swing_along
 from pipelines.effects.rotor_inertia import RotorInertia
-from pipelines.mechanics.load import Load
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 
 def link_behind_motor(
-    motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float
+    motion: Motion, body: NDArray, effect: Effect, values: NDArray, ratio: float
 ) -> Motion:
     """Return the motion of the link behind an effect's transmission.
 
-    The arguments are those of ``behind_spring``; ``values`` are (k,), in the effect's order.
+    The arguments are those of ``behind_spring``: ``body`` is (p,), ``values`` are (k,).
     """
     direction = np.zeros_like(motion.q)
     direction[:, effect.column(motion)] = 1.0
     rotor = rotor_among_links(motion, str(effect.joint))
-    return behind_spring(motion, load, direction, effect, values, ratio, rotor)
+    return behind_spring(motion, body, direction, effect, values, ratio, rotor)
 
 
 def rotor_among_links(motion: Motion, joint: str) -> float:
@@ -38,7 +37,7 @@ def rotor_among_links(motion: Motion, joint: str) -> float:
 
 def behind_spring(
     motion: Motion,
-    load: Load,
+    body: NDArray,
     direction: NDArray,
     effect: Effect,
     values: NDArray | tuple[float, ...],
@@ -51,8 +50,8 @@ def behind_spring(
     ----------
     motion : Motion
         Motion before the spring.
-    load : Load
-        Load behind the spring, along the motion before it.
+    body : (p,) array
+        Inertial parameters of the load behind the spring.
     direction : (n, J) array
         Rotation of the joints per unit of twist.
     effect : Effect
@@ -67,7 +66,7 @@ def behind_spring(
     """
     # Least inertia of any load of an exoskeleton, kg·m².
     least_inertia = 0.02
-    torque, inertia, *slopes = load.on_coordinate(direction)
+    torque, inertia, *slopes = motion.load_columns.projected(direction) @ body
     # The rotor follows the motor, and its torque does not pass the spring.
     torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
     along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]

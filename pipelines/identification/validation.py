@@ -1,7 +1,7 @@
 """The torque error of a model on validation runs, and its residuals."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
@@ -75,60 +75,40 @@ def validate(
         RMSE (J,) in N·m, with and without samples near reversals.
     """
     joints = motions[0].joints
-    sums: dict[str, _Sums] = {}
+    sums: dict[str, NDArray] = {}
     for motion in motions:
         model = model_of(motion)
         if model is not None:
             # Sums of squares add up over runs and pieces; rms errors do not.
-            of_run = sums.get(motion.run, _Sums.none(len(joints)))
+            of_run = sums.get(motion.run, np.zeros((5, len(joints))))
             for r in regressions(motion, model, cutoff_hz):
-                of_run = of_run + _Sums.of(r, residual_of(r, model.linear_values))
+                of_run = of_run + _sums(r, residual_of(r, model.linear_values))
             sums[motion.run] = of_run
-    pooled = sum(sums.values(), _Sums.none(len(joints)))
+    pooled = sum(sums.values(), np.zeros((5, len(joints))))
     return Validation(
-        joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()}
+        joints=joints, pooled=_score(pooled), by_run={run: _score(s) for run, s in sums.items()}
     )
 
 
-@dataclass(frozen=True)
-class _Sums:
-    """Sums of squares, (J,) each, and their numbers of blocks."""
-
-    residual: NDArray
-    torque: NDArray
-    scored: int
-    unmasked: NDArray
-    valid: int
-
-    @classmethod
-    def none(cls, joints: int) -> "_Sums":
-        return cls(np.zeros(joints), np.zeros(joints), 0, np.zeros(joints), 0)
-
-    @classmethod
-    def of(cls, r: Regression, residual: NDArray) -> "_Sums":
-        squares = residual**2
-        return cls(
-            # All joints count on the same blocks, so that their errors are comparable.
-            residual=squares[r.scored].sum(axis=0),
-            torque=np.sum(r.torque[r.scored] ** 2, axis=0),
-            scored=int(r.scored.sum()),
-            unmasked=squares[r.valid].sum(axis=0),
-            valid=int(r.valid.sum()),
-        )
-
-    def __add__(self, other: "_Sums") -> "_Sums":
-        return _Sums(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
-
-    def score(self) -> Score:
-        return Score(
-            rmse=_root(self.residual, self.scored),
-            rmse_unmasked=_root(self.unmasked, self.valid),
-            torque_rms=_root(self.torque, self.scored),
-        )
+def _sums(r: Regression, residual: NDArray) -> NDArray:
+    """Return sums of squares and their numbers of blocks, (5, J), as ``_score`` takes them."""
+    squares, ones = residual**2, np.ones_like(residual)
+    # All joints count on the same blocks, so that their errors are comparable.
+    scored = [x[r.scored].sum(axis=0) for x in (squares, r.torque**2, ones)]
+    return np.array([*scored, *(x[r.valid].sum(axis=0) for x in (squares, ones))])
 
 
-def _root(squares: NDArray, count: int) -> NDArray:
-    return np.sqrt(squares / count) if count else np.full(len(squares), np.nan)
+def _score(sums: NDArray) -> Score:
+    residual, torque, scored, unmasked, valid = sums
+    return Score(
+        rmse=_root(residual, scored),
+        rmse_unmasked=_root(unmasked, valid),
+        torque_rms=_root(torque, scored),
+    )
+
+
+def _root(squares: NDArray, count: NDArray) -> NDArray:
+    return np.sqrt(squares / count) if count.any() else np.full(len(squares), np.nan)
 
 
 def residuals(

@@ -42,6 +42,10 @@ REACTION = void(INSTANT, vector, vector, vector, int64, vector)
 """reaction(at, state, values, geometry, joint, out): add the drives' torque to ``out``."""
 
 
-def reaction(function):
-    """Compile a torque equation."""
-    return staticmethod(njit(REACTION, cache=True)(function))
+def compiler_of(signature):
+    """Return a decorator that compiles a kernel, which stands in its class without ``self``."""
+    return lambda function: staticmethod(njit(signature, cache=True)(function))
+
+
+reaction = compiler_of(REACTION)
+"""Decorator of a torque equation."""

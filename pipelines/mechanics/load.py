@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +11,6 @@ from pipelines.mechanics.mechanism import Mechanism
 
 STEP = 1e-4
 """Step of the difference quotients, rad and rad/s; the torque bends over tenths of a radian."""
-
-
-class CoordinateLoad(NamedTuple):
-    """Torque of a body on one coordinate along a motion, and its slopes, (n,) each."""
-
-    torque: NDArray
-    """N·m."""
-    inertia: NDArray
-    """N·m per rad/s²."""
-    damping: NDArray
-    """N·m per rad/s: centrifugal and Coriolis torque."""
-    stiffness: NDArray
-    """N·m per rad: gravity, and torques that turn with the body."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +59,9 @@ class LoadColumns:
         Returns
         -------
         (4, n, p) array
-            Torque, inertia, damping and stiffness per unit of each parameter.
+            Per unit of each parameter: torque, N·m; inertia, N·m per rad/s²; damping, N·m per
+            rad/s, of centrifugal and Coriolis torque; stiffness, N·m per rad, of gravity, and of
+            torques that turn with the body.
         """
         # Arrays are not hashable. Equal directions have equal bytes.
         key = direction.tobytes()
@@ -99,22 +87,3 @@ class LoadColumns:
 
     def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
         return self.mechanism.regressor(q, dq, ddq, self.geometry)
-
-
-@dataclass(frozen=True)
-class Load:
-    """The load of a rigid body along a motion."""
-
-    columns: LoadColumns
-    X: NDArray
-    """(p,) inertial parameters."""
-
-    def on_coordinate(self, direction: NDArray) -> CoordinateLoad:
-        """Return the load on one coordinate.
-
-        Parameters
-        ----------
-        direction : (n, J) array
-            Angle of each joint per unit of the coordinate.
-        """
-        return CoordinateLoad(*(self.columns.projected(direction) @ self.X))

@@ -14,7 +14,7 @@ from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.load import Load, LoadColumns
+from pipelines.mechanics.load import LoadColumns
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.signals.interpolation import between_readings
@@ -207,16 +207,6 @@ class Motion:
             return self.transmitted
         # Samples without forces take the links' torque, or the filter would spread their NaN.
         return self._smoothed(np.where(np.isfinite(torque), torque, self.transmitted[0]))
-
-    @cached_property
-    def link_swing(self) -> Load | None:
-        """Body behind the drive trains as a load that can swing; None if it was not estimated."""
-        return None if self.body is None else Load(self.load_columns, self.body)
-
-    @cached_property
-    def limb_swing(self) -> Load | None:
-        """The wearer's limb as a load that can swing; None if it was not estimated."""
-        return None if self.limb_body is None else Load(self.load_columns, self.limb_body)
 
     @cached_property
     def columns_known(self) -> dict[Hashable, NDArray]:

@@ -10,13 +10,14 @@ from numpy.testing import assert_allclose
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, DTHETA, accelerations, workspace
-from pipelines.effects import EFFECTS, LAWS, Effect, Family, Side
+from pipelines.effects import EFFECTS, Effect, Family, Side
 from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.outside import STATED
 from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term
+from pipelines.wording.law import LAWS
 from tests.effects.catalogue import SIZES, TERMS
 
 BODY = Term(RigidBody(), np.array([2.6, 0.63, 1.78, 5.7]))

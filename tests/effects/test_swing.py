@@ -146,7 +146,7 @@ def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(
     )
     direction = np.zeros((n, 2))
     direction[:, bound.column(motion)] = 1.0
-    link = behind_spring(motion, motion.link_swing, direction, bound, shape, ratio)
+    link = behind_spring(motion, X, direction, bound, shape, ratio)
     twist, found = motion.q - states[:, Q], motion.q - link.q
     assert np.abs(twist).max() > 0.4 * min(0.05, shape[0])
     assert np.std((found - twist)[100:-100]) < error * np.std(twist)
@@ -166,18 +166,13 @@ def test_what_turns_with_the_motor_does_not_hang_on_the_spring(rotor):
         t, q, dq, ddq, np.zeros((n, 2)), np.zeros(n, np.int64), np.ones(n, bool), body=X
     )
     direction = np.tile([1.0, 0.0], (n, 1))
-    swung_alone = behind_spring(
-        motion, motion.link_swing, direction, JointElasticity("hip"), (400.0, 0.0)
-    )
+    spring = direction, JointElasticity("hip"), (400.0, 0.0)
+    swung_alone = behind_spring(motion, X, *spring)
     holding = replace(motion, body=with_rotor)
-    less = behind_spring(
-        holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0), 0.0, rotor
-    )
+    less = behind_spring(holding, with_rotor, *spring, 0.0, rotor)
     assert_allclose(less.q, swung_alone.q, atol=1e-12)
     if rotor:
-        more = behind_spring(
-            holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0)
-        )
+        more = behind_spring(holding, with_rotor, *spring)
         assert np.abs(more.q - swung_alone.q).max() > 1e-3
 
 
@@ -204,7 +199,7 @@ def simulated(model, seconds):
 
 
 @pytest.mark.parametrize("with_load", [False, True])
-@pytest.mark.parametrize("before", [None, "link_swing", "limb_swing", "on_limb", "transmitted"])
+@pytest.mark.parametrize("before", [None, "load_columns", "on_limb", "transmitted"])
 def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(
     before, with_load
 ):
@@ -236,8 +231,7 @@ def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured
     moved, alone = measured.with_state(q + 0.2, dq, ddq), replace(measured, q=q + 0.2)
     direction = np.tile([1.0, 0.5], (n, 1))
     for of in (
-        lambda motion: motion.link_swing.on_coordinate(direction),
-        lambda motion: motion.limb_swing.on_coordinate(direction),
+        lambda motion: motion.load_columns.projected(direction) @ X,
         lambda motion: motion.on_limb,
         lambda motion: motion.transmitted,
     ):
