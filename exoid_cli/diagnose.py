@@ -80,7 +80,7 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     sections = ("mechanism", "filter", "diagnose")
     used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
-    shared = {"joints": motions[0].joint_metadata} | describe(files, used_settings)
+    shared = {"joints": machine.joint_metadata} | describe(files, used_settings)
     recordings = {}
     if diagnosis.each_run:  # hashing reads whole files
         for motion, path in zip(motions, files, strict=True):

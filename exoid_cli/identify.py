@@ -116,7 +116,8 @@ def identify(
     used_settings = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
     config_used = used_settings | {"identify": options.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
-    shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
+    joints = {"joints": runs[0].machine.joint_metadata}
+    shared = joints | describe(inputs=inputs, config=config_used)
     method_used = dict(model.method)
     if effect:
         method_used["effects"] = effect

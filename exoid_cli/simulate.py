@@ -130,7 +130,7 @@ def _track(
     counts, noise_rad = chosen.encoder_counts_per_turn, chosen.encoder_noise_rad
     noise = {"counts_per_turn": counts, "angle_rad": noise_rad}
     described = describe(inputs, config) | {
-        "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
+        "joints": plant.machine.joint_metadata,
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
         "disturbance": disturbance,
@@ -182,7 +182,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "filter", "mechanism")
-    about: dict[str, Any] = {"joints": motion.joint_metadata, "plant": plant.metadata()}
+    joints = motion.machine.joint_metadata
+    about: dict[str, Any] = {"joints": joints, "plant": plant.metadata()}
     shared = describe(inputs, config) | about
     names = [joint.name for joint in plant.joints]
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import in_words, joints_of
 from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Effect
@@ -189,14 +190,13 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
 
 def _refuse_another_machine(table: Table, run: Run) -> None:
     mechanism = table.metadata.get("mechanism") or run.machine.mechanism.name
-    joints = table.metadata.get("joints") or run.joint_metadata
-    of_table = [f"{one['name']} ({one['kind']})" for one in joints]
-    of_runs = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
+    joints = joints_of(table.metadata) if table.metadata.get("joints") else run.machine.joints
+    of_table, of_runs = in_words(joints), in_words(run.machine.joints)
     remedy = "give the parameters.parquet of a diagnosis of the same machine"
     if of_table != of_runs or mechanism != run.machine.mechanism.name:
         raise InputError(
-            f"{table.path}: is of a {mechanism} with the joints {', '.join(of_table)}, the runs are"
-            f" of a {run.machine.mechanism.name} with {', '.join(of_runs)}; {remedy}"
+            f"{table.path}: is of a {mechanism} with the joints {of_table}, the runs are of a"
+            f" {run.machine.mechanism.name} with {of_runs}; {remedy}"
         )
     # Inertial parameters contain the lengths: with another thigh they describe another leg.
     geometry = table.metadata.get("geometry") or {}

@@ -64,6 +64,11 @@ class Machine:
         """Names of its joints."""
         return tuple(joint.name for joint in self.joints)
 
+    @property
+    def joint_metadata(self) -> list[dict[str, str]]:
+        """Its joints for a file's metadata."""
+        return [{"name": joint.name, "kind": joint.kind} for joint in self.joints]
+
     def joint(self, name: str) -> Joint:
         """Return the joint of a name."""
         return self.joints[self.names.index(name)]

@@ -85,11 +85,6 @@ class Motion:
         """The machine that moved, by its joints."""
         return machine_of(joints_of(self.metadata), self.geometry, self.file, self.scales)
 
-    @property
-    def joint_metadata(self) -> list[dict[str, str]]:
-        """Joints for the metadata of files computed from this motion."""
-        return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
-
     def pieces(self, margin: int) -> Iterator["Piece"]:
         """Yield the run as a single piece, because all of it is in memory.
 

@@ -1,6 +1,6 @@
 """A run to fit or to validate, either in memory or read piece by piece from its file."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +12,7 @@ import pyarrow as pa
 from pipelines.contracts.joint_units import Scale
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
+from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
@@ -43,8 +44,6 @@ class Run(Protocol):
     def file(self) -> str: ...  # noqa: D102
     @property
     def metadata(self) -> dict[str, Any]: ...  # noqa: D102
-    @property
-    def joint_metadata(self) -> list[dict[str, str]]: ...  # noqa: D102
 
     def pieces(self, margin: int) -> Iterator[Piece]:
         """Yield the run in order, piece by piece.
@@ -122,11 +121,6 @@ class StoredRun:
         """Metadata of the motion."""
         return self.rows.metadata
 
-    @property
-    def joint_metadata(self) -> list[dict[str, str]]:
-        """Joints for the metadata of files computed from this run."""
-        return self._facts.joint_metadata
-
     @cached_property
     def _columns(self) -> list[str]:
         """Columns that a fit needs, with temperatures if the file has them."""
@@ -168,6 +162,43 @@ class StoredRun:
     def whole(self) -> Motion:
         """Return the whole run with every channel in memory."""
         return self._motion(pa.concat_tables(self.rows.pieces()))
+
+
+def refuse_several_machines(runs: Sequence[Run]) -> None:
+    """Refuse runs whose joints or geometry differ from the first one's.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        At least one.
+
+    Raises
+    ------
+    InputError
+        Names both files and their joints or lengths.
+    """
+    first = runs[0]
+    for other in runs[1:]:
+        if other.machine.joints != first.machine.joints:
+            raise InputError(
+                f"{other.file} has joints {_named(other)}, {first.file} has {_named(first)}; give"
+                " runs of one machine"
+            )
+        # The regressor contains only these. Cuff distances may differ, as each run uses its own.
+        lengths = ("thigh_length_m",) if first.machine.mechanism.has_length else ()
+        for key in (*lengths, "gravity_m_s2"):
+            ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
+            if ours != theirs:
+                raise InputError(
+                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of"
+                    " one machine, or correct the metadata"
+                )
+
+
+def _named(run: Run) -> str:
+    joints = run.machine.joints
+    alike = all(joint.kind == "revolute" for joint in joints)
+    return ", ".join(joint.name if alike else f"{joint.name} ({joint.kind})" for joint in joints)
 
 
 def kinds_of(runs: Iterable[Run]) -> tuple[str, ...]:

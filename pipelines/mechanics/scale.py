@@ -13,8 +13,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from pipelines.contracts.joint_units import Scale
-from pipelines.mechanics.one_machine import refuse_several_machines
-from pipelines.mechanics.run import Run
+from pipelines.mechanics.run import Run, refuse_several_machines
 
 Measured = TypeVar("Measured", bound=Run)
 

@@ -140,7 +140,7 @@ class Model:
         # From the encoders towards the wearer, because each correction needs the one before.
         motor = self.sensed(motion)
         link = self.behind_motors(motor)
-        return Motions(motor, link, self._behind_cuffs(link))
+        return Motions(motor, link, self._corrected(link, lambda e: e.side is Side.HUMAN))
 
     def sensed(self, motion: Motion) -> Motion:
         """Undo the encoders' errors: return the motion of the motors."""
@@ -150,10 +150,6 @@ class Model:
         """Return the motion of the machine's links for a motion of its motors."""
         # STRUCTURE has the tilt of the base, which turns links and not motors.
         return self._corrected(motor, lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
-
-    def _behind_cuffs(self, link: Motion) -> Motion:
-        """Return the motion of the wearer's limb for a motion of the machine's links."""
-        return self._corrected(link, lambda effect: effect.side is Side.HUMAN)
 
     def _corrected(self, motion: Motion, chosen: Callable[[Effect], bool]) -> Motion:
         for term in self.terms:

@@ -10,8 +10,8 @@ from pipelines.contracts.joints import the
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.one_machine import refuse_several_machines
 from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.run import refuse_several_machines
 from pipelines.mechanics.silence import silent_torque
 
 MOST_NM = 10_000.0
