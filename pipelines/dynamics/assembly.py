@@ -107,13 +107,14 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     """
     terms = in_order(model)
     effects = [term.effect for term in terms]
+    has_cuffs, groups = cuffed(effects), np.arange(5)
     joint = np.array([joints.index(e.joint) if e.joint else -1 for e in effects], dtype=np.int64)
     sprung = np.full(len(joints), -1, dtype=np.int64)
     inertias = np.zeros(len(joints))
     for i, effect in enumerate(effects):
         if effect.spring is None:
             continue
-        if effect.at_cuff != cuffed(effects):
+        if effect.at_cuff != has_cuffs:
             raise InputError(
                 f"{effect.label}: a simulation supports compliant cuffs or compliant joints,"
                 " not both; remove one of them"
@@ -127,9 +128,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         sprung[joint[i]], inertias[joint[i]] = i, motor_inertia(effect, model, geometry)
     return Assembly(
         joints=len(joints),
-        bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(
-            np.int64
-        ),
+        bounds=np.searchsorted([_group(e, has_cuffs) for e in effects], groups).astype(np.int64),
         reactions=_addresses([e.reaction for e in effects], _no_reaction),
         derivatives=_addresses([e.derivative for e in effects], _no_memory),
         springs=_addresses([e.spring for e in effects], _no_spring),
@@ -142,7 +141,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         sensed_at=_offsets([e.reading_states for e in effects]),
         sprung=sprung,
         motor_inertia=inertias,
-        cuffed=cuffed(effects),
+        cuffed=has_cuffs,
         geometry=geometry.array(),
         temperature=np.full(len(joints), REFERENCE_C),
     )

@@ -76,16 +76,14 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
         triangles = triangles or [np.zeros((0, rows.shape[2]))] * rows.shape[1]
         for j, triangle in enumerate(triangles):
             # The old triangle with new rows has the same R as all rows together (Demmel et al.,
-            # 2012).
-            # scipy fills the rows below the triangle with zeros; they are cut off.
-            triangles[j] = qr(np.concatenate([triangle, rows[r.usable[:, j], j]]), mode="r")[0][
-                : rows.shape[2]
-            ]
+            # 2012). scipy fills the rows below the triangle with zeros; they are cut off.
+            stacked = np.concatenate([triangle, rows[r.usable[:, j], j]])
+            triangles[j] = qr(stacked, mode="r")[0][: rows.shape[2]]
         count = count + r.usable.sum(axis=0)
     # A joint with few usable rows has fewer than there are columns; zeros fill them up.
     width = triangles[0].shape[1]
-    stacked = np.stack([np.pad(t, ((0, width - len(t)), (0, 0))) for t in triangles])
-    return Compressed(stacked[:, :, :-1], stacked[:, :, -1], np.asarray(count))
+    every = np.stack([np.pad(t, ((0, width - len(t)), (0, 0))) for t in triangles])
+    return Compressed(every[:, :, :-1], every[:, :, -1], np.asarray(count))
 
 
 def together(parts: Sequence[Compressed]) -> Compressed:

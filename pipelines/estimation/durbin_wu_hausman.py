@@ -72,7 +72,6 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
         Differences (k,), ``one`` less ``other``, in the parameters' units, and an F statistic with
         its p-value.
     """
-
     # Variance below which a combination of parameters is not tested, where each parameter scaled by
     # its error has a mean variance of 1. Below it, second-order errors exceed the difference, and
     # the covariance counts them twice.
@@ -89,9 +88,8 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
     # In units of the errors, because parameters of different units have no common scale.
     variance, directions = np.linalg.eigh(V / np.outer(error, error))
     informed = variance > faint
-    square = float(
-        np.sum((directions.T[informed] @ (difference / error)) ** 2 / variance[informed])
-    )
+    projected = directions.T[informed] @ (difference / error)
+    square = float(np.sum(projected**2 / variance[informed]))
     k = int(informed.sum())
     # With an estimated covariance the statistic is Hotelling's T², which this turns into F.
     # A very long lag leaves fewer degrees of freedom than combinations; F needs at least one.

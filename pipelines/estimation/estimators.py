@@ -30,12 +30,7 @@ def estimator_named(name: str) -> Estimator:
     InputError
         If no estimator has this name.
     """
-    known = {
-        name: estimator
-        for estimator in ESTIMATORS
-        for name in (estimator.name, estimator.short)
-        if name
-    }
+    known = {name: one for one in ESTIMATORS for name in (one.name, one.short) if name}
     if name not in known:
         raise InputError(f"--method: there is no method {name!r}; {suggestion(name, list(known))}")
     return known[name]()

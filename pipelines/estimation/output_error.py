@@ -131,16 +131,12 @@ def _searched(
         # NaN makes the search take a shorter step away from a model that diverges or has a
         # singular mass matrix.
         try:
-            residual = np.concatenate(
-                [(error * root).ravel() for error in _errors(problem, completed(step))]
-            )
+            errors = _errors(problem, completed(step))
         except ZeroDivisionError:
             return np.full(outputs, np.nan)
-        return (
-            residual
-            if np.all(np.abs(residual) < ran_away * root.max())
-            else np.full_like(residual, np.nan)
-        )
+        residual = np.concatenate([(error * root).ravel() for error in errors])
+        is_near = np.all(np.abs(residual) < ran_away * root.max())
+        return residual if is_near else np.full(outputs, np.nan)
 
     def jacobian(step: NDArray) -> NDArray:
         slopes = _slopes(problem, completed(step), problem.fitted.tolist(), size)
@@ -199,6 +195,5 @@ def _window_scores(
     # The error is measured less simulated, and ``slopes`` are its derivatives: hence the sign.
     scores = -np.einsum("j,wnjk,wnj->wk", weights, slopes, errors, optimize=True)
     parts = np.einsum("j,wnjk,wnjl->wkl", weights, slopes, slopes, optimize=True)
-    return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[
-        ..., 0
-    ]
+    own = np.eye(len(sensitivity)) - parts @ sensitivity
+    return np.linalg.solve(own, scores[..., np.newaxis])[..., 0]

@@ -158,12 +158,10 @@ class Training:
         for r in regressions(run, model, self.cutoff_hz):
             # A per-run parameter has a column for each run, with zeros in the rows of all others.
             r = replace(r, regressor=self.layout.expand(r.regressor, number, present))
-            yield (
+            if self.reversals:
                 # A sample is valid at all joints or none; only reversals are each joint's own.
-                replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
-                if self.reversals
-                else r
-            )
+                r = replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
+            yield r
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:

@@ -122,9 +122,8 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
     for form in _inertia_forms(problem):
         # Semidefinite if and only if the least eigenvalue is at least this share of the trace. The
         # bound stays linear in the parameters, as the program requires.
-        leading = form - margin * np.trace(form, axis1=1, axis2=2)[
-            :, np.newaxis, np.newaxis
-        ] * np.eye(form.shape[1])
+        trace = np.trace(form, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
+        leading = form - margin * trace * np.eye(form.shape[1])
         rows = np.array([_triangle(matrix) for matrix in leading]).T
         yield (
             (rows[:, problem.fitted] * size, rows @ every),

@@ -8,7 +8,6 @@ from pathlib import Path
 from pipelines.contracts import MOTION, RECORDING, contract_of
 from pipelines.contracts.joints import in_words
 from pipelines.contracts.provenance import sha256
-from pipelines.contracts.table import Rows
 from pipelines.errors import InputError, SettingsError, about
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import filtered, motion_table
@@ -158,18 +157,13 @@ def read_runs(
         Two files hold the same recording, or the runs are of different machines.
     """
     _refuse_twins(paths)
-    runs = [
-        StoredRun(_motion_rows(path, settings), default_geometry, name)
-        for path, name in zip(paths, _distinct_names(paths), strict=True)
-    ]
+    runs = []
+    for path, name in zip(paths, _distinct_names(paths), strict=True):
+        is_recording = contract_of(path) is RECORDING
+        rows = filtered(RECORDING.scan(path), settings) if is_recording else MOTION.scan(path)
+        runs.append(StoredRun(rows, default_geometry, name))
     _refuse_seen(runs)
     return on_one_scale(runs)
-
-
-def _motion_rows(path: Path, settings: FilterSettings) -> Rows:
-    if contract_of(path) is RECORDING:
-        return filtered(RECORDING.scan(path), settings)
-    return MOTION.scan(path)
 
 
 def _refuse_twins(paths: Sequence[Path]) -> None:

@@ -302,22 +302,17 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     """
     # The number of a ripple's lines follows from the names in the file.
     effect = effect.with_parts_named(values)
-    known = {parameter.name: parameter for parameter in effect.parameters}
-    missing = [
-        name
-        for name, parameter in known.items()
-        if name not in values and parameter.default is None
-    ]
-    if missing or not set(values) <= set(known):
+    defaults = {parameter.name: parameter.default for parameter in effect.parameters}
+    known = list(defaults)
+    given = {**{name: d for name, d in defaults.items() if d is not None}, **values}
+    if set(given) != set(known):
         unknown = [name for name in values if name not in known]
-        meant = list(filter(None, (closest(name, list(known)) for name in unknown)))
+        meant = list(filter(None, (closest(name, known) for name in unknown)))
         raise InputError(
             f"{effect.label} has values {', '.join(values) or 'none'}, expected"
             f" {', '.join(known)}; "
             + (f"did you mean {', '.join(meant)}?" if meant else "correct them")
         )
-    physical = np.array(
-        [values.get(name, parameter.default) for name, parameter in known.items()], dtype=float
-    )
     # Files may hold other parameters than a fit, such as amplitude and phase.
+    physical = np.array([given[name] for name in known], dtype=float)
     return Term(effect, effect.values_from(physical))
