@@ -12,7 +12,7 @@ from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import Margin, margins
 from pipelines.mechanics.machine import THE_LEG
-from pipelines.mechanics.mechanisms.leg import INERTIAL
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.model import Model, baseline
@@ -79,7 +79,7 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
     errors = standard_errors(trajectory, settings.noise, geometry, settings.sample_rate_hz)
     return Quality(
         condition=_condition(stacked),
-        inertial_condition=_condition(stacked[:, : len(INERTIAL)]),
+        inertial_condition=_condition(stacked[:, : len(LEG.parameters)]),
         # A joint at rest has a column of zeros, which stays zero: the condition is infinite.
         scaled_condition=_condition(stacked / np.where(size > 0.0, size, 1.0)),
         log_det=float(np.linalg.slogdet(stacked.T @ stacked / samples)[1]),

@@ -102,11 +102,7 @@ _columns = float64[:, :, ::1]
 _MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperature, geometry
 # Signatures are spelt out so that one compilation serves every effect: the kernel's address is an
 # argument.
-_ALONG = void(int64, vector, int64, *_MOTION, vector, _columns)
-_ALONG_WITH_MEMORY = void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns)
 _strided = types.Array(float64, 3, "A")
-_READ_ALONG = void(int64, vector, int64, vector, _table, _strided, vector, _table, _strided)
-_SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
 
 ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
@@ -126,7 +122,7 @@ def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
             out[j, i] = torque[j]
 
 
-@njit(_ALONG, **ALLOCATING_NOTHING)
+@njit(void(int64, vector, int64, *_MOTION, vector, _columns), **ALLOCATING_NOTHING)
 def columns_along(
     where, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out
 ):
@@ -191,7 +187,7 @@ def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
         state[m] += h * slope[m]
 
 
-@njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
+@njit(void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns), **ALLOCATING_NOTHING)
 def columns_along_with_memory(
     where,
     where_rate,
@@ -268,7 +264,10 @@ def columns_along_with_memory(
             _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint)
 
 
-@njit(_READ_ALONG, **ALLOCATING_NOTHING)
+@njit(
+    void(int64, vector, int64, vector, _table, _strided, vector, _table, _strided),
+    **ALLOCATING_NOTHING,
+)
 def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
     """Apply a sensor, the kernel at an address, to p torques of one unbroken stretch.
 
@@ -320,7 +319,7 @@ def _twist_at_rest(kernel, values, torque, stiffness):
     return 0.5 * (low + high)
 
 
-@njit(_SWING_ALONG, **ALLOCATING_NOTHING)
+@njit(void(int64, vector, float64, float64, float64, *(vector,) * 4, vector), **ALLOCATING_NOTHING)
 def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffness, out):
     """Integrate a load that swings on a spring along one unbroken stretch, from rest.
 

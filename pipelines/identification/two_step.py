@@ -7,7 +7,7 @@ check. Least squares reads each training run once to compress its rows, from whi
 follows, and twice for the covariance of the residual.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
@@ -34,17 +34,8 @@ from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
 
-BIASED = (
-    f"{IN_WORDS}, so every fit underestimates inertia. Set filter.cutoff_hz ="
-    f" {CUTOFF_HZ:g}, and check encoder counts and time stamps"
-)
-LOW_PASSED = f"{IN_WORDS}, so nothing above {CUTOFF_HZ:g} Hz is {{}}, as in the diagnosis"
 ROUNDS = 12
 """Most iterations of loads and rigid bodies."""
-NOT_CONVERGED = (
-    f"rigid bodies and loads did not converge in {ROUNDS} iterations, so these values are not"
-    " reliable. A fixed shape, such as a soft spring's, may not fit these runs"
-)
 
 FitT = TypeVar("FitT", bound=Fit, covariant=True)
 
@@ -156,6 +147,10 @@ def identify(
     # A held value has an error of zero here because its error is unknown, not because it is exact.
     known_error = np.where(error > 0.0, error, np.nan)
     table = table_of(table_rows, known_error, _critical(table_rows, steps, extension))
+    biased = (
+        f"{IN_WORDS}, so every fit underestimates inertia. Set filter.cutoff_hz ="
+        f" {CUTOFF_HZ:g}, and check encoder counts and time stamps"
+    )
     # One fit of all columns is the check: friction that changes with a wearer shows there.
     everything = Problem(training, training.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
@@ -178,12 +173,22 @@ def identify(
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, train[0].machine),
             *extension.remarks,
-            *[NOT_CONVERGED] * (not has_converged),
-            *[LOW_PASSED.format("fitted or scored" if estimator.masks else "scored")]
-            * (training.cutoff_hz is not None),
+            *_limits(estimator, training, has_converged),
         ],
-        angle_noise=[BIASED] * (loud and training.cutoff_hz is None),
+        angle_noise=[biased] * (loud and training.cutoff_hz is None),
     )
+
+
+def _limits(estimator: Estimator, training: Training, has_converged: bool) -> Iterator[str]:
+    """Yield a sentence if bodies and loads did not converge, or high frequencies do not count."""
+    if not has_converged:
+        yield (
+            f"rigid bodies and loads did not converge in {ROUNDS} iterations, so these values are"
+            " not reliable. A fixed shape, such as a soft spring's, may not fit these runs"
+        )
+    if training.cutoff_hz is not None:
+        use = "fitted or scored" if estimator.masks else "scored"
+        yield f"{IN_WORDS}, so nothing above {CUTOFF_HZ:g} Hz is {use}, as in the diagnosis"
 
 
 def _training(

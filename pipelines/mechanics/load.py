@@ -1,6 +1,6 @@
 """The load of a rigid body on its joints along a motion, and its slopes near that motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,8 @@ class LoadColumns:
     dq: NDArray
     ddq: NDArray
     geometry: Geometry
+    # Results by direction: thousands of fits need few directions.
+    _projected: dict[bytes, NDArray] = field(default_factory=dict, init=False)
 
     @cached_property
     def torque(self) -> NDArray:
@@ -79,11 +81,6 @@ class LoadColumns:
                 [np.einsum("nj,njp->np", direction, torque) for torque in torques]
             )
         return self._projected[key]
-
-    @cached_property
-    def _projected(self) -> dict[bytes, NDArray]:
-        """Results by direction: thousands of fits need few directions."""
-        return {}
 
     def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
         return self.mechanism.regressor(q, dq, ddq, self.geometry)

@@ -20,8 +20,6 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.instant import REACTION
 from pipelines.mechanics.mechanism import Inertial, Mechanism
 
-INERTIAL = ("X1", "X2", "X3", "X4")
-
 
 @njit(cache=True)
 def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
