@@ -7,7 +7,7 @@ stacked and made one triangle again, as in Demmel et al. (2012), SIAM J. Sci. Co
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,33 +26,6 @@ class Compressed:
     """(J, r) N·m."""
     count: NDArray
     """(J,) number of rows before compression."""
-
-    def select(self, columns: NDArray) -> "Compressed":
-        """Return the regression on some of the parameters.
-
-        Parameters
-        ----------
-        columns : (k,) array
-            Numbers of the columns to keep.
-
-        Returns
-        -------
-        Compressed
-            With a regressor of shape (J, r, k).
-        """
-        return replace(self, regressor=self.regressor[:, :, columns])
-
-    def with_held(self, columns: NDArray, values: NDArray) -> "Compressed":
-        """Return the same rows without the torque of some parameters.
-
-        Parameters
-        ----------
-        columns : (k,) int array
-            Columns whose values are known.
-        values : (k,) array
-            Their values.
-        """
-        return replace(self, torque=self.torque - self.regressor[:, :, columns] @ values)
 
 
 def compress(regressions: Iterable[Regression]) -> Compressed:

@@ -43,9 +43,13 @@ class WeightedLeastSquares(Estimator):
         Fit
             ``about`` holds ``joint_weights_1_nm2``: J inverse variances, 1/(N·m)².
         """
-        rows = problem.rows
+        rows, held = problem.rows, problem.of_held
         # Held parameters act through their torque alone: friction, in the step of the wearer.
-        free = rows.with_held(problem.of_held, problem.held[problem.of_held]).select(problem.fitted)
+        free = Compressed(
+            rows.regressor[:, :, problem.fitted],
+            rows.torque - rows.regressor[:, :, held] @ problem.held[held],
+            rows.count,
+        )
         weights = self._weights(free, problem.names)
         normal, right = normal_equations(free, weights)
         sensitivity = inverse(normal, problem.names)

@@ -77,7 +77,12 @@ class FilteredRecording:
         edge_rows = edge(rate_hz, self.cutoff.hz)
         # A stretch that lies only in the margin may be too short to filter; it is dropped.
         first, last = window.first + window.core.start, window.first + window.core.stop
-        for s in self.stretches.overlapping(first, last):
+        # One that ends at the first row, or begins at the last, does not overlap the core.
+        overlapping = range(
+            int(np.searchsorted(self.stretches.stop, first, "right")),
+            int(np.searchsorted(self.stretches.start, last, "left")),
+        )
+        for s in overlapping:
             here = _rows_of(s, self.stretches, window)
             segment[here] = s
             if self.stretches.samples[s] < shortest(rate_hz, self.cutoff.hz):

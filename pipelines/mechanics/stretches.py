@@ -36,25 +36,6 @@ class Stretches:
         """Index of the longest stretch, the first of equals."""
         return int(np.argmax(self.samples))
 
-    def overlapping(self, first: int, last: int) -> range:
-        """Return the indices of stretches that overlap some rows.
-
-        Parameters
-        ----------
-        first, last : int
-            First row, and the row before which to end.
-
-        Returns
-        -------
-        range
-            Into the s stretches.
-        """
-        # A stretch that ends at the first row, or begins at the last, does not overlap.
-        return range(
-            int(np.searchsorted(self.stop, first, "right")),
-            int(np.searchsorted(self.start, last, "left")),
-        )
-
 
 def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
     """Find the stretches of a recording whose times arrive piece by piece.

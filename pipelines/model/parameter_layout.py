@@ -223,26 +223,6 @@ class ParameterLayout:
         # The wearer's body adds to the machine's, which moves in every run.
         return self.bodies if kind == "with_human" else self.bodies[:1]
 
-    def column_of(self, effect: str, joint: str | None, parameter: str) -> int:
-        """Return the first column of a parameter.
-
-        Parameters
-        ----------
-        effect : str
-            Name of its effect.
-        joint : str or None
-            Joint of the effect.
-        parameter : str
-            Name of the parameter.
-
-        Raises
-        ------
-        ValueError
-            No column has these names.
-        """
-        names = [(c.effect.name, c.effect.joint, c.parameter.name) for c in self.columns]
-        return names.index((effect, joint, parameter))
-
     def acting_in(self, kind: str) -> NDArray:
         """Return which columns act in a kind of run.
 
