@@ -33,23 +33,6 @@ class LoadColumns:
         """Torque per unit of each parameter, (n, J, p)."""
         return self._torque(self.q, self.dq, self.ddq)
 
-    def torque_of(self, X: NDArray) -> NDArray:
-        """Return the torque of a body.
-
-        Parameters
-        ----------
-        X : (p,) array
-            Its inertial parameters, SI units.
-
-        Returns
-        -------
-        (n, J) array
-            N·m.
-        """
-        # numpy multiplies one matrix twenty times as fast as a stack of matrices.
-        flat = self.torque.reshape(-1, len(X))
-        return (flat @ X).reshape(self.q.shape)
-
     def projected(self, direction: NDArray) -> NDArray:
         """Return torque and slopes on one coordinate.
 

@@ -242,9 +242,11 @@ class Motion:
         limb : (p,) array
             Inertial parameters of the wearer's limb alone.
         """
+        # numpy multiplies one matrix twenty times as fast as a stack of matrices.
+        flat = self.load_columns.torque.reshape(-1, len(body))
+        load, limb_load = ((flat @ X).reshape(self.q.shape) for X in (body, limb))
         # Loads from measured torques would bring their noise to both sides of a regression.
-        of = self.load_columns.torque_of
-        motion = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
+        motion = replace(self, load=load, limb_load=limb_load, body=body, limb_body=limb)
         # The kinematics are the same, and so are the cached columns.
         motion.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
         return motion

@@ -8,6 +8,7 @@ from pathlib import Path
 from pipelines.contracts import MOTION, RECORDING, contract_of
 from pipelines.contracts.joints import in_words
 from pipelines.contracts.provenance import sha256
+from pipelines.contracts.table import Rows
 from pipelines.errors import InputError, SettingsError, about
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import filtered, motion_table
@@ -159,8 +160,11 @@ def read_runs(
     _refuse_twins(paths)
     runs = []
     for path, name in zip(paths, _distinct_names(paths), strict=True):
-        is_recording = contract_of(path) is RECORDING
-        rows = filtered(RECORDING.scan(path), settings) if is_recording else MOTION.scan(path)
+        rows: Rows
+        if contract_of(path) is RECORDING:
+            rows = filtered(RECORDING.scan(path), settings)
+        else:
+            rows = MOTION.scan(path)
         runs.append(StoredRun(rows, default_geometry, name))
     _refuse_seen(runs)
     return on_one_scale(runs)
