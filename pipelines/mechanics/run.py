@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,48 +21,6 @@ RUNS = ("exo_alone", "with_human")
 
 WINDOW = 2**16
 """Samples in a piece."""
-
-
-class Run(Protocol):
-    """Interface of a run for fits; a ``Motion`` has it."""
-
-    @property
-    def run(self) -> str: ...  # noqa: D102
-    @property
-    def purpose(self) -> str: ...  # noqa: D102
-    @property
-    def sample_rate_hz(self) -> float: ...  # noqa: D102
-    @property
-    def joints(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def machine(self) -> Machine: ...  # noqa: D102
-    @property
-    def scales(self) -> tuple[Scale, ...]: ...  # noqa: D102
-    @property
-    def geometry(self) -> Geometry: ...  # noqa: D102
-    @property
-    def file(self) -> str: ...  # noqa: D102
-    @property
-    def metadata(self) -> dict[str, Any]: ...  # noqa: D102
-
-    def pieces(self, margin: int) -> Iterator[Piece]:
-        """Yield the run in order, piece by piece.
-
-        Parameters
-        ----------
-        margin : int
-            Samples to add on both sides of each piece, as far as there are any.
-
-        Yields
-        ------
-        Piece
-            Its core belongs to no other piece.
-        """
-        ...
-
-    def whole(self) -> Motion:
-        """Return the whole run with every channel in memory."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -162,6 +120,10 @@ class StoredRun:
     def whole(self) -> Motion:
         """Return the whole run with every channel in memory."""
         return self._motion(pa.concat_tables(self.rows.pieces()))
+
+
+Run = Motion | StoredRun
+"""A run to fit or to validate; both kinds have the same properties and methods."""
 
 
 def refuse_several_machines(runs: Sequence[Run]) -> None:
