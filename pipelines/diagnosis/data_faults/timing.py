@@ -48,13 +48,8 @@ def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
     The counter shows them. Without one: a missing sample makes all later samples late, a late stamp
-    only itself. So the step is sought in the lower envelope of the lateness.
-
-    Parameters
-    ----------
-    motion : Motion
-    late : (n,) array
-        Time in sample periods, less the sample's number.
+    only itself. So the step is sought in the lower envelope of the lateness: ``late`` (n,) is the
+    time in sample periods, less the sample's number.
     """
     if motion.sequence is not None:
         step = _counted(motion.sequence)
@@ -173,18 +168,9 @@ class _Comparison:
 
     @classmethod
     def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Comparison":
-        """Compare the roughness of angles with that due to stamps off their grid.
+        """Compare the roughness of angles (n, J) with that due to stamps off their grid, (n,).
 
         Third differences hold noise of angles and of stamps, and no smooth motion.
-
-        Parameters
-        ----------
-        motion : Motion
-            n samples of J joints.
-        angle : (n, J) array
-            Measured angles, rad.
-        on_grid : (n,) array
-            Distance of each stamp from its grid, sample periods.
         """
         rough = np.diff(angle, 3, axis=0)
         stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
