@@ -13,12 +13,12 @@ both are repeated with causes sought on all runs.
 from collections.abc import Sequence
 
 from pipelines.diagnosis.all_runs import by_all_runs
-from pipelines.diagnosis.candidates.library import silent
+from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.fit.validation_scheme import HoldOut
 from pipelines.diagnosis.judged_fit import judged_fit
-from pipelines.diagnosis.selection.selection import Report, nothing_selected, select
+from pipelines.diagnosis.selection.selection import nothing_selected, select
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 

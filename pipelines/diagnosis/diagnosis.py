@@ -19,8 +19,8 @@ from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp, built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
 from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
-from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
-from pipelines.diagnosis.fit.validation_error import Gain, errors_of
+from pipelines.diagnosis.fit.validation import ValidationResult
+from pipelines.diagnosis.fit.validation_error import Gain, errors_of, gain
 from pipelines.diagnosis.fit.validation_scheme import ValidationScheme
 from pipelines.diagnosis.judged_fit import JudgedFit
 from pipelines.diagnosis.selection.answer import NamedCause
@@ -228,7 +228,8 @@ class Diagnosis:
     @cached_property
     def gains(self) -> dict[str, Gain]:
         """The gain of each named cause on the validation runs, the others kept, by label."""
-        return gains_of(self.without, self.after)
+        after = self.after.errors
+        return {label: gain(less.errors, after) for label, less in self.without.items()}
 
     @cached_property
     def torque_rms(self) -> NDArray:

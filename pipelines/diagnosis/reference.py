@@ -161,14 +161,6 @@ def _measured() -> list[str]:
     ]
 
 
-def keep(title: str, measured: dict[str, Any]) -> None:
-    """Write a measurement of the criteria as a section: ``about``, ``columns`` and ``rows``."""
-    measurements = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
-    MEASURED.write_text(
-        json.dumps(measurements, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-
-
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = [columns, ["---"] * len(columns)]
     return "".join(f"| {' | '.join(row)} |\n" for row in (*head, *rows))
