@@ -64,10 +64,11 @@ def diagnose(
     judged = judged_fit(selected, scheme, prepared.noise)
     # An error above the noise may mean that the training runs alone show too little.
     if not data.spoilt and judged.after.leaves_more_than_noise:
-        judged = by_all_runs(data, prepared.noise, judged, _after_the_fit(report))
+        judged = by_all_runs(
+            data,
+            prepared.noise,
+            judged,
+            # Its shares lie between the fit and the end.
+            lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what),
+        )
     return Diagnosis.of(data, prepared.noise, judged)
-
-
-def _after_the_fit(report: Report) -> Report:
-    """Return a report whose shares lie between the fit and the end."""
-    return lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what)

@@ -159,11 +159,8 @@ class Diagnosis:
     @property
     def unexplained(self) -> list[float | None]:
         """Share of each joint's systematic power that remains; None where there was none."""
-        floor, before, after = (
-            self.floor_rms**2,
-            self.before.errors.rms**2,
-            self.after.errors.rms**2,
-        )
+        floor = self.floor_rms**2
+        before, after = self.before.errors.rms**2, self.after.errors.rms**2
         remaining = np.maximum(after - floor, 0.0)
         was = self.before.above(self.floor)
         # A joint that was at the floor has no systematic power; its quotient is discarded below.
@@ -260,10 +257,8 @@ class Diagnosis:
     @cached_property
     def lacks_mass(self) -> bool:
         """Whether a rigid body's least inertia is negative by more than its standard error."""
-        table, geometry = (
-            self.parameters.reset_index(drop=True),
-            self.fitted_runs[0].motion.geometry,
-        )
+        table = self.parameters.reset_index(drop=True)
+        geometry = self.fitted_runs[0].motion.geometry
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.
