@@ -14,7 +14,7 @@ with z_a^2 twice the price and z_b for the required power. A good rig shows a li
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -25,6 +25,7 @@ from scipy.stats import ncx2
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, proposals
 from pipelines.diagnosis.candidates.columns import bent_column, torque_columns
+from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
@@ -286,7 +287,7 @@ def detectability(
     baseline: Baseline,
     floor: Floor,
     power: float = POWER,
-    report: Callable[[float, str], None] = lambda share, what: None,
+    report: Report = silent,
 ) -> list[Detectable]:
     """Return every cause at every joint with the smallest size that these runs reveal.
 
@@ -318,10 +319,17 @@ def detectability(
     results: dict[Effect, list[DetectionResult]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        of_shapes = list(_results_of(effect, problem, power))
+        of_shapes = [
+            (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
+            for candidate in _shapes(effect, problem.runs)
+        ]
         # Where no shape is plausible, all count: every cause is reported.
         results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
-    chosen = [_usual(own) for own in results.values()]
+    # The size of each suffices for ``USUAL`` of its shapes.
+    chosen = [
+        sorted(own, key=lambda result: result.rms)[round(USUAL * (len(own) - 1))]
+        for own in results.values()
+    ]
     unexplained = _unexplained(chosen, list(results.values()))
     return [
         _detectable(effect, result, results, row, float(problem.torque_rms[problem.joint(effect)]))
@@ -332,7 +340,7 @@ def detectability(
 def detectability_of_recorded(
     motions: Sequence[Motion],
     power: float = POWER,
-    report: Callable[[float, str], None] = lambda share, what: None,
+    report: Report = silent,
     known: Sequence[str] = (),
 ) -> list[Detectable]:
     """Return the detectability of recorded motions, with noise from differences of periods.
@@ -393,16 +401,6 @@ def needed_noncentrality(columns: int, price: float, power: float) -> float:
     price = 2.0 * price
     # The power rises with the noncentrality, so there is one root.
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))
-
-
-def _results_of(
-    effect: Effect, problem: DetectionProblem, power: float
-) -> Iterator[DetectionResult]:
-    for candidate in _shapes(effect, problem.runs):
-        if candidate.transforms_motion:
-            yield _bent(candidate, problem, power)
-        else:
-            yield _added(candidate, problem, power)
 
 
 def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
@@ -604,11 +602,6 @@ def _growth(
     if by_noise >= by_background:
         return by_noise, "noise"
     return by_background, "materiality"
-
-
-def _usual(results: list[DetectionResult]) -> DetectionResult:
-    """Return the result whose size suffices for ``USUAL`` of the shapes."""
-    return sorted(results, key=lambda result: result.rms)[round(USUAL * (len(results) - 1))]
 
 
 def _detectable(

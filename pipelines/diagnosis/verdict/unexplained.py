@@ -60,7 +60,7 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
     ]
     rms = errors_of(d.validate, joints).rms
     return Unexplained(
-        description=describe(d.baseline.machine, dependences, above, term.together),
+        description=describe(d.baseline.machine, dependences, above, term.surfaces),
         depends_on=dependences[:MENTIONED],
         smooth=term.describe(),
         rmse_nm={joint: float(v) for joint, v in zip(d.baseline.joints, rms, strict=True)},

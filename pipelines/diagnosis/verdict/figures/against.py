@@ -114,7 +114,7 @@ def _along_tone(
     """Fold time at the strongest tone in residuals (m,), each run from its tone's crest."""
     # ``tone`` reads column j of several; the others are copies that it does not read.
     wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
-    frequency, _ = tone(runs, wide, j)
+    frequency, *_ = tone(runs, wide, j)
     x = []
     for run, residual in zip(runs, residuals, strict=True):
         known = run.usable[:, j]
