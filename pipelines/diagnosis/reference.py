@@ -96,18 +96,10 @@ def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
 
 def _assigned(statement: ast.stmt) -> list[str]:
     """Return the names of constants that a statement assigns."""
-    targets = (
-        statement.targets
-        if isinstance(statement, ast.Assign)
-        else [getattr(statement, "target", None)]
-    )
-    return [
-        node.id
-        for t in targets
-        if t
-        for node in ast.walk(t)
-        if isinstance(node, ast.Name) and node.id.isupper()
-    ]
+    if not isinstance(statement, ast.Assign | ast.AnnAssign):
+        return []
+    names = (node for node in ast.walk(statement) if isinstance(node, ast.Name))
+    return [n.id for n in names if isinstance(n.ctx, ast.Store) and n.id.isupper()]
 
 
 def _is_number(value: Any) -> bool:

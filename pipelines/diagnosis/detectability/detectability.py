@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, proposals
-from pipelines.diagnosis.candidates.columns import bent_column, torque_columns
+from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
@@ -568,16 +568,18 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
 
 
 def _bend(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run."""
-    return [
-        bent_column(
-            *columns_under([candidate.term(r)], run, problem.baseline),
-            problem.values,
-            problem.untouched[r],
-            run,
-        )
-        for r, run in enumerate(problem.runs)
-    ]
+    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run.
+
+    The effect is not linear, so the baseline is computed again from the transformed motion.
+    Linearised at biased parameters, elasticity would be mistaken for an encoder offset.
+    """
+    changes = []
+    for r, (run, untouched) in enumerate(zip(problem.runs, problem.untouched, strict=True)):
+        columns, measured = columns_under([candidate.term(r)], run, problem.baseline)
+        plain = untouched @ problem.values
+        change = columns @ problem.values - plain - (measured - run.measured)
+        changes.append(change[:, :, np.newaxis])
+    return changes
 
 
 def _growth(

@@ -66,7 +66,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "data_faults": [
             {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
         ],
-        "residual": remainder.as_json() if remainder else None,
+        "residual": remainder,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
     }
