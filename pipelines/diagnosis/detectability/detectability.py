@@ -220,20 +220,6 @@ class DetectionProblem:
         """Return the joint at which an effect's size is given: for a whole machine the first."""
         return max(effect.column(self.runs[0].motion), 0)
 
-    def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms of a column as a share of the joint's torque.
-
-        Parameters
-        ----------
-        effect : Effect
-            Whose joint counts.
-        column : sequence of (m, O, 1) arrays
-            One of each run, N·m.
-        """
-        return self.rms(effect, column) / max(
-            float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny
-        )
-
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
         """Return the rms of a column at the effect's joint, where it acts.
 
@@ -596,7 +582,8 @@ def _growth(
     price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
     by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
     # A good rig has a little of the effect: its amplitude is uncertain by that much.
-    share = problem.share(effect, column)
+    torque = max(float(problem.torque_rms[problem.joint(effect)]), np.finfo(float).tiny)
+    share = problem.rms(effect, column) / torque
     # As against noise, the amplitude must exceed its background by the root of twice the price.
     by_background = (
         2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
