@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+from pipelines.diagnosis.candidates.library import Report
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.fit.validation_scheme import CrossValidation
 from pipelines.diagnosis.judged_fit import JudgedFit, judged_fit
-from pipelines.diagnosis.selection.selection import Report, select
+from pipelines.diagnosis.selection.selection import select
 from pipelines.diagnosis.training_data import TrainingData
 
 

@@ -13,12 +13,12 @@ both are repeated with causes sought on all runs.
 from collections.abc import Sequence
 
 from pipelines.diagnosis.all_runs import by_all_runs
-from pipelines.diagnosis.candidates.library import silent
+from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.fit.validation_scheme import HoldOut
 from pipelines.diagnosis.judged_fit import judged_fit
-from pipelines.diagnosis.selection.selection import Report, nothing_selected, select
+from pipelines.diagnosis.selection.selection import nothing_selected, select
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 
@@ -64,10 +64,11 @@ def diagnose(
     judged = judged_fit(selected, scheme, prepared.noise)
     # An error above the noise may mean that the training runs alone show too little.
     if not data.spoilt and judged.after.leaves_more_than_noise:
-        judged = by_all_runs(data, prepared.noise, judged, _after_the_fit(report))
+        judged = by_all_runs(
+            data,
+            prepared.noise,
+            judged,
+            # Its shares lie between the fit and the end.
+            lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what),
+        )
     return Diagnosis.of(data, prepared.noise, judged)
-
-
-def _after_the_fit(report: Report) -> Report:
-    """Return a report whose shares lie between the fit and the end."""
-    return lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what)

@@ -19,8 +19,8 @@ from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp, built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
 from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
-from pipelines.diagnosis.fit.validation import ValidationResult, gains_of
-from pipelines.diagnosis.fit.validation_error import Gain, errors_of
+from pipelines.diagnosis.fit.validation import ValidationResult
+from pipelines.diagnosis.fit.validation_error import Gain, errors_of, gain
 from pipelines.diagnosis.fit.validation_scheme import ValidationScheme
 from pipelines.diagnosis.judged_fit import JudgedFit
 from pipelines.diagnosis.selection.answer import NamedCause
@@ -159,11 +159,8 @@ class Diagnosis:
     @property
     def unexplained(self) -> list[float | None]:
         """Share of each joint's systematic power that remains; None where there was none."""
-        floor, before, after = (
-            self.floor_rms**2,
-            self.before.errors.rms**2,
-            self.after.errors.rms**2,
-        )
+        floor = self.floor_rms**2
+        before, after = self.before.errors.rms**2, self.after.errors.rms**2
         remaining = np.maximum(after - floor, 0.0)
         was = self.before.above(self.floor)
         # A joint that was at the floor has no systematic power; its quotient is discarded below.
@@ -228,7 +225,8 @@ class Diagnosis:
     @cached_property
     def gains(self) -> dict[str, Gain]:
         """The gain of each named cause on the validation runs, the others kept, by label."""
-        return gains_of(self.without, self.after)
+        after = self.after.errors
+        return {label: gain(less.errors, after) for label, less in self.without.items()}
 
     @cached_property
     def torque_rms(self) -> NDArray:
@@ -259,10 +257,8 @@ class Diagnosis:
     @cached_property
     def lacks_mass(self) -> bool:
         """Whether a rigid body's least inertia is negative by more than its standard error."""
-        table, geometry = (
-            self.parameters.reset_index(drop=True),
-            self.fitted_runs[0].motion.geometry,
-        )
+        table = self.parameters.reset_index(drop=True)
+        geometry = self.fitted_runs[0].motion.geometry
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.

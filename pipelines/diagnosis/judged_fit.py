@@ -80,19 +80,14 @@ def judged_fit(selected: Selection, scheme: ValidationScheme, noise: NoiseModel)
         else:
             break
     # Last, because the share that a cause removes depends on the others that stay.
-    selected = selected.with_look_alikes(_removed(after, without))
+    shares = {label: removed_share(less, after) for label, less in without.items()}
+    # A cause has no share if the error without it is at the noise floor.
+    selected = selected.with_look_alikes(
+        {label: share for label, share in shares.items() if share is not None}
+    )
     if selected.candidates != fitted:
         after, without = _fitted(selected.candidates, scheme, before)
     return JudgedFit(selected, scheme, before, after, without)
-
-
-def _removed(after: ValidationResult, without: dict[str, ValidationResult]) -> dict[str, float]:
-    """Return the share of the systematic error that each cause removes, by label.
-
-    A cause is left out if the error without it is at the noise floor.
-    """
-    shares = {label: removed_share(less, after) for label, less in without.items()}
-    return {label: share for label, share in shares.items() if share is not None}
 
 
 def _shortfalls(

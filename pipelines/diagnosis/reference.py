@@ -96,18 +96,10 @@ def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
 
 def _assigned(statement: ast.stmt) -> list[str]:
     """Return the names of constants that a statement assigns."""
-    targets = (
-        statement.targets
-        if isinstance(statement, ast.Assign)
-        else [getattr(statement, "target", None)]
-    )
-    return [
-        node.id
-        for t in targets
-        if t
-        for node in ast.walk(t)
-        if isinstance(node, ast.Name) and node.id.isupper()
-    ]
+    if not isinstance(statement, ast.Assign | ast.AnnAssign):
+        return []
+    names = (node for node in ast.walk(statement) if isinstance(node, ast.Name))
+    return [n.id for n in names if isinstance(n.ctx, ast.Store) and n.id.isupper()]
 
 
 def _is_number(value: Any) -> bool:
@@ -159,14 +151,6 @@ def _measured() -> list[str]:
         f"## {title}\n\n{one['about']}\n\n{_table(one['columns'], one['rows'])}"
         for title, one in measured.items()
     ]
-
-
-def keep(title: str, measured: dict[str, Any]) -> None:
-    """Write a measurement of the criteria as a section: ``about``, ``columns`` and ``rows``."""
-    measurements = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
-    MEASURED.write_text(
-        json.dumps(measurements, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

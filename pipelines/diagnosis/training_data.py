@@ -70,7 +70,9 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
     if noisy:
         runs = [observe(motion, CUTOFF_HZ) for motion in valid]
-    train, validate = (_of(runs, purpose) for purpose in WHY)
+    train, validate = (
+        tuple(run for run in runs if run.motion.purpose == purpose) for purpose in WHY
+    )
     # A spoilt session gets a verdict on its faults instead of an error about its noise.
     if not any(fault.spoils for fault in faults):
         _refuse_unknown_noise(validate, faults)
@@ -82,10 +84,6 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
         faults,
         noisy,
     )
-
-
-def _of(runs: Sequence[Run], purpose: str) -> tuple[Run, ...]:
-    return tuple(run for run in runs if run.motion.purpose == purpose)
 
 
 def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:

@@ -45,7 +45,7 @@ def test_the_residual_is_split_by_the_runs_that_were_searched(diagnosis):
     prepared = prepare(diagnosis.data.train, diagnosis.baseline)
     alone = residual_shares(prepared.runs, prepared.residuals, prepared.noise)[0]
     shares = verdict(diagnosis)["router"]["hip"]
-    assert shares["repeats"] > 0.04 > alone.as_json()["repeats"]
+    assert shares["repeats"] > 0.04 > alone.repeats
 
 
 def test_its_amplitudes_are_fitted_to_the_training_runs_alone(diagnosis):

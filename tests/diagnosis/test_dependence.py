@@ -142,9 +142,9 @@ def test_a_law_learnt_on_one_excitation_lowers_the_error_on_another(runs, fresh)
 
 def test_two_variables_are_named_where_neither_alone_foretells(runs):
     residuals = with_law(runs, np.random.default_rng(5), product)
-    together = smooth_term(runs, residuals).together
+    surfaces = smooth_term(runs, residuals).surfaces
     text = describe(
-        THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR), together
+        THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR), surfaces
     )
     assert "together with" in text
 

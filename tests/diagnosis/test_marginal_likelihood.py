@@ -10,6 +10,7 @@ from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence, Nonnegative, explained
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 from pipelines.diagnosis.selection.posterior import posterior
+from tests.campaigns.learn.packing import packed, unpacked
 
 ROWS = 60
 CRITERIA = Criteria(drive_weight=1.0, cuff_weight=1.0)
@@ -197,7 +198,7 @@ def test_evidence_survives_being_packed():
         np.array([0.3, 0.1]), rng.random((2, 2)), rng.normal(size=(2, evidence.gram.shape[1]))
     )
     evidence = replace(evidence, nonnegative=friction)
-    again = Evidence.unpacked(evidence.packed())
+    again = unpacked(packed(evidence))
     np.testing.assert_allclose(again.gram, evidence.gram, rtol=1e-6)
     assert again.elements == evidence.elements
     assert again.background == evidence.background

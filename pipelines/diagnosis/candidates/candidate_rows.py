@@ -63,8 +63,9 @@ class CandidateRows:
         """
         if not candidate.transforms_motion:
             runs = self._runs if self._ripples_within_blocks(candidate) else self._slow
-            parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-            rows = self._regression.rows(self._expanded(candidate, parts))
+            own = candidate.columns_in(self._kinds)
+            parts = (torque_columns(candidate, r, run) for r, run in enumerate(runs))
+            rows = self._regression.rows([own.expand(part, r) for r, part in enumerate(parts)])
         elif candidate.directions:
             # The effect is linear along its directions, so each gives its column by itself.
             shapes = ((shape,) * len(self._kinds) for shape in candidate.directions)
@@ -112,10 +113,6 @@ class CandidateRows:
             value for p, value in zip(shapes, candidate.shapes[0], strict=True) if p.unit in TURNS
         )
         return cycles * self._steps[joint] > LONGEST_STEP
-
-    def _expanded(self, candidate: Candidate, parts: Sequence[NDArray]) -> list[NDArray]:
-        own = candidate.columns_in(self._kinds)
-        return [own.expand(part, r) for r, part in enumerate(parts)]
 
     def _transformed(self, candidate: Candidate, others: NDArray | None) -> NDArray:
         """Return the change of the transformed baseline against the plain one, at its own values.

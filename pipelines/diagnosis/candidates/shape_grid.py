@@ -57,7 +57,8 @@ def screened(
     """
     chosen = effect.directions([run.motion for run in runs])
     if chosen:
-        starts = [_along(effect, directions, len(runs)) for directions in chosen]
+        # A candidate has a column for each direction to which its effect is proportional.
+        starts = [Candidate(effect, (some[0],) * len(runs), tuple(some)) for some in chosen]
     elif any(p.per_run for p in effect.shape) and not transforms_motion(effect):
         starts = [_from_the_begin(effect, len(runs))]
     else:
@@ -70,11 +71,6 @@ def screened(
     else:
         fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.score)
-
-
-def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
-    """Return a candidate with a column for each direction to which its effect is proportional."""
-    return Candidate(effect, (directions[0],) * runs, tuple(directions))
 
 
 def others_of(fits: Sequence[CandidateFit], chosen: CandidateFit, most: int) -> list[CandidateFit]:

@@ -76,18 +76,13 @@ def _with_short_runs_left_out(motions: Sequence[Motion], faults: Sequence[Fault]
     # A fault without samples spoils the session; a run that others replace is masked as a whole.
     for fault in faults:
         run = hopeless.get(fault.file)
-        if run is None:
-            reported.append(fault)
-        elif fault.samples is None or not _others_suffice(run, motions, hopeless):
-            reported.append(replace(fault, samples=None))
-        else:
-            reported.append(
-                replace(
-                    fault,
-                    what=f"{fault.what}; this run is left out",
-                    samples=np.ones(len(run), bool),
-                )
-            )
+        if run is not None:
+            if fault.samples is None or not _others_suffice(run, motions, hopeless):
+                fault = replace(fault, samples=None)
+            else:
+                what, whole = f"{fault.what}; this run is left out", np.ones(len(run), bool)
+                fault = replace(fault, what=what, samples=whole)
+        reported.append(fault)
     return reported
 
 

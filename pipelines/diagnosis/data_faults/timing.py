@@ -1,7 +1,6 @@
 """Find faults of time stamps: missing samples, jitter, wrong clock rates, counter jumps."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,13 +47,8 @@ def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
     The counter shows them. Without one: a missing sample makes all later samples late, a late stamp
-    only itself. So the step is sought in the lower envelope of the lateness.
-
-    Parameters
-    ----------
-    motion : Motion
-    late : (n,) array
-        Time in sample periods, less the sample's number.
+    only itself. So the step is sought in the lower envelope of the lateness: ``late`` (n,) is the
+    time in sample periods, less the sample's number.
     """
     if motion.sequence is not None:
         step = _counted(motion.sequence)
@@ -148,7 +142,7 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     if motion.measured_angle is None:
         explained, spoils = "take time from the device's clock, not from the host's", True
     else:
-        explained, spoils = _judged(_Comparison.of(motion, motion.measured_angle, on_grid))
+        explained, spoils = _judged(motion, motion.measured_angle, on_grid)
     return Fault(
         motion.file,
         "time_s",
@@ -158,62 +152,36 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     )
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """The angles compared with uneven stamps."""
+def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool]:
+    """Return the meaning of uneven stamps, and whether they spoil the run.
 
-    followed: float
-    """1 where the samples were taken at the stamps: an angle at uneven instants is rough, d angle =
-    speed d t. 0 where they were taken evenly."""
-    error: float
-    """Standard error of ``followed``."""
-    share: float
-    """Change of an angle by the stamps' deviation, over the angle's own noise; the largest of the
-    joints."""
-
-    @classmethod
-    def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Comparison":
-        """Compare the roughness of angles with that due to stamps off their grid.
-
-        Third differences hold noise of angles and of stamps, and no smooth motion.
-
-        Parameters
-        ----------
-        motion : Motion
-            n samples of J joints.
-        angle : (n, J) array
-            Measured angles, rad.
-        on_grid : (n,) array
-            Distance of each stamp from its grid, sample periods.
-        """
-        rough = np.diff(angle, 3, axis=0)
-        stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
-        whole = len(rough) // BLOCK * BLOCK
-        # Neighbouring differences share samples; sums over so many are nearly independent.
-        sums = np.sum(rough * stray, axis=1)[:whole].reshape(-1, BLOCK).sum(axis=1)
-        tiny = np.finfo(float).tiny
-        scale = max(float(np.sum(stray**2)), tiny)
-        return cls(
-            # Slope of the angles' roughness along that of samples taken at the stamps.
-            followed=float(np.sum(rough * stray)) / scale,
-            error=float(np.sqrt(len(sums)) * np.std(sums)) / scale,
-            share=float(np.max(np.std(stray, axis=0) / np.maximum(np.std(rough, axis=0), tiny))),
-        )
-
-
-def _judged(comparison: _Comparison) -> tuple[str, bool]:
-    """Return the meaning of uneven stamps, and whether they spoil the run."""
-    if comparison.followed - SURE * comparison.error > HALF:
+    The roughness of the angles (n, J) is compared with that due to stamps off their grid, (n,).
+    Third differences hold noise of angles and of stamps, and no smooth motion.
+    """
+    rough = np.diff(angle, 3, axis=0)
+    # An angle at uneven instants is rough: d angle = speed d t.
+    stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
+    whole = len(rough) // BLOCK * BLOCK
+    # Neighbouring differences share samples; sums over so many are nearly independent.
+    sums = np.sum(rough * stray, axis=1)[:whole].reshape(-1, BLOCK).sum(axis=1)
+    tiny = np.finfo(float).tiny
+    scale = max(float(np.sum(stray**2)), tiny)
+    # 1 where the samples were taken at the stamps, 0 where they were taken evenly.
+    followed = float(np.sum(rough * stray)) / scale
+    error = float(np.sqrt(len(sums)) * np.std(sums)) / scale
+    if followed - SURE * error > HALF:
         return "the angles follow the stamps: the stamps are right, and nothing is lost", False
-    if comparison.followed + SURE * comparison.error >= HALF:
+    if followed + SURE * error >= HALF:
         words = (
             "the angles are too coarse to show whether the stamps are right, so no sample is left"
             " out; better take time from the device's clock"
         )
         return words, False
     reason = "the angles are smooth against the sample count, so only the stamps are wrong: "
-    if comparison.share < BELOW:
-        noise = f"{100 * comparison.share:.2g} % of the angles' own noise"
+    # Change of an angle by the stamps' deviation, over the angle's own noise.
+    share = float(np.max(np.std(stray, axis=0) / np.maximum(np.std(rough, axis=0), tiny)))
+    if share < BELOW:
+        noise = f"{100 * share:.2g} % of the angles' own noise"
         return f"{reason}by {noise} at most, and nothing is lost", False
     return f"{reason}rebuild time_s from the device's counter and sample rate", True
 

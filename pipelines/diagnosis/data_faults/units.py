@@ -137,12 +137,7 @@ def _torque_over_position_loop(motion: Motion, joint: int) -> float | None:
     """Return recorded torque over that of the position loop in the metadata.
 
     The torque is fitted by the angle's error and both speeds; the multiple of the error is the
-    loop's stiffness.
-
-    Returns
-    -------
-    float or None
-        None where there is no such loop, or it explains too little.
+    loop's stiffness. The result is None where there is no such loop, or it explains too little.
     """
     controller = motion.metadata.get("controller", {}).get(motion.joints[joint], {})
     stiffness = controller.get("kp_nm_rad")

@@ -35,7 +35,9 @@ FOLLOWS = 0.9
 """Correlation of an angle with its set-point from which it follows it."""
 SIGN, SWAP = "reversed", "exchanged"
 
-Wiring = tuple[Reading, tuple[int, int], tuple[float, float], tuple[tuple[int, str], ...], str]
+Channels = tuple[tuple[int, str], ...]
+"""Numbers of joints, and a quantity of each."""
+Wiring = tuple[Reading, tuple[int, int], tuple[float, float], Channels, str]
 """Reading of the angles; columns of hip's and knee's torque; their signs; wrong channels, and
 how."""
 HIP, KNEE = 0, 1
@@ -58,7 +60,7 @@ WIRINGS: tuple[Wiring, ...] = (
     (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
 )
-MIRROR_IMAGES: dict[tuple[tuple[int, str], ...], str] = {
+MIRROR_IMAGES: dict[Channels, str] = {
     BOTH_TORQUES: "both angles",
     ((KNEE, "angle"), (KNEE, "torque")): "the hip's angle and torque",
 }
@@ -77,9 +79,8 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
     for j in range(joints):
         own, best = alike[j, j], int(np.argmax(alike[j]))
         if own < -FOLLOWS:
-            yield _reversed(
-                motion, ((j, "angle"),), f"it moves against its set-point (correlation {own:.2f})"
-            )
+            why = f"it moves against its set-point (correlation {own:.2f})"
+            yield _fault(motion, ((j, "angle"),), SIGN, why)
         elif (
             best != j
             and alike[j, best] > FOLLOWS
@@ -89,12 +90,9 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
             # A pair is reported once.
             and j < best
         ):
-            yield _exchanged(
-                motion,
-                ((j, "angle"), (best, "angle")),
-                f"each follows the other's set-point (correlations {alike[j, best]:.2f} and"
-                f" {alike[best, j]:.2f})",
-            )
+            one, other = f"{alike[j, best]:.2f}", f"{alike[best, j]:.2f}"
+            why = f"each follows the other's set-point (correlations {one} and {other})"
+            yield _fault(motion, ((j, "angle"), (best, "angle")), SWAP, why)
 
 
 def wiring_faults(run: Averages) -> Iterator[Fault]:
@@ -110,10 +108,8 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         reading, channels, signs, *_ = wiring
         return sum(misfits[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
 
-    as_recorded, best = (
-        WIRINGS[0],
-        min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3])),
-    )
+    as_recorded = WIRINGS[0]
+    best = min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3]))
     if best is as_recorded:
         return
     why = (
@@ -124,8 +120,7 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
     if best[4] == SIGN and mirror:
         mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
         why += f" (reversing {mirror} instead gives the same)"
-    say = _reversed if best[4] == SIGN else _exchanged
-    yield say(run.motion, best[3], why)
+    yield _fault(run.motion, best[3], best[4], why)
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
@@ -157,27 +152,16 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
         )
 
 
-def _names(motion: Motion, channels: tuple[tuple[int, str], ...]) -> tuple[str, str]:
+def _fault(motion: Motion, channels: Channels, how: str, why: str) -> Fault:
     columns = [column(motion, *channel) for channel in channels]
-    return columns[0] if len(columns) == 1 else WHOLE_ROW, " and ".join(columns)
-
-
-def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
-    channel, names = _names(motion, channels)
+    names, settings = " and ".join(columns), settings_of(motion)
     return Fault(
         motion.file,
-        channel,
-        f"the sign of {names} is reversed, all along: {why}; reverse it in {settings_of(motion)},"
-        " if every run has it, and in this recording",
-    )
-
-
-def _exchanged(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
-    channel, names = _names(motion, channels)
-    return Fault(
-        motion.file,
-        channel,
-        f"{names} are swapped, all along: {why}; exchange the joints in {settings_of(motion)}",
+        columns[0] if len(columns) == 1 else WHOLE_ROW,
+        f"the sign of {names} is reversed, all along: {why}; reverse it in {settings}, if every run"
+        " has it, and in this recording"
+        if how == SIGN
+        else f"{names} are swapped, all along: {why}; exchange the joints in {settings}",
     )
 
 

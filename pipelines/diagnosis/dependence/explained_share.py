@@ -8,6 +8,7 @@ variables.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
 from pipelines.mechanics.machine import Machine
+
+if TYPE_CHECKING:
+    from pipelines.diagnosis.dependence.smooth_term import Surface
 
 LONGEST_S = 2.0
 """Largest time since a reversal that is distinguished, s."""
@@ -147,15 +151,6 @@ class Dependence:
 
 
 @dataclass(frozen=True)
-class Together:
-    """Variables that only together predict much of a joint's residual."""
-
-    joint: str
-    variables: tuple[Variable, ...]
-    share: float
-
-
-@dataclass(frozen=True)
 class Excess:
     """The part of a run's residual above the noise floor."""
 
@@ -189,13 +184,13 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
     results = []
     for j, joint in enumerate(machine.names):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
-        terms = [
-            Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s))
-            for v, s in shares.items()
-        ]
+        terms = []
+        for v, share in shares.items():
+            sentence = f"{_unexplained(joint, share)} depends on {_words(joint, machine, v.words)}"
+            terms.append(Dependence(joint, v.name, share, sentence))
         # A hum may lie above the cut-off that noisy angles require, so tones get that torque back.
         fast = [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)]
-        frequency, share, in_step = _free_or_in_step(runs, fast, j)
+        frequency, share, in_step = tone(runs, fast, j)
         kind = (
             "above the motion's own band, in step with its period"
             if in_step
@@ -216,10 +211,6 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
     return any(variable.of(run, j) is not None for run in runs)
 
 
-def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
-    return f"{_unexplained(joint, share)} depends on {_words(joint, machine, words)}"
-
-
 def _unexplained(joint: str, share: float) -> str:
     return f"{100 * share:.0f} % of the remaining error at {the(joint)}"
 
@@ -236,7 +227,7 @@ def _words(joint: str, machine: Machine, words: str) -> str:
     )
 
 
-def _by_kind(
+def by_kind(
     runs: Sequence[Run], residuals: Sequence[NDArray]
 ) -> Iterable[tuple[list[Run], list[NDArray]]]:
     """Yield the runs of each kind with their residuals (m, O).
@@ -263,7 +254,7 @@ def variable_share(
         Number of the joint.
     """
     total = error = 0.0
-    for some, of_kind in _by_kind(runs, residuals):
+    for some, of_kind in by_kind(runs, residuals):
         y = pooled(some, [r[:, j] for r in of_kind], j)
         if not len(y):
             continue
@@ -330,7 +321,7 @@ def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
     return np.concatenate([v[run.usable[:, j]] for run, v in zip(runs, values, strict=True)])
 
 
-def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
+def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float, bool]:
     """Return the strongest tone that no period of the motion explains, and its share.
 
     Where a harmonic of the motion's period, above twice the motion's own band, predicts most, it is
@@ -350,14 +341,9 @@ def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[flo
         Frequency, Hz.
     float
         Share of the variance that it predicts.
+    bool
+        Whether it is in step with the motion.
     """
-    return _free_or_in_step(runs, residuals, j)[:2]
-
-
-def _free_or_in_step(
-    runs: Sequence[Run], residuals: Sequence[NDArray], j: int
-) -> tuple[float, float, bool]:
-    """Return frequency and share of ``tone``, and whether it is in step with the motion."""
     # A tone that is no harmonic of the motion lies in what does not repeat between periods.
     free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
@@ -470,7 +456,7 @@ def describe(
     machine: Machine,
     results: Sequence[Dependence],
     above: Sequence[Excess],
-    together: Sequence[Together] = (),
+    surfaces: Sequence["Surface"] = (),
 ) -> str:
     """Describe the residual of the joint with most above its floor, in a sentence or two.
 
@@ -479,8 +465,8 @@ def describe(
     machine : Machine
     results : sequence of Dependence
     above : sequence of Excess
-    together : sequence of Together
-        Pairs of variables that predict the residual (see ``smooth_term``).
+    surfaces : sequence of Surface, optional
+        Those that predict the residual (see ``smooth_term``).
     """
     squares = {
         d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in results
@@ -488,10 +474,11 @@ def describe(
     joint = max(squares, key=lambda name: squares[name])
     where = _where([e for e in above if e.joint == joint])
     own = [d for d in results if d.joint == joint]
-    pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
+    pairs = [s for s in surfaces if s.joint == joint and len(s.curve.variables) > 1]
+    pair = max(pairs, key=lambda s: s.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
         words = " together with ".join(
-            _words(joint, machine, variable.words) for variable in pair.variables
+            _words(joint, machine, variable.words) for variable in pair.curve.variables
         )
         return f"{_unexplained(joint, pair.share)} depends on {words}{where}."
     if own[0].share < LITTLE:

@@ -181,13 +181,12 @@ def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) ->
     columns, right = np.array([A.T @ A for A, _ in parts]), np.array([A.T @ b for A, b in parts])
     square = np.array([b @ b for _, b in parts])
     folds = np.array(np.unravel_index(cells, (FOLDS,) * len(partitions)))
-    return [_summed(columns, right, square, own) for own in folds]
-
-
-def _summed(columns: NDArray, right: NDArray, square: NDArray, fold: NDArray) -> Products:
-    """Add up the products of cells (c, ...) by the fold (c,) to which each belongs."""
-    belongs = (fold == np.arange(FOLDS)[:, np.newaxis]).astype(float)
-    return Products(np.tensordot(belongs, columns, axes=1), belongs @ right, belongs @ square)
+    products = []
+    for own in folds:
+        belongs = (own == np.arange(FOLDS)[:, np.newaxis]).astype(float)
+        summed = np.tensordot(belongs, columns, axes=1)
+        products.append(Products(summed, belongs @ right, belongs @ square))
+    return products
 
 
 def held_out_error(products: Sequence[Products]) -> tuple[float, float]:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.dependence.explained_share import (
     VARIABLES,
-    Together,
     Variable,
+    by_kind,
     parts_of_period,
     pooled,
 )
@@ -67,15 +67,6 @@ class SmoothTerm:
                 torque[:, surface.curve.joint] += surface.curve.design(run) @ surface.values
         return torque
 
-    @property
-    def together(self) -> list[Together]:
-        """The surfaces over two variables, for ``explained_share.describe``."""
-        return [
-            Together(s.joint, s.curve.variables, s.share)
-            for s in self.surfaces
-            if len(s.curve.variables) > 1
-        ]
-
     def describe(self) -> str:
         """Return the variables of the surfaces in words."""
         parts = []
@@ -109,21 +100,14 @@ def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm
 
 
 def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
-    surface = _best(runs, residuals, j)
-    if surface is not None or len({run.motion.run for run in runs}) == 1:
+    surface, kinds = _best(runs, residuals, j), list(by_kind(runs, residuals))
+    if surface is not None or len(kinds) == 1:
         return surface
     # No law serves both kinds of run: it may still act in the kind with most of the error.
-    of_kind: dict[str, list[int]] = {}
-    for i, run in enumerate(runs):
-        of_kind.setdefault(run.motion.run, []).append(i)
-    square = {
-        kind: float(np.mean(pooled([runs[i] for i in at], [residuals[i] for i in at], j) ** 2))
-        for kind, at in of_kind.items()
-    }
-    worst = max(square, key=lambda kind: square[kind])
-    if square[worst] < ONE_SIDED * min(square.values()):
+    squares = [float(np.mean(pooled(*of_kind, j) ** 2)) for of_kind in kinds]
+    if max(squares) < ONE_SIDED * min(squares):
         return None
-    return _best([runs[i] for i in of_kind[worst]], [residuals[i] for i in of_kind[worst]], j)
+    return _best(*kinds[squares.index(max(squares))], j)
 
 
 def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
@@ -141,10 +125,8 @@ def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface 
 def _surface(
     variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int
 ) -> Surface:
-    curve, kinds = (
-        Curve.along(variables, runs, j),
-        list(dict.fromkeys(run.motion.run for run in runs)),
-    )
+    curve = Curve.along(variables, runs, j)
+    kinds = list(dict.fromkeys(run.motion.run for run in runs))
     y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
     partitions = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
     # A law of the machine must predict the runs with a wearer from those without.

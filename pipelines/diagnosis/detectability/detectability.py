@@ -14,7 +14,7 @@ with z_a^2 twice the price and z_b for the required power. A good rig shows a li
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -24,7 +24,8 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, proposals
-from pipelines.diagnosis.candidates.columns import bent_column, torque_columns
+from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
@@ -219,20 +220,6 @@ class DetectionProblem:
         """Return the joint at which an effect's size is given: for a whole machine the first."""
         return max(effect.column(self.runs[0].motion), 0)
 
-    def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms of a column as a share of the joint's torque.
-
-        Parameters
-        ----------
-        effect : Effect
-            Whose joint counts.
-        column : sequence of (m, O, 1) arrays
-            One of each run, N·m.
-        """
-        return self.rms(effect, column) / max(
-            float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny
-        )
-
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
         """Return the rms of a column at the effect's joint, where it acts.
 
@@ -286,7 +273,7 @@ def detectability(
     baseline: Baseline,
     floor: Floor,
     power: float = POWER,
-    report: Callable[[float, str], None] = lambda share, what: None,
+    report: Report = silent,
 ) -> list[Detectable]:
     """Return every cause at every joint with the smallest size that these runs reveal.
 
@@ -318,10 +305,17 @@ def detectability(
     results: dict[Effect, list[DetectionResult]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        of_shapes = list(_results_of(effect, problem, power))
+        of_shapes = [
+            (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
+            for candidate in _shapes(effect, problem.runs)
+        ]
         # Where no shape is plausible, all count: every cause is reported.
         results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
-    chosen = [_usual(own) for own in results.values()]
+    # The size of each suffices for ``USUAL`` of its shapes.
+    chosen = [
+        sorted(own, key=lambda result: result.rms)[round(USUAL * (len(own) - 1))]
+        for own in results.values()
+    ]
     unexplained = _unexplained(chosen, list(results.values()))
     return [
         _detectable(effect, result, results, row, float(problem.torque_rms[problem.joint(effect)]))
@@ -332,7 +326,7 @@ def detectability(
 def detectability_of_recorded(
     motions: Sequence[Motion],
     power: float = POWER,
-    report: Callable[[float, str], None] = lambda share, what: None,
+    report: Report = silent,
     known: Sequence[str] = (),
 ) -> list[Detectable]:
     """Return the detectability of recorded motions, with noise from differences of periods.
@@ -393,16 +387,6 @@ def needed_noncentrality(columns: int, price: float, power: float) -> float:
     price = 2.0 * price
     # The power rises with the noncentrality, so there is one root.
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))
-
-
-def _results_of(
-    effect: Effect, problem: DetectionProblem, power: float
-) -> Iterator[DetectionResult]:
-    for candidate in _shapes(effect, problem.runs):
-        if candidate.transforms_motion:
-            yield _bent(candidate, problem, power)
-        else:
-            yield _added(candidate, problem, power)
 
 
 def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
@@ -570,16 +554,18 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
 
 
 def _bend(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run."""
-    return [
-        bent_column(
-            *columns_under([candidate.term(r)], run, problem.baseline),
-            problem.values,
-            problem.untouched[r],
-            run,
-        )
-        for r, run in enumerate(problem.runs)
-    ]
+    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run.
+
+    The effect is not linear, so the baseline is computed again from the transformed motion.
+    Linearised at biased parameters, elasticity would be mistaken for an encoder offset.
+    """
+    changes = []
+    for r, (run, untouched) in enumerate(zip(problem.runs, problem.untouched, strict=True)):
+        columns, measured = columns_under([candidate.term(r)], run, problem.baseline)
+        plain = untouched @ problem.values
+        change = columns @ problem.values - plain - (measured - run.measured)
+        changes.append(change[:, :, np.newaxis])
+    return changes
 
 
 def _growth(
@@ -596,7 +582,8 @@ def _growth(
     price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
     by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
     # A good rig has a little of the effect: its amplitude is uncertain by that much.
-    share = problem.share(effect, column)
+    torque = max(float(problem.torque_rms[problem.joint(effect)]), np.finfo(float).tiny)
+    share = problem.rms(effect, column) / torque
     # As against noise, the amplitude must exceed its background by the root of twice the price.
     by_background = (
         2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
@@ -604,11 +591,6 @@ def _growth(
     if by_noise >= by_background:
         return by_noise, "noise"
     return by_background, "materiality"
-
-
-def _usual(results: list[DetectionResult]) -> DetectionResult:
-    """Return the result whose size suffices for ``USUAL`` of the shapes."""
-    return sorted(results, key=lambda result: result.rms)[round(USUAL * (len(results) - 1))]
 
 
 def _detectable(

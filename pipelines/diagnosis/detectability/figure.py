@@ -14,11 +14,8 @@ from pipelines.wording.label import effect_labelled, title_in_words
 
 def draw(results: Sequence[Detectable], stem: Path, title: str) -> None:
     """Write the bars as PNG and PDF; a cause of the whole leg is drawn with the hip."""
-    first = next(one.effect.joint for one in results if one.effect.joint)
-    joints = list(
-        dict.fromkeys([first, *(one.effect.joint for one in results if one.effect.joint)])
-    )
-    groups = [[one for one in results if (one.effect.joint or first) == joint] for joint in joints]
+    joints = list(dict.fromkeys(one.effect.joint for one in results if one.effect.joint))
+    groups = [[one for one in results if (one.effect.joint or joints[0]) == j] for j in joints]
     height = 0.9 + 0.22 * max(len(group) for group in groups)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(

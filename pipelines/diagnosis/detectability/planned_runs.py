@@ -1,7 +1,6 @@
 """Simulate the runs of a planned trajectory on a faultless leg, with their noise."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.effects.baseline import Friction
@@ -43,51 +42,34 @@ def planned_motions(
     q, dq, ddq = trajectory.at(time)
     geometry = Geometry(thigh_length_m=plant.thigh_length_m, gravity_m_s2=plant.gravity_m_s2)
     Y = LEG.regressor(q, dq, ddq, geometry)
+    names = tuple(joint.name for joint in trajectory.joints)
     motions = []
     for kind in kinds:
-        X = np.array(plant.exo_inertial) + (
-            np.array(plant.human_inertial) if kind == "with_human" else 0.0
+        worn = np.array(plant.human_inertial) if kind == "with_human" else 0.0
+        load = Y @ (np.array(plant.exo_inertial) + worn)
+        motion = Motion(
+            time,
+            q,
+            dq,
+            ddq,
+            # A copy, because friction is added to the drives' torque and not to the load behind.
+            torque=load.copy(),
+            load=load,
+            segment=np.zeros(count, np.int64),
+            valid=np.ones(count, bool),
+            run=kind,
+            sample_rate_hz=rate_hz,
+            period_s=trajectory.period_s,
+            joints=names,
+            geometry=geometry,
+            file=kind,
+            metadata={"joints": [{"name": j.name, "kind": j.kind} for j in trajectory.joints]},
         )
-        motions.append(
-            _motion(time, (q, dq, ddq), Y @ X, kind, plant, geometry, trajectory, rate_hz)
-        )
+        levels = zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True)
+        for joint, own in zip(names, levels, strict=True):
+            motion.torque[:] += Friction(joint).torque(motion, np.array(own))
+        motions.append(motion)
     return motions
-
-
-def _motion(
-    time: NDArray,
-    state: tuple[NDArray, NDArray, NDArray],
-    load: NDArray,
-    kind: str,
-    plant: PlantSettings,
-    geometry: Geometry,
-    trajectory: Trajectory,
-    rate_hz: float,
-) -> Motion:
-    names = tuple(joint.name for joint in trajectory.joints)
-    motion = Motion(
-        time,
-        *state,
-        # A copy, because friction is added to the drives' torque and not to the load behind them.
-        torque=load.copy(),
-        load=load,
-        segment=np.zeros(len(time), np.int64),
-        valid=np.ones(len(time), bool),
-        run=kind,
-        sample_rate_hz=rate_hz,
-        period_s=trajectory.period_s,
-        joints=names,
-        geometry=geometry,
-        file=kind,
-        metadata={
-            "joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]
-        },
-    )
-    for joint, levels in zip(
-        names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True
-    ):
-        motion.torque[:] += Friction(joint).torque(motion, np.array(levels))
-    return motion
 
 
 def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> Floor:

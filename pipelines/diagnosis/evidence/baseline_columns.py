@@ -50,7 +50,4 @@ def gram_of_runs(
     """
     measured = measured or [run.measured for run in runs]
     grams = [gram_of(c, y, r.usable) for r, c, y in zip(runs, columns, measured, strict=True)]
-    total = grams[0]
-    for gram in grams[1:]:
-        total = total + gram
-    return total
+    return sum(grams[1:], start=grams[0])

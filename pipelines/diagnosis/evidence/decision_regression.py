@@ -236,13 +236,8 @@ def _whitening(
 ) -> sparse.csr_matrix:
     """Return the matrix that whitens averages correlated with the average before, (N, N).
 
-    Parameters
-    ----------
-    bands : sequence of DecisionBand
-    weighty : (rows,) bool
-        Rows of all averages and outputs that count.
-    memory : (O,) array
-        Correlation of adjacent averages.
+    ``weighty`` (rows,) marks the averages and outputs that count; ``memory`` (O,) is the
+    correlation of adjacent averages.
     """
     outputs, number = len(memory), np.cumsum(weighty) - 1
     # The first average of a run, or after a gap, has none before it.

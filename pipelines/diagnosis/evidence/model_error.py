@@ -30,15 +30,8 @@ def imperfection(runs: Sequence[Run]) -> NDArray:
         N·m.
     """
     torque = varying_torque(runs)
-    return torque * _imperfect_share(len(torque))
-
-
-def _imperfect_share(outputs: int) -> NDArray:
-    """Return the share of each output's torque that is wrong on a good rig, (O,).
-
-    Drives come first, then cuffs.
-    """
-    return np.repeat(IMPERFECTION, outputs // 2)
+    # Drives come first, then cuffs.
+    return torque * np.repeat(IMPERFECTION, len(torque) // 2)
 
 
 def varying_torque(runs: Sequence[Run]) -> NDArray:

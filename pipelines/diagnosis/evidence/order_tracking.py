@@ -323,13 +323,7 @@ class _Search:
         self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
 
     def remainder(self, lines: Sequence[Sinusoids]) -> list[Channel]:
-        """Return the residual in each run less the lines.
-
-        Parameters
-        ----------
-        lines : sequence of Sinusoids
-            Lines of each kind, N·m.
-        """
+        """Return the residual in each run less the lines of each kind."""
         return [
             waves.grid.channel(waves.grid.residual - sum(kind.torque(waves, r) for kind in lines))
             for r, waves in enumerate(self.waves)
@@ -344,19 +338,7 @@ class _Search:
     def added(
         self, lines: Sequence[Sinusoids], kind: Kind, cycles: float, channels: Sequence[Channel]
     ) -> list[Sinusoids]:
-        """Return lines with one more; its amplitudes come from the scores of the residual.
-
-        Parameters
-        ----------
-        lines : sequence of Sinusoids
-            Lines of each kind.
-        kind : Kind
-            Kind of the new line.
-        cycles : float
-            Per turn, or Hz.
-        channels : sequence of Channel
-            The residual less the lines, in each run.
-        """
+        """Return the lines of each kind with one more; its amplitudes come from the scores."""
         if kind is Kind.TIME:
             # Over a long run a small error of the frequency turns the phase.
             cycles = self._sharpened(cycles, channels)
@@ -447,23 +429,9 @@ class _Search:
         spectra: Sequence[Spectrum],
         searches: int,
     ) -> tuple[Line, ...]:
-        """Return the lines that are significant in addition to all others.
+        """Return the lines that are significant in addition to all others, the strongest first.
 
-        Parameters
-        ----------
-        lines : sequence of Sinusoids
-            Lines of each kind.
-        channels : sequence of Channel
-            The residual less all lines, in each run.
-        spectra : sequence of Spectrum
-            Spectrum of each kind.
-        searches : int
-            Number of similar searches.
-
-        Returns
-        -------
-        tuple of Line
-            The strongest first.
+        The channels hold the residual less all lines.
         """
         significant = []
         for known, spectrum in zip(lines, spectra, strict=True):

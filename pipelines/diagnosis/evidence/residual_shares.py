@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
-
-KINDS = ("exo_alone", "with_human")
+from pipelines.effects import RUNS
 
 
 @dataclass(frozen=True)
 class ResidualShares:
     """Shares of one joint's mean square residual in the decision band; they add up to one."""
 
-    rms: float
-    """N·m in the decision band."""
+    rms_nm: float
+    """In the decision band."""
     noise: float
     repeats: float | None
     """With the motion, in every period alike; None without a period."""
@@ -36,18 +35,6 @@ class ResidualShares:
     """More than noise, where no period shows whether it repeats; else zero."""
     with_person_only: float | None
     """Part of the repeating share that is present with a person only; None with one kind of run."""
-
-    def as_json(self) -> dict[str, float | None]:
-        """Return a joint's entry of ``router`` in the verdict."""
-        return {
-            "rms_nm": self.rms,
-            "noise": self.noise,
-            "repeats": self.repeats,
-            "wanders": self.wanders,
-            "between_runs": self.between_runs,
-            "unsplit": self.unsplit,
-            "with_person_only": self.with_person_only,
-        }
 
 
 def residual_shares(
@@ -138,23 +125,14 @@ def _with_person_only(
     bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float
 ) -> float | None:
     """Return how much more repeats with a person than without, as a share of all."""
-    powers = []
-    for kind in KINDS:
+    products = []
+    for kind in RUNS:
         own = [r for band, r in zip(bands, repeated, strict=True) if band.run.motion.run == kind]
-        products = np.concatenate(own) if own else np.zeros(0)
-        if not len(products):
-            return None
-        # Noise can make a mean of products negative; a power is not.
-        powers.append(max(float(products.mean()), 0.0))
-    alone, worn = powers
+        products.append(np.concatenate([*own, []]))
+    if not all(map(len, products)):
+        return None
+    # Noise can make a mean of products negative; a power is not.
+    alone, worn = (max(float(of_kind.mean()), 0.0) for of_kind in products)
     # The difference exists in the runs with a person only, and they are a part of the total.
-    of_all = sum(len(r) for r in repeated)
-    share = (
-        sum(
-            len(r)
-            for band, r in zip(bands, repeated, strict=True)
-            if band.run.motion.run == KINDS[1]
-        )
-        / of_all
-    )
+    share = len(products[1]) / sum(map(len, repeated))
     return float(np.clip((worn - alone) * share / total, 0.0, 1.0))

@@ -71,7 +71,8 @@ def fit(
     -------
     Fit
     """
-    causes = tuple(sorted(causes, key=_last_sensors))
+    # Sensors come last.
+    causes = tuple(sorted(causes, key=lambda cause: cause.effect.side is Side.SENSOR))
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
     errors, rms, cost = _errors(gram, values)
@@ -106,10 +107,6 @@ def residuals_on(fitted: Fit, runs: Sequence[Run], baseline: Baseline) -> list[N
     """
     columns = stacked_columns(fitted.causes, with_loads_of(runs, fitted, baseline), baseline)
     return [measured - c @ fitted.values for c, measured in columns]
-
-
-def _last_sensors(cause: Candidate) -> bool:
-    return cause.effect.side is Side.SENSOR
 
 
 def _layout(

@@ -67,7 +67,7 @@ class Refinement:
             loads = self._loads_after(best)
             runs = self._with_loads(loads)
             start = self._fit(best.causes, runs, loads)
-            ahead = self._round(start, runs)
+            ahead = self._stepped(self._forms(start, runs), runs)
             fits.append(ahead)
             if ahead.cost > best.cost - ENOUGH * abs(best.cost):
                 break
@@ -94,10 +94,6 @@ class Refinement:
 
     def _fit(self, causes: Sequence[Candidate], runs: Sequence[Run], loads: NDArray | None) -> Fit:
         return fit(causes, runs, self._baseline, self._weights, loads)
-
-    def _round(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the fit after a few steps with the loads held."""
-        return self._stepped(self._forms(best, runs), runs)
 
     def _stepped(self, best: Fit, runs: Sequence[Run]) -> Fit:
         """Return the fit after a few steps of its shapes, its forms unchanged."""

@@ -115,18 +115,7 @@ class _About:
         return cls(motion, model, j, read, speed, rest, level, near)
 
     def remainder(self, side: "Side") -> NDArray:
-        """Return the residual near reversals.
-
-        Parameters
-        ----------
-        side : callable
-            Return friction at each sample as a share of the Coulomb level, (n,).
-
-        Returns
-        -------
-        (near,) array
-            N·m.
-        """
+        """Return the residual near reversals, (near,) N·m, with friction on the given side."""
         column = np.zeros((*self.motion.q.shape, 1))
         column[:, self.j, 0] = self.level * side(self)
         # A gain or a delay of the torque sensor acts on friction too.

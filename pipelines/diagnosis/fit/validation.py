@@ -1,6 +1,6 @@
 """Evaluate a model on samples that its fit has not seen, and judge its causes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
 from pipelines.diagnosis.fit.joint_fit import Fit
-from pipelines.diagnosis.fit.validation_error import Errors, Gain, errors_of, gain
+from pipelines.diagnosis.fit.validation_error import Errors, errors_of
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,6 @@ class ValidationResult:
             Of the drives.
         """
         return np.asarray(self.errors.rms > CRITERIA.at_floor * floor.rms[: len(self.errors.rms)])
-
-
-def gains_of(without: Mapping[str, ValidationResult], whole: ValidationResult) -> dict[str, Gain]:
-    """Return the gain of each cause, the others kept, by label."""
-    return {label: gain(less.errors, whole.errors) for label, less in without.items()}
 
 
 def removed_share(less: ValidationResult, whole: ValidationResult) -> float | None:

@@ -3,7 +3,6 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,42 +16,6 @@ from pipelines.diagnosis.fit.joint_fit import Fit, fit, with_loads_of
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.fit.validation_error import errors_of
-
-
-class ValidationScheme(Protocol):
-    """How models are fitted and scored."""
-
-    @property
-    def runs(self) -> tuple[Run, ...]:
-        """The runs that the reported parameters are fitted to."""
-
-    def validated(self, causes: Sequence[Candidate]) -> ValidationResult:
-        """Fit the baseline with some causes, their shapes refined, and score it.
-
-        Parameters
-        ----------
-        causes : sequence of Candidate
-            None for the baseline alone.
-
-        Returns
-        -------
-        ValidationResult
-        """
-
-    def refitted(self, result: ValidationResult, kept: Collection[str]) -> ValidationResult:
-        """Fit some of the causes of a result again, at its shapes and joint loads, and score them.
-
-        Parameters
-        ----------
-        result : ValidationResult
-            Of this scheme.
-        kept : collection of str
-            Labels of these causes.
-
-        Returns
-        -------
-        ValidationResult
-        """
 
 
 @dataclass(frozen=True)
@@ -81,13 +44,13 @@ class HoldOut:
         return cls(loaded[0], loaded[1], baseline, weights)
 
     def validated(self, causes: Sequence[Candidate]) -> ValidationResult:
-        """Fit the baseline with some causes, and score it (see ``ValidationScheme``)."""
+        """Fit the baseline with some causes, their shapes refined, and score it."""
         # After a search of all runs, causes have shapes in further runs too.
         own = [replace(cause, shapes=cause.shapes[: len(self.runs)]) for cause in causes]
         return self._scored(Refinement(self.runs, self.baseline, self.weights)(own))
 
     def refitted(self, result: ValidationResult, kept: Collection[str]) -> ValidationResult:
-        """Fit some causes of a result again, and score them (see ``ValidationScheme``)."""
+        """Fit some causes of a result again, at its shapes and joint loads, and score them."""
         return self.refitted_from(result.fit, kept)
 
     def refitted_from(self, whole: Fit, kept: Collection[str]) -> ValidationResult:
@@ -135,18 +98,22 @@ class CrossValidation:
         )
 
     def validated(self, causes: Sequence[Candidate]) -> ValidationResult:
-        """Fit the baseline with some causes, and score it (see ``ValidationScheme``)."""
+        """Fit the baseline with some causes, their shapes refined, and score it."""
         return _merged(
             self._all_runs.validated(causes), [one.validated(causes) for one in self._without_half]
         )
 
     def refitted(self, result: ValidationResult, kept: Collection[str]) -> ValidationResult:
-        """Fit some causes of a result again, and score them (see ``ValidationScheme``)."""
+        """Fit some causes of a result again, at its shapes and joint loads, and score them."""
         parts = [
             one.refitted_from(half_fit, kept)
             for one, half_fit in zip(self._without_half, result.half_fits, strict=True)
         ]
         return _merged(self._all_runs.refitted(result, kept), parts)
+
+
+ValidationScheme = HoldOut | CrossValidation
+"""How models are fitted and scored. Reported parameters are fitted to its ``runs``."""
 
 
 def _hiding(run: Run, half: int) -> Run:

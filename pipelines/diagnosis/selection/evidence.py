@@ -1,14 +1,11 @@
 """Compute the evidence of a session: products of columns, and their meaning.
 
-The decision needs nothing else. It is small enough to be kept for thousands of sessions, from which
-the criteria are learned.
+The decision needs nothing else.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,8 +135,6 @@ class Evidence:
     nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined together."""
-    about: Mapping[str, Any] = field(default_factory=dict)
-    """Noise, torque, kinds of run: for reports."""
 
     @classmethod
     def of(cls, library: Library, auxiliary: Mapping[str, float]) -> "Evidence":
@@ -160,47 +155,6 @@ class Evidence:
             np.array(list(_explained(library, at, gram, right))),
             Nonnegative.of(library, at, X.shape[1]),
             tuple(_contexts(library, elements)),
-            _about(library),
-        )
-
-    def packed(self) -> dict[str, Any]:
-        """Return a row of a table, with symmetric matrices as their upper triangles."""
-        # Single precision, because the Gram matrices are nearly all of a stored session.
-        upper = np.triu_indices(self.gram.shape[1])
-        return {
-            "gram": self.gram[:, *upper].astype(np.float32).tobytes(),
-            "right": self.right.tobytes(),
-            "text": json.dumps(
-                {
-                    "elements": [asdict(element) for element in self.elements],
-                    "background": self.background,
-                    "auxiliary": self.auxiliary,
-                    "explained": self.explained.tolist(),
-                    "contexts": self.contexts,
-                    "about": self.about,
-                    "nonnegative": self.nonnegative
-                    and {k: v.tolist() for k, v in vars(self.nonnegative).items()},
-                }
-            ),
-        }
-
-    @classmethod
-    def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
-        """Return the evidence of a row from ``packed``."""
-        text = json.loads(row["text"])
-        explained, nonnegative = np.array(text["explained"]), text["nonnegative"]
-        right = np.frombuffer(row["right"]).reshape(len(explained), -1)
-        return cls(
-            _symmetric(row["gram"], right.shape),
-            right,
-            tuple(Element(**one) for one in text["elements"]),
-            tuple((place, v, noise) for place, v, noise in text["background"]),
-            text["auxiliary"],
-            explained,
-            nonnegative
-            and Nonnegative(**{name: np.array(values) for name, values in nonnegative.items()}),
-            tuple(map(tuple, text["contexts"])),
-            text["about"],
         )
 
 
@@ -255,14 +209,6 @@ def _beyond_noise(gram: NDArray, right: NDArray, precision: NDArray, first: int)
     # The trace of S^-1 G where S = G + the precision.
     of_noise = len(inverse) - np.sum(precision[first:] * inverse[:, first:] ** 2)
     return max(float(np.sum((inverse @ right) ** 2) - of_noise), 0.0)
-
-
-def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
-    outputs, n = shape
-    full = np.zeros((outputs, n, n))
-    upper = np.triu_indices(n)
-    full[:, *upper] = np.frombuffer(packed, np.float32).reshape(outputs, -1)
-    return full + np.triu(full, 1).transpose(0, 2, 1)
 
 
 @dataclass(frozen=True)
@@ -459,16 +405,3 @@ def _contexts(library: Library, elements: Sequence[Element]):
     laws = {element.variant: i for i, element in enumerate(elements) if element.is_law}
     for context in library.contexts:
         yield (*context.causes, *(laws[variant] for variant in context.laws))
-
-
-def _about(library: Library) -> dict[str, Any]:
-    prepared = library.prepared
-    return {
-        "kinds": [run.motion.run for run in prepared.runs],
-        "density": prepared.noise.density.tolist(),
-        "correlation_s": prepared.noise.correlation_s.tolist(),
-        "pink": prepared.noise.pink.tolist(),
-        "from_periods": prepared.noise.from_periods,
-        "torque": prepared.torque.tolist(),
-        "shapes": [[list(map(float, s)) for s in c.candidate.shapes] for c in library.causes],
-    }

@@ -5,7 +5,7 @@ belongs to, which cause it is. Each is reported at the deepest node whose probab
 half.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,16 +110,12 @@ def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
     anything: dict[str, Any] = {}
     for nodes in (families, joints, [anything]):
         covered: Inside = frozenset()
-        for node in _distinct(nodes):
+        for node in {tuple(node.items()): node for node in nodes}.values():
             for finding, inside in _likely(posterior, rest, node):
                 yield finding
                 covered |= inside
         # The next level up reports only elements that no finding covers yet.
         rest -= covered
-
-
-def _distinct(nodes: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    return list({tuple(node.items()): node for node in nodes}.values())
 
 
 def _likely(

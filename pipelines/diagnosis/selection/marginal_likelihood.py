@@ -139,7 +139,8 @@ class MarginalLikelihood:
         values = np.linalg.solve(system, self.right[columns])
         ends = np.cumsum([0, *(len(self.parts[i]) for i in chosen)])
         own = [values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)]
-        return np.maximum([_share(v) for v in own], LEAST_SIZE)
+        # The columns of a cause are orthonormal, so the norm is its share.
+        return np.maximum([np.linalg.norm(v) for v in own], LEAST_SIZE)
 
     def _log_evidence(
         self, columns: NDArray, variance: NDArray, elements: Sequence[Element]
@@ -288,11 +289,6 @@ def _forward(lower: NDArray, right: NDArray) -> NDArray:
     if not len(lower):
         return right  # LAPACK refuses a system without unknowns
     return np.asarray(dtrtrs(lower, right, lower=1)[0])
-
-
-def _share(values: NDArray) -> float:
-    """Return the share of coefficients; the columns of a cause are orthonormal."""
-    return float(np.linalg.norm(values))
 
 
 def _log_odds_of_lines(element: Element, c: Criteria) -> float:

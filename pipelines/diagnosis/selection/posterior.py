@@ -5,7 +5,7 @@ full; triples extend the best pairs. Marginals are reported: of nothing missing,
 something unlisted, of each family at each joint.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -165,7 +165,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     odds: dict[Set, float] = {(): 0.0}
     # A shape refined in a set counts in that set only: otherwise the cause would count twice.
     odds |= {(i,): float(weigh.alone[i]) for i, e in enumerate(evidence.elements) if _explains(e)}
-    for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
+    for chosen in (*_pairs(weigh), *(tuple(sorted(own)) for own in evidence.contexts)):
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
         odds[chosen] = weigh(chosen)
@@ -192,10 +192,6 @@ def _with_bursts(
         for chosen, value in odds.items():
             together = (*chosen, i)
             yield together, value + own + weigh.prior(together) - weigh.prior(chosen)
-
-
-def _ordered(chosen: Sequence[int]) -> Set:
-    return tuple(sorted(chosen))
 
 
 def likely_contexts(weighed: Posterior) -> list[Context]:

@@ -1,15 +1,15 @@
 """Select causes from the searched runs: library, posterior, answer, findings."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from scipy.special import expit, logit
 
-from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.library import Library, build_library, silent
+from pipelines.diagnosis.candidates.library import Library, Report, build_library, silent
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns, prepare
+from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
+from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
 from pipelines.diagnosis.selection.answer import Answer, NamedCause, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
@@ -22,8 +22,7 @@ from pipelines.diagnosis.selection.posterior import (
     posterior,
     strongest,
 )
-from pipelines.diagnosis.training_data import training_data
-from pipelines.mechanics.motion import Motion
+from pipelines.effects import EFFECTS
 
 LIBRARY_SHARE = 0.6
 """Position of the progress bar at which the library is done."""
@@ -31,7 +30,6 @@ PARTNERS = 5
 """Number of causes that are refined together with each of the most probable ones."""
 ROUNDS = 50
 """Rounds in which the probabilities of several groups are raised to their least values in turn."""
-Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -265,13 +263,6 @@ def select(prepared: PreparedRuns, report: Report = silent) -> Selection:
     )
 
 
-def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidence:
-    """Return the evidence of a session, from which the decision follows."""
-    data = training_data(motions, known)
-    prepared = prepare(data.train, data.baseline)
-    return weighed(prepared)[1]
-
-
 def nothing_selected(prepared: PreparedRuns) -> Selection:
     """Return the empty answer where faults of acquisition prevent a search."""
     return Selection(None, None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
@@ -284,7 +275,7 @@ def weighed(prepared: PreparedRuns, report: Report = silent) -> tuple[Library, E
     """
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
     report(LIBRARY_SHARE, "posterior")
-    auxiliary = auxiliary_evidence(prepared)
+    auxiliary = _auxiliary(prepared)
     evidence = Evidence.of(library, auxiliary)
     result = posterior(evidence)
     # The first posterior names sets that are worth a joint refinement, which is expensive.
@@ -296,6 +287,21 @@ def weighed(prepared: PreparedRuns, report: Report = silent) -> tuple[Library, E
         return library, evidence, result
     evidence = Evidence.of(refined, auxiliary)
     return refined, evidence, posterior(evidence)
+
+
+def _auxiliary(prepared: PreparedRuns) -> dict[str, float]:
+    """Return log likelihood ratios of causes from evidence other than the mean torque, by label.
+
+    It is the part of the torque that cuffs and drives share, for effects with ``cuff_coherence``. A
+    rhythm that is fitted explains some of it too.
+    """
+    ratios = cuff_coherence(prepared.runs, prepared.residuals)
+    return {
+        effect(joint=joint).label: float(ratio)
+        for effect in EFFECTS
+        if effect.cuff_coherence
+        for joint, ratio in zip(prepared.baseline.joints, ratios, strict=True)
+    }
 
 
 def _router(prepared: PreparedRuns) -> tuple[ResidualShares, ...]:

@@ -1,6 +1,6 @@
 """Build ``candidates/1``: every set of causes and laws that was weighed, and its verdict."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from typing import Any
 
 import numpy as np
@@ -19,45 +19,52 @@ ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "abso
 
 def candidates(d: Diagnosis) -> pd.DataFrame:
     """Return every set that was weighed, the named one first, then by probability."""
+    machine, library, posterior = d.baseline.machine, d.selected.library, d.selected.posterior
+    weighed = {} if posterior is None else posterior.by_labels
     # The empty set is no row; its probability is in the verdict.
-    rows = [_row(d, labels, p) for labels, p in _weighed(d).items() if labels]
+    rows = [_row(d, labels, *_judged(d, labels, p), p) for labels, p in weighed.items() if labels]
     rows += [
-        _absorbed(d, effect.name, joint, into)
+        _row(
+            d,
+            {f"{effect.name}@{joint}"},
+            "absorbed",
+            f"it is part of {into} and cannot be separated from it",
+        )
         for effect in EFFECTS
-        for joint, into in _taken_up(effect, d.baseline.machine).items()
+        for joint, into in _taken_up(effect, machine).items()
     ]
-    rows += [_left_out(d, label) for label in _not_fitted(d)]
+    left_out = "its torque is infinite, or rigid body and friction explain all of it"
+    rows += [
+        _row(d, {label}, "rejected", f"it was left out: {left_out}")
+        for label in (library.left_out if library else ())
+    ]
     rows.sort(key=lambda r: (ORDER[r["verdict"]], -(r["probability"] or 0.0)))
     frame = pd.DataFrame(rows)
     frame.insert(0, "rank", range(1, len(frame) + 1))
     return frame
 
 
-def _weighed(d: Diagnosis) -> dict[frozenset[str], float]:
-    """Return the probability of each set of labels."""
-    return {} if d.selected.posterior is None else d.selected.posterior.by_labels
-
-
-def _row(d: Diagnosis, labels: frozenset[str], probability: float) -> dict[str, Any]:
+def _row(
+    d: Diagnosis, labels: Set[str], verdict: str, reason: str, probability: float | None = None
+) -> dict[str, Any]:
+    """Return the row of a set; one that was not weighed has no numbers."""
     # Only the named set and its subsets by one are fitted in full; there are thousands of others.
-    fitted = _fitted(d, labels)
+    fitted = None if probability is None else _fitted(d, labels)
+    own = gain(d.before.errors, fitted.errors) if fitted else None
     row: dict[str, Any] = {
         "causes": sorted(labels),
         "parameters": _parameters(fitted, d) if fitted else [],
-        "train_score": _log_odds(d, probability),
-        "gain_nm": None,
-        "gain_low_nm": None,
-        "gain_high_nm": None,
+        "train_score": _log_odds(d, probability or 0.0),
+        "gain_nm": own and own.value,
+        "gain_low_nm": own and own.low,
+        "gain_high_nm": own and own.high,
         "probability": probability,
     }
     for j, joint in enumerate(d.baseline.machine.joints):
-        row[joint.column("rmse_before")] = float(d.before.errors.rms[j])
+        before = None if probability is None else float(d.before.errors.rms[j])
+        row[joint.column("rmse_before")] = before
         row[joint.column("rmse_after")] = float(fitted.errors.rms[j]) if fitted else None
-    if fitted:
-        own = gain(d.before.errors, fitted.errors)
-        row |= {"gain_nm": own.value, "gain_low_nm": own.low, "gain_high_nm": own.high}
-    row["verdict"], row["reason"] = _judged(d, labels, probability)
-    return row
+    return row | {"verdict": verdict, "reason": reason}
 
 
 def _log_odds(d: Diagnosis, probability: float) -> float | None:
@@ -68,7 +75,7 @@ def _log_odds(d: Diagnosis, probability: float) -> float | None:
     return float(np.log(probability) - np.log(nothing))
 
 
-def _fitted(d: Diagnosis, labels: frozenset[str]) -> ValidationResult | None:
+def _fitted(d: Diagnosis, labels: Set[str]) -> ValidationResult | None:
     """Return the fit of a set: the named one, or it without one cause; else None."""
     named = frozenset(d.causes)
     if labels == named:
@@ -129,42 +136,3 @@ def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
         joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
     }
     return {joint: into for joint, into in by_joint.items() if into}
-
-
-def _not_fitted(d: Diagnosis) -> tuple[str, ...]:
-    return () if d.selected.library is None else d.selected.library.left_out
-
-
-def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
-    return _without_numbers(
-        d,
-        label,
-        "rejected",
-        "it was left out: its torque is infinite, or rigid body and friction explain all of it",
-    )
-
-
-def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
-    return _without_numbers(
-        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be separated from it"
-    )
-
-
-def _without_numbers(d: Diagnosis, label: str, verdict: str, reason: str) -> dict[str, Any]:
-    blank = {
-        j.column(f"rmse_{when}"): None
-        for j in d.baseline.machine.joints
-        for when in ("before", "after")
-    }
-    return {
-        "causes": [label],
-        "parameters": [],
-        "train_score": None,
-        "gain_nm": None,
-        "gain_low_nm": None,
-        "gain_high_nm": None,
-        "probability": None,
-        **blank,
-        "verdict": verdict,
-        "reason": reason,
-    }

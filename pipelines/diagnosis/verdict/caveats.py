@@ -197,9 +197,8 @@ def _one_run(d: Diagnosis) -> list[str]:
 def _one_kind(d: Diagnosis) -> list[str]:
     """Report the limits of runs of one kind."""
     kinds = {run.motion.run for run in d.fitted_runs}
-    if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
-        return []  # other machines have no wearer
-    if kinds == {"exo_alone"}:
+    # Other machines have no wearer.
+    if kinds == {"exo_alone"} and d.baseline.machine.is_exoskeleton:
         return [
             "every run is without a person: effects of a person do not show, and a shifted zero "
             "looks like a mass off the axis. Record with_human runs as well"

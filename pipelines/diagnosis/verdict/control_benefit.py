@@ -23,9 +23,6 @@ CASE = SimulateSettings()
 """The reference case of docs/simulation.md: the same for every machine, so that numbers can be
 compared."""
 
-# Settings of `exoid simulate` that do not change the loop.
-NOT_OF_THE_LOOP = {"sweep_nm_s_rad", "figures"}
-
 
 def control(d: Diagnosis) -> dict[str, Any]:
     """Return tracking error and peak torque of the adaptive loop, as JSON objects.
@@ -40,7 +37,8 @@ def control(d: Diagnosis) -> dict[str, Any]:
         "controller": {
             "type": "rbf",
             "reference": "gait",
-            **CASE.model_dump(mode="json", exclude=NOT_OF_THE_LOOP),
+            # These settings of `exoid simulate` do not change the loop.
+            **CASE.model_dump(mode="json", exclude={"sweep_nm_s_rad", "figures"}),
         },
         "without": None,
         "with": None,

@@ -1,5 +1,7 @@
 """Write the summary: the verdict in one or two sentences, for the first look."""
 
+from typing import Any
+
 from pipelines.contracts.joints import the
 from pipelines.contracts.verdict import Cause, Finding
 from pipelines.diagnosis.criteria import CRITERIA
@@ -8,7 +10,6 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings
-from pipelines.diagnosis.verdict.unexplained import Unexplained
 from pipelines.wording.label import amount, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import UNLISTED
 
@@ -18,7 +19,7 @@ CLOSEST = 0.05
 """Least probability of a cause that is reported as the closest."""
 
 
-def summary(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) -> str:
+def summary(d: Diagnosis, causes: list[Cause], remainder: dict[str, Any] | None) -> str:
     """Return the verdict's first sentences."""
     if d.data.spoilt:
         return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
@@ -33,10 +34,9 @@ def _noise_without_periods(d: Diagnosis) -> str:
     """Report noise that is estimated without differences of periods."""
     # Noise of the training runs weighs causes; that of the validation runs is the floor.
     weighed, floor = d.noise.from_periods, d.floor.from_periods
-    if weighed and floor:
+    # Where all runs were searched, some of them hold periods.
+    if floor and (weighed or d.sought_on_all):
         return ""
-    if floor and d.sought_on_all:
-        return ""  # the runs that were searched hold periods
     if floor:
         return (
             " No training run holds two periods, so the noise that weighs causes is estimated from"
@@ -66,9 +66,9 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
     return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 
-def finding_in_words(d: Diagnosis, causes: list[Cause], remainder: Unexplained | None) -> str:
+def finding_in_words(d: Diagnosis, causes: list[Cause], remainder: dict[str, Any] | None) -> str:
     """Return the finding in words, without remarks on floor and faults."""
-    described = f" {remainder.description}" if remainder and remainder.description else ""
+    described = f" {remainder['description']}" if remainder and remainder["description"] else ""
     if d.status == "nothing_missing":
         return f"{_nothing(d)}{described}"
     if d.status == "unknown_cause":

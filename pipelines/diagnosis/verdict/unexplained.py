@@ -1,6 +1,5 @@
 """Describe the residual of the named causes, and extend the model by a smooth term."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,31 +14,7 @@ MENTIONED = 5
 """Most variables that the verdict lists for the remaining error."""
 
 
-@dataclass(frozen=True)
-class Unexplained:
-    """The residual that no named cause explains."""
-
-    description: str
-    depends_on: list[Dependence]
-    smooth: str
-    """The smooth term in words."""
-    rmse_nm: dict[str, float]
-    """Of the model with the smooth term, on validation runs. It is measured, as the term may do
-    harm there."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the entry of the verdict."""
-        return {
-            "description": self.description,
-            "depends_on": [
-                {"joint": d.joint, "variable": d.variable, "share": d.share}
-                for d in self.depends_on
-            ],
-            "smooth_term": {"what": self.smooth, "rmse_nm": self.rmse_nm},
-        }
-
-
-def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
+def unexplained(d: Diagnosis, dependences: list[Dependence]) -> dict[str, Any]:
     """Describe the residual of the validation runs, and fit a smooth term to the training runs.
 
     Parameters
@@ -58,10 +33,13 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> Unexplained:
         r - np.nan_to_num(term.torque(run))
         for run, r in zip(d.validate, d.after.residuals, strict=True)
     ]
-    rms = errors_of(d.validate, joints).rms
-    return Unexplained(
-        description=describe(d.baseline.machine, dependences, above, term.together),
-        depends_on=dependences[:MENTIONED],
-        smooth=term.describe(),
-        rmse_nm={joint: float(v) for joint, v in zip(d.baseline.joints, rms, strict=True)},
-    )
+    rms = zip(d.baseline.joints, errors_of(d.validate, joints).rms.tolist(), strict=True)
+    return {
+        "description": describe(d.baseline.machine, dependences, above, term.surfaces),
+        "depends_on": [
+            {"joint": one.joint, "variable": one.variable, "share": one.share}
+            for one in dependences[:MENTIONED]
+        ],
+        # Its error is measured, as the term may do harm on the validation runs.
+        "smooth_term": {"what": term.describe(), "rmse_nm": dict(rms)},
+    }

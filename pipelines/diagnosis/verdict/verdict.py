@@ -1,9 +1,8 @@
 """Build ``verdict.json``: the diagnosis as its contract has it."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
-
-import pandas as pd
 
 from pipelines.contracts.verdict import Cause
 from pipelines.diagnosis.dependence.explained_share import Dependence, dependences
@@ -17,9 +16,8 @@ from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.diagnosis.verdict.error_budget import error_budget
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.summary import finding_in_words, floor_from, summary
-from pipelines.diagnosis.verdict.tie_reasons import tie_between
 from pipelines.diagnosis.verdict.unexplained import unexplained
-from pipelines.effects import Effect
+from pipelines.effects import Effect, Tie
 from pipelines.estimation.angle_noise import CUTOFF_HZ
 from pipelines.estimation.regression import mask_in_words
 
@@ -43,7 +41,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "sought_on": "all" if d.sought_on_all else "train",
         "fitted_to": "all" if d.fitted_to_all else "train",
         "router": {
-            joint.name: shares.as_json()
+            joint.name: asdict(shares)
             for joint, shares in zip(joints, d.selected.router, strict=True)
         },
         "posterior": _posterior(d),
@@ -60,12 +58,15 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "depends_on": _depends_on(before, after),
         "reversals": [_reversal(d, one) for one in d.reversals],
         "units": {j.name: {"torque": j.unit("torque"), "angle": j.unit("angle")} for j in joints},
-        "known": [_known(d, effect) for effect in d.baseline.known],
+        "known": [
+            {"effect": e.name, "joint": e.joint, "parameters": _parameters(d, e)}
+            for e in d.baseline.known
+        ],
         "causes": causes,
         "data_faults": [
             {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
         ],
-        "residual": remainder.as_json() if remainder else None,
+        "residual": remainder,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
     }
@@ -112,20 +113,19 @@ def _posterior(d: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _known(d: Diagnosis, effect: Effect) -> dict[str, Any]:
-    rows = _rows(d.parameters, effect)
-    return {"effect": effect.name, "joint": effect.joint, "parameters": _values(rows)}
-
-
-def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _parameters(d: Diagnosis, effect: Effect) -> list[dict[str, Any]]:
+    """Return the fitted parameters of an effect with their intervals."""
+    table = d.parameters
+    # A cause of the whole machine has no joint, and pandas does not find None equal to None.
+    here = table["joint"].isna() if effect.joint is None else table["joint"] == effect.joint
     return [
         {
-            "name": r["name"],
-            "value": r["value"],
-            "unit": r["unit"],
-            "ci95": [r["ci95_low"], r["ci95_high"]],
+            "name": row["name"],
+            "value": float(row["value"]),
+            "unit": row["unit"],
+            "ci95": [float(row["ci95_low"]), float(row["ci95_high"])],
         }
-        for r in rows
+        for row in table[(table["effect"] == effect.name) & here].to_dict("records")
     ]
 
 
@@ -156,7 +156,7 @@ def _cause(d: Diagnosis, named: NamedCause) -> dict[str, Any]:
         "joint": effect.joint,
         "side": str(effect.side),
         "probability": named.probability,
-        "parameters": _values(_rows(d.parameters, effect)),
+        "parameters": _parameters(d, effect),
         "gain": {
             "rmse_reduction_nm": gained.value,
             "ci95": [gained.low, gained.high],
@@ -170,18 +170,15 @@ def _cause(d: Diagnosis, named: NamedCause) -> dict[str, Any]:
     }
 
 
-def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
-    # A cause of the whole machine has no joint, and pandas does not find None equal to None.
-    here = frame["joint"].isna() if effect.joint is None else frame["joint"] == effect.joint
-    numbers = ("value", "ci95_low", "ci95_high")
-    return [
-        {str(k): float(v) if k in numbers else v for k, v in row.items()}
-        for row in frame[(frame["effect"] == effect.name) & here].to_dict("records")
-    ]
-
-
 def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
-    tie = tie_between(effect, rival)
+    """Return a tie, and why these two are not separated: for any data or on this motion only."""
+    # Either effect may list the tie.
+    tie = effect.ties.get(rival.name) or rival.ties.get(effect.name)
+    tie = tie or Tie(
+        "on this motion the difference of their torques is below the noise, or other parameters"
+        " compensate it",
+        f"for the one: {effect.confirm}; for the other: {rival.confirm}",
+    )
     return {
         "effect": rival.name,
         "joint": rival.joint,

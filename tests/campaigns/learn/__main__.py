@@ -8,13 +8,13 @@ import os
 import time
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.reference import MEASURED, keep
+from pipelines.diagnosis.reference import MEASURED
 from tests.campaigns.blind.seeds import RANGES
 from tests.campaigns.learn.evidence import ONE_THREAD, write_evidence
 
@@ -128,6 +128,14 @@ def sensitivity(
     chosen = [w for w in worlds.split(",") if w]
     keep(TITLE, measured(out.resolve(), chosen, most, workers, CRITERIA))
     typer.echo(f"written to {MEASURED}")
+
+
+def keep(title: str, measured: dict[str, Any]) -> None:
+    """Write a measurement of the criteria as a section: ``about``, ``columns`` and ``rows``."""
+    measurements = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
+    MEASURED.write_text(
+        json.dumps(measurements, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
 
 
 @app.command("look-alikes")

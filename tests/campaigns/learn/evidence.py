@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from pipelines.diagnosis.criteria import BEFORE_EVIDENCE, CRITERIA
 from tests.campaigns.blind.cases import Case
 from tests.campaigns.blind.examine import Folders, neutral_name, prepare
+from tests.campaigns.learn.packing import packed
 
 SOURCES = (
     "pipelines",
@@ -102,7 +103,9 @@ def _one(case: Case, root: Path, revision: str, keep: bool) -> str:
 
 def evidence_row(recordings: Path) -> dict[str, Any]:
     """Return the evidence of a folder of recordings, packed; why there is none in ``refused``."""
-    from pipelines.diagnosis.selection.selection import evidence_of
+    from pipelines.diagnosis.evidence.prepared_runs import prepare as prepared
+    from pipelines.diagnosis.selection.selection import weighed
+    from pipelines.diagnosis.training_data import training_data
     from pipelines.errors import ExoidError
     from pipelines.mechanics.read import read_motions
     from pipelines.settings.filter import FilterSettings
@@ -111,7 +114,9 @@ def evidence_row(recordings: Path) -> dict[str, Any]:
     empty = {"gram": b"", "right": b"", "text": "", "refused": ""}
     try:
         motions = read_motions(sorted(recordings.glob("*.parquet")), FilterSettings(), None)
-        row = empty | evidence_of(motions).packed()
+        data = training_data(motions)
+        _, evidence, _ = weighed(prepared(data.train, data.baseline))
+        row = empty | packed(evidence)
     except ExoidError as error:
         row = empty | {"refused": str(error)}
     return row | {"seconds": time.process_time() - began}

@@ -20,6 +20,7 @@ from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 from pipelines.diagnosis.selection.posterior import Posterior, Set, posterior
 from pipelines.diagnosis.selection.prior import features, of_set
+from tests.campaigns.learn.packing import unpacked
 from tests.campaigns.learn.truth import Right, right_sets
 
 SETS = 80
@@ -64,7 +65,7 @@ def revisions(sessions: Iterable[Session]) -> str:
 
 def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
     """Return a session with the sets that matter under some criteria."""
-    truth, evidence = json.loads(row["truth"]), Evidence.unpacked(row)
+    truth, evidence = json.loads(row["truth"]), unpacked(row)
     right = right_sets(truth)
     kept = _kept(posterior(evidence, criteria), right)
     return Session(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,16 +14,9 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE
 from pipelines.plotting.style import NOISE
 from pipelines.signals.binned_mean import binned_mean
-
-DOTS = 2000
-"""Largest number of dots: more hide the shape, and take long to draw."""
-LINES = ("-", "--", ":", "-.")
-"""Line styles of the parts' means."""
-TALLEST = 99.0
-"""Percentile of the residual's size that a panel shows."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +114,7 @@ def _along_tone(
     """Fold time at the strongest tone in residuals (m,), each run from its tone's crest."""
     # ``tone`` reads column j of several; the others are copies that it does not read.
     wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
-    frequency, _ = tone(runs, wide, j)
+    frequency, *_ = tone(runs, wide, j)
     x = []
     for run, residual in zip(runs, residuals, strict=True):
         known = run.usable[:, j]
@@ -144,8 +138,9 @@ def reach(*residuals: NDArray) -> float:
     float
         On either side of zero, N·m.
     """
+    # A few outliers would flatten the rest.
     return 1.1 * max(
-        (float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0
+        (float(np.percentile(np.abs(e), 99.0)) for e in residuals if len(e)), default=1.0
     )
 
 
@@ -165,25 +160,18 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
     """
     axis.axhspan(-floor, floor, color=NOISE, alpha=0.5, lw=0)
     axis.axhline(0, color="black", lw=0.6)
-    step = max(1, len(seen.x) // DOTS)
+    # More dots than about 2000 hide the shape, and take long to draw.
+    step = max(1, len(seen.x) // 2000)
     if len(seen.x):
         # A few outliers would squeeze all other dots.
         low, high = np.percentile(seen.x, [0.2, 99.8])
         axis.set_xlim(low - 0.02 * (high - low) - 1e-9, high + 0.02 * (high - low) + 1e-9)
     kinds = [(seen.before, BEFORE, 0.6)] + [(seen.after, AFTER, 0.4)] * changed
     for residual, colour, alpha in kinds:
-        axis.plot(
-            seen.x[::step],
-            residual[::step],
-            ".",
-            ms=1.8,
-            mew=0,
-            color=colour,
-            alpha=alpha,
-            rasterized=True,
-        )
+        style: dict[str, Any] = {"color": colour, "alpha": alpha, "rasterized": True}
+        axis.plot(seen.x[::step], residual[::step], ".", ms=1.8, mew=0, **style)
     for residual, colour, _ in kinds:
-        for part, line in zip(seen.parts, cycle(LINES)):
+        for part, line in zip(seen.parts, cycle(("-", "--", ":", "-."))):
             if part.any():
                 x = seen.x[part]
                 mean = binned_mean(x, residual[part], x.min(), x.max())

@@ -11,17 +11,12 @@ from matplotlib.patches import Patch
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.error_budget import FLOOR, REPEATS, UNEXPLAINED, WANDERS
+from pipelines.diagnosis.verdict.figures.shared import heading
 from pipelines.plotting.style import BLUE, CAUSES, NOISE
 from pipelines.plotting.style import WANDERS as SCATTER
 from pipelines.wording.label import SHARES, in_words
 
 COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, UNEXPLAINED: BLUE}
-ROOM = 0.07
-"""Share of a bar from which its number fits in it."""
-SMALL = 0.095
-"""Root mean square below which two digits are written, not two decimals."""
-NEGLIGIBLE = 0.005
-"""Share of a bar below which its line reads "none"."""
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -50,7 +45,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     axes[-1, 0].set_xlabel(
         f"mean square of the {last.effort} error on data no fit has seen, ({last.unit('torque')})²"
     )
-    drawn.suptitle("What the error is made of", x=0.02, ha="left", fontweight="bold")
+    heading(drawn, "What the error is made of")
     drawn.tight_layout()
     return drawn
 
@@ -96,7 +91,7 @@ def stack(
         # A cause that raises the error must not shorten the bars of the others.
         start = right if width >= 0 else left
         axis.barh(row, width, left=start, color=colours[key], height=0.7, edgecolor="white", lw=0.5)
-        if abs(width) > ROOM * whole:
+        if abs(width) > 0.07 * whole:  # its number fits in it
             axis.text(
                 start + 0.5 * width,
                 row,
@@ -133,20 +128,13 @@ def rms(share: float) -> str:
     str
         N·m.
     """
-    root = np.sqrt(abs(share))
-    return (
-        f"{'−' if share < 0 else ''}{root:.2f}"
-        if root > SMALL
-        else f"{'−' if share < 0 else ''}{root:.2g}"
-    )
+    root, sign = np.sqrt(abs(share)), "−" if share < 0 else ""
+    # Of a small number two decimals would be one digit or none.
+    return f"{sign}{root:.2f}" if root > 0.095 else f"{sign}{root:.2g}"
 
 
 def _line(words: str, share: float, total: float, unit: str) -> str:
-    if abs(share) < NEGLIGIBLE * total:
+    if abs(share) < 0.005 * total:
         return f"{words}: none"
-    if share < 0:
-        return (
-            f"{words}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the"
-            " square"
-        )
-    return f"{words}: {rms(share)} {unit} rms, {share / total:.0%} of the square"
+    worse = "makes it worse by " if share < 0 else ""
+    return f"{words}: {worse}{rms(abs(share))} {unit} rms, {abs(share) / total:.0%} of the square"

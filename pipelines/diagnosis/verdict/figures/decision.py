@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.figures.shared import legend_below
 from pipelines.diagnosis.verdict.findings_in_words import family_of
 from pipelines.plotting.style import BLUE, GREY, NOISE, WANDERS
 from pipelines.wording.findings import PARTS, VARIABLES, searched_runs
@@ -24,13 +25,10 @@ COLOURS = {
     "noise": NOISE,
     "wanders": WANDERS,
     "between_runs": "#5b87e5",
-    "repeats": BLUE,
     "unsplit": GREY,
+    "repeats": BLUE,
 }
 """Colours of the residual's parts: the more of it a model could explain, the darker."""
-DARK = ("repeats", "unsplit", "between_runs")
-"""Parts with white numbers."""
-ORDER = ("noise", "wanders", "between_runs", "unsplit", "repeats")
 FAMILIES = {
     "person": "#3b0764",
     "transmission": "#7c2d12",
@@ -47,36 +45,19 @@ UNLISTED = "////"
 SHOWN, LEAST = 6, 0.01
 """Largest number of sets in the figure, and the least probability of one: the others share one
 bar."""
-TEXT = 0.08
-"""Share of a bar from which its number fits in it."""
-PREDICTS = 0.05
-"""Least share that a variable must predict to be shown, except the usual ones."""
-OTHERS = 3
-"""Number of variables besides the usual ones."""
-SHORT = {"acceleration": "accel-\neration"}
-"""Names that need two lines."""
 NEGLIGIBLE = 0.01
 """Share below which a part has no entry in the legend."""
 PERSON = "of it with a person only"
 LABEL = 34
 """Characters in a line of a label."""
-LINE_IN, SMALLEST_IN, FEWEST = 0.17, 4.4, 17
-"""Height of a line of a label, least height of the figure, and its least number of lines."""
-SHADES = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
-NOTHING = "nothing is missing"
-PROBABILITY = (
-    "probability of each set of causes and laws; a cause's own is the sum over its sets\n"
-    "bold: named, or tied with it"
-)
-BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
-AGAINST = " (validation runs against it)"
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw the residual's shares on the left, and the posterior over sets on the right."""
     bars = _bars(d)
     lines = sum(_height(bar) for bar in bars)
-    drawn = plt.figure(figsize=(11, max(SMALLEST_IN, LINE_IN * lines + 1.3)), layout="constrained")
+    # A line of a label is 0.17 inches high.
+    drawn = plt.figure(figsize=(11, max(4.4, 0.17 * lines + 1.3)), layout="constrained")
     grid = drawn.add_gridspec(2, 2, width_ratios=[1, 1.1], height_ratios=[1.25, 1])
     _shares(drawn.add_subplot(grid[0, 0]), verdict)
     _dependence(drawn.add_subplot(grid[1, 0]), verdict)
@@ -91,26 +72,19 @@ def _shares(axis: Axes, verdict: Verdict) -> None:
     router = verdict.router
     for row, shares in enumerate(router.values()):
         start = 0.0
-        for part in ORDER:
+        for part, colour in COLOURS.items():
             share = getattr(shares, part) or 0.0
-            axis.barh(row, share, left=start, color=COLOURS[part], **BAR)
-            if share > TEXT:
+            axis.barh(row, share, 0.6, start, color=colour, edgecolor="white", lw=0.8)
+            if share > 0.08:  # its number fits in it
                 _number(axis, row, start, share, part)
             if share > NEGLIGIBLE:
-                seen[PARTS[part]] = Patch(color=COLOURS[part])
+                seen[PARTS[part]] = Patch(color=colour)
             start += share
             # What shows with a person only is a part of what repeats, at its right end.
             person = min(shares.with_person_only or 0.0, share) if part == "repeats" else 0.0
             if person > NEGLIGIBLE:
                 axis.barh(
-                    row,
-                    person,
-                    left=start - person,
-                    height=0.6,
-                    fill=False,
-                    hatch="..",
-                    edgecolor="white",
-                    lw=0,
+                    row, person, 0.6, start - person, fill=False, hatch="..", ec="white", lw=0
                 )
                 seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
     units = {joint: of["torque"] for joint, of in verdict.units.items()}
@@ -123,15 +97,8 @@ def _shares(axis: Axes, verdict: Verdict) -> None:
     axis.set_xlabel(
         f"share of the mean square, 0.1 s averages, {searched_runs(verdict)}", fontsize=8
     )
-    words = [one for one in (*map(PARTS.get, ORDER), PERSON) if one in seen]
-    axis.legend(
-        [seen[one] for one in words],
-        words,
-        loc="upper left",
-        bbox_to_anchor=(-0.02, -0.32),
-        fontsize=8,
-        ncols=2,
-    )
+    words = [*(PARTS[part] for part in COLOURS), PERSON]
+    legend_below(axis, {one: seen[one] for one in words if one in seen}, 0.32, 2)
     _title(axis, "Does the error of rigid body and friction repeat?")
 
 
@@ -143,7 +110,7 @@ def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None
         ha="center",
         va="center",
         fontsize=8,
-        color="white" if part in DARK else "black",
+        color="black" if part in ("noise", "wanders") else "white",
         zorder=3,
         bbox={"facecolor": COLOURS[part], "edgecolor": "none", "pad": 1},
     )
@@ -158,12 +125,17 @@ def _dependence(axis: Axes, verdict: Verdict) -> None:
     variables = _variables(ranked)
     # A joint may lack a variable, such as a temperature.
     shares = np.array([[of.get(name, np.nan) for name in variables] for of in ranked.values()])
-    axis.imshow(shares, cmap=SHADES, vmin=0.0, vmax=1.0, aspect="auto")
+    shades = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
+    axis.imshow(shares, cmap=shades, vmin=0.0, vmax=1.0, aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
         text = "–" if np.isnan(share) else f"{share:.0%}"
         colour = "white" if share > 0.5 else "black"
         axis.text(column, row, text, ha="center", va="center", fontsize=8, color=colour)
-    words = [SHORT.get(name, name.replace("_", "\n")) for name in variables]
+    # Long names need two lines.
+    words = [
+        "accel-\neration" if name == "acceleration" else name.replace("_", "\n")
+        for name in variables
+    ]
     axis.set_xticks(range(len(variables)), words, fontsize=8)
     axis.set_yticks(range(len(ranked)), list(ranked))
     axis.grid(visible=False)
@@ -179,8 +151,8 @@ def _variables(ranked: Mapping[str, Mapping[str, float]]) -> list[str]:
     every = dict.fromkeys(name for of in ranked.values() for name in of if name != "phase")
     most = {name: max(of.get(name, 0.0) for of in ranked.values()) for name in every}
     usual = [name for name in VARIABLES if name in every]
-    others = [name for name in every if name not in usual and most[name] >= PREDICTS]
-    return usual + sorted(others, key=lambda name: -most[name])[:OTHERS]
+    others = [name for name in every if name not in usual and most[name] >= 0.05]
+    return usual + sorted(others, key=lambda name: -most[name])[:3]
 
 
 @dataclass(frozen=True)
@@ -219,13 +191,14 @@ def _bars(d: Diagnosis) -> list[Bar]:
 def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str | None, bool, bool]]:
     weighed = d.selected.posterior
     if not labels or weighed is None:
-        yield NOTHING, None, False, d.status == "nothing_missing"
+        yield "nothing is missing", None, False, d.status == "nothing_missing"
     answers = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
     against = d.selected.dropped
     # Listed causes come before laws.
     for label in sorted(labels, key=lambda one: (one.startswith(LAW), one)):
         assert weighed is not None
-        words = label_in_words(label, d.baseline.machine) + AGAINST * (label in against)
+        words = label_in_words(label, d.baseline.machine)
+        words += " (validation runs against it)" * (label in against)
         family, unlisted = family_of(label, weighed), label.startswith(LAW)
         yield fill(words, LABEL), family, unlisted, label in answers
 
@@ -248,16 +221,10 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         for words, family, unlisted, named in bar.elements:
             height = 1.3 + words.count("\n")
             colour = FAMILIES.get(str(family), GREY)
-            axis.barh(
-                top + 0.5 * height,
-                bar.probability,
-                height=height,
-                color=colour,
-                hatch=UNLISTED if unlisted else None,
-                edgecolor="white",
-                lw=0.8,
-            )
-            ticks.append((top + 0.5 * height, words, named))
+            style: dict[str, Any] = {"color": colour, "edgecolor": "white", "lw": 0.8}
+            hatch, y = UNLISTED if unlisted else None, top + 0.5 * height
+            axis.barh(y, bar.probability, height, hatch=hatch, **style)
+            ticks.append((y, words, named))
             if family:
                 families[family] = Patch(color=colour)
             top += height
@@ -268,7 +235,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     for label, (*_, named) in zip(axis.get_yticklabels(), ticks, strict=True):
         label.set_fontweight("bold" if named else "normal")
     # Without a least number of lines, few bars fill the axis.
-    axis.set_ylim(max(top, FEWEST), -0.4)
+    axis.set_ylim(max(top, 17), -0.4)
     # Beyond 1 there is only the number of a long bar.
     axis.set_xlim(0.0, 1.1)
     axis.set_xticks(np.linspace(0.0, 1.0, 6))
@@ -276,17 +243,14 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     axis.grid(axis="y", visible=False)
     axis.set_axisbelow(True)
     axis.tick_params(axis="y", length=0)
-    axis.set_xlabel(PROBABILITY, fontsize=8)
+    axis.set_xlabel(
+        "probability of each set of causes and laws; a cause's own is the sum over its sets\n"
+        "bold: named, or tied with it",
+        fontsize=8,
+    )
     if any(unlisted for bar in bars for _, _, unlisted, _ in bar.elements):
         families["unlisted law"] = Patch(facecolor=GREY, hatch=UNLISTED, edgecolor="white")
-    axis.legend(
-        families.values(),
-        families.keys(),
-        loc="upper left",
-        bbox_to_anchor=(-0.02, -0.17),
-        fontsize=8,
-        ncols=4,
-    )
+    legend_below(axis, families, 0.17, 4)
 
 
 def _title(axis: Axes, words: str) -> None:

@@ -7,16 +7,10 @@ from matplotlib.lines import Line2D
 from pipelines.contracts.verdict import Dependence, Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
-from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE
 
 SHOWN = ("angle", "speed", "load", "time", "phase")
 """Variables that are always shown; others only where they predict something."""
-SOMETHING, MOST = 0.05, 6
-"""Share from which a variable predicts something, and most variables in addition to the phase."""
-EXPLAINED = (
-    "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed: backward,"
-    " or another run."
-)
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -36,7 +30,8 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
         # A joint with fewer variables leaves axes over, which are switched off.
         for axis, one, values in zip(row, ranking, seen, strict=False):
             draw(axis, values, float(d.floor.rms[j]), height, bool(d.causes))
-            axis.set_title(_predicted(one, bool(d.causes)), fontsize=8)
+            after = f" → {one.share_after:.0%}" if d.causes else ""
+            axis.set_title(f"{one.share_before:.0%}{after}", fontsize=8)
         for axis in row[len(ranking) :]:
             axis.set_axis_off()
         row[0].set_ylabel(f"{joint} residual, {verdict.units[joint]['torque']}")
@@ -49,19 +44,18 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
         ha="left",
         fontweight="bold",
     )
-    drawn.text(0.01, 0.925, EXPLAINED, fontsize=8.5, va="top")
+    explained = (
+        "%: share of the error's variance that a curve predicts. Band: noise floor. Dashed:"
+        " backward, or another run."
+    )
+    drawn.text(0.01, 0.925, explained, fontsize=8.5, va="top")
     drawn.tight_layout(rect=(0, 0, 1, 0.94))
     return drawn
 
 
 def _shown(ranking: list[Dependence]) -> list[Dependence]:
     """Return the variables to draw, the phase last: it can imitate everything that repeats."""
-    chosen = [one for one in ranking if one.share_before > SOMETHING or one.variable in SHOWN]
+    chosen = [one for one in ranking if one.share_before > 0.05 or one.variable in SHOWN]
     phase = [one for one in chosen if one.variable == "phase"]
     others = [one for one in chosen if one.variable != "phase"]
-    kept = sorted(others, key=lambda one: -one.share_before)[:MOST]
-    return kept + phase
-
-
-def _predicted(one: Dependence, changed: bool) -> str:
-    return f"{one.share_before:.0%}" + (f" → {one.share_after:.0%}" if changed else "")
+    return sorted(others, key=lambda one: -one.share_before)[:6] + phase

@@ -17,14 +17,12 @@ DRAWN_BY = {
     "dependence": dependence.figure,
 }
 """The function that draws each of ``FIGURES`` from a diagnosis and its verdict, by file name."""
-ON_SCREEN = ("simulation", "dependence")
-"""Figures of many panels for the screen: a PDF of each takes as long as all others."""
 
 
 def draw(d: Diagnosis, checked: Verdict, folder: Path) -> None:
     """Write every figure as PNG, and those to print as PDF too."""
     with plt.rc_context(STYLE):
         for name, figure in DRAWN_BY.items():
-            save(
-                figure(d, checked), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf")
-            )
+            # Those of many panels are for the screen: a PDF of each takes as long as all others.
+            on_screen = name in ("simulation", "dependence")
+            save(figure(d, checked), folder / name, ("png",) if on_screen else ("png", "pdf"))

@@ -1,5 +1,7 @@
 """Draw replayed simulation and measurement where the baseline is worst."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
@@ -9,15 +11,10 @@ from pipelines.contracts.joints import either
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import ValidationResult
-from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
+from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE, heading
 from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
 from pipelines.plotting.style import NOISE
 from pipelines.wording.label import number
-
-NARROWEST = 8.0
-"""Width that the titles need, inches."""
-FAR_MRAD = 500.0
-"""Largest error that is shown, mrad."""
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -26,7 +23,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     drawn, axes = plt.subplots(
         4,
         len(joints),
-        figsize=(max(5.2 * len(joints), NARROWEST), 7.6),
+        figsize=(max(5.2 * len(joints), 8.0), 7.6),  # the titles need 8 inches
         sharex=True,
         squeeze=False,
         height_ratios=[2, 1.3, 2, 1.3],
@@ -34,6 +31,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     models = [("rigid body and friction", BEFORE, d.before)]
     models += [("with the causes", AFTER, d.after)] if d.causes else []
     for j, (joint, column) in enumerate(zip(joints, axes.T, strict=True)):
+        effort = d.baseline.machine.joint(joint).effort
         _measured(column[0], column[2], d, stretch, j)
         column[1].axhline(0, color="black", lw=0.6)
         column[3].axhspan(
@@ -43,10 +41,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
             f"{joint}: 1 s simulations drift {_drift(verdict, joint)}", loc="left", fontsize=9
         )
         column[2].set_title(
-            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by"
-            f" {_off(d, verdict, joint)}",
-            loc="left",
-            fontsize=9,
+            f"{joint}: {effort} is off by {_off(d, verdict, joint)}", loc="left", fontsize=9
         )
         column[-1].set_xlabel("time, s")
     for name, colour, validated in models:
@@ -55,21 +50,17 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     # A simulation that runs away would flatten all others.
     for error in axes[1]:
         low, high = error.get_ylim()
-        error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
+        error.set_ylim(max(low, -500.0), min(high, 500.0))
     angle, torque = (
         either(verdict.units[joint][quantity] for joint in joints)
         for quantity in ("angle", "torque")
     )
     where = either(joint.place for joint in d.baseline.machine.joints)
     push = either(joint.effort for joint in d.baseline.machine.joints)
-    words = (
-        f"{where}, {angle}",
-        f"{where} error, m{angle}",
-        f"{push}, {torque}",
-        f"{push} error, {torque}",
-    )
-    for row, label in zip(axes, words, strict=True):
-        row[0].set_ylabel(label)
+    axes[0, 0].set_ylabel(f"{where}, {angle}")
+    axes[1, 0].set_ylabel(f"{where} error, m{angle}")
+    axes[2, 0].set_ylabel(f"{push}, {torque}")
+    axes[3, 0].set_ylabel(f"{push} error, {torque}")
     lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
     drawn.legend(
         [h for some, _ in lines for h in some],
@@ -78,13 +69,8 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
         bbox_to_anchor=(0.01, 0.965),
         ncols=4,
     )
-    drawn.suptitle(
-        "Simulated and measured where the baseline is furthest off"
-        f" ({d.validate[stretch.run].motion.file})",
-        x=0.02,
-        ha="left",
-        fontweight="bold",
-    )
+    file = d.validate[stretch.run].motion.file
+    heading(drawn, f"Simulated and measured where the baseline is furthest off ({file})")
     axes[0, 0].set_xlim(stretch.begin, stretch.end)
     drawn.align_ylabels()
     drawn.tight_layout(rect=(0, 0, 1, 0.96))
@@ -117,15 +103,9 @@ def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int)
     run = d.validate[stretch.run]
     motion, blocks = run.motion, stretch.within(run.time)
     samples = stretch.within(motion.time)
-    angle.plot(
-        motion.time[samples],
-        motion.q[samples, j],
-        color=MEASURED,
-        lw=0.8,
-        zorder=3,
-        label="measured",
-    )
-    torque.plot(run.time[blocks], run.measured[blocks, j], color=MEASURED, lw=0.8, zorder=3)
+    style: dict[str, Any] = {"color": "black", "lw": 0.8, "zorder": 3}
+    angle.plot(motion.time[samples], motion.q[samples, j], label="measured", **style)
+    torque.plot(run.time[blocks], run.measured[blocks, j], **style)
 
 
 def _angles(

@@ -20,23 +20,19 @@ from pipelines.diagnosis.verdict.figures.budget import (
     stack,
     words_of,
 )
-from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE, legend_below
 from pipelines.effects import RUNS
 from pipelines.model import effect_named
 from pipelines.plotting.style import NOISE
 from pipelines.wording.label import in_words
 
-WIDTH = 125
-"""Characters of the summary in a line."""
-LINE_IN, BODY_IN = 0.19, 3.5
-"""Heights of a line of the summary and of the panels below it."""
-
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw the error budget, and the residual against the variable that shows the cause best."""
-    summary = textwrap.wrap(verdict.summary, WIDTH)
-    head = 0.1 + LINE_IN * len(summary)
-    height = head + BODY_IN
+    summary = textwrap.wrap(verdict.summary, 125)
+    # Heights of the summary's lines, and of the panels below them, inches.
+    head = 0.1 + 0.19 * len(summary)
+    height = head + 3.5
     drawn, (left, right) = plt.subplots(1, 2, figsize=(10, height), width_ratios=[1, 1.1])
     _budget(left, d, verdict)
     _shape(right, d, verdict)
@@ -73,14 +69,7 @@ def _budget(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
         for key in next(iter(budget.values()))
         if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())
     ]
-    axis.legend(
-        [Patch(color=colours[key]) for key in there],
-        [words_of(key, d) for key in there],
-        loc="upper left",
-        bbox_to_anchor=(-0.02, -0.2),
-        fontsize=8,
-        ncols=2,
-    )
+    legend_below(axis, {words_of(key, d): Patch(color=colours[key]) for key in there}, 0.2, 2)
 
 
 def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
@@ -93,10 +82,8 @@ def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
             key=lambda j: verdict.baseline_rmse_nm[j] / verdict.noise_floor_nm[j],
         )
         # The time at which a fault of acquisition begins is its best description.
-        variable, kinds = (
-            "time" if d.data.spoilt else verdict.depends_on[joint][0].variable,
-            RUNS,
-        )
+        variable = "time" if d.data.spoilt else verdict.depends_on[joint][0].variable
+        kinds = RUNS
     j = d.baseline.joints.index(joint)
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
@@ -105,19 +92,10 @@ def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
     axis.set_ylabel(
         f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict.units[joint]['torque']}"
     )
-    lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
-    lines += [(f"with {named}", AFTER)] if d.causes else []
-    handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [
-        Patch(color=NOISE, alpha=0.5)
-    ]
-    axis.legend(
-        handles,
-        [words for words, _ in lines] + ["noise floor"],
-        loc="upper left",
-        bbox_to_anchor=(-0.02, -0.2),
-        fontsize=8,
-    )
+    colours = {"rigid body and friction": BEFORE} | ({f"with {named}": AFTER} if named else {})
+    lines = {words: Line2D([], [], color=colour, lw=2) for words, colour in colours.items()}
+    legend_below(axis, lines | {"noise floor": Patch(color=NOISE, alpha=0.5)}, 0.2)
 
 
 def _shown_best(d: Diagnosis, verdict: Verdict) -> tuple[str, str, tuple[str, ...]]:
@@ -125,16 +103,12 @@ def _shown_best(d: Diagnosis, verdict: Verdict) -> tuple[str, str, tuple[str, ..
     first = verdict.causes[0]
     joint, effect = first.gain.joint, effect_named(first.effect)(joint=first.joint)
     # The difference of both residuals is the torque that the named causes explain.
-    runs = [
-        (run, b - a)
-        for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
-        if effect.explains(run.motion)
-    ]
+    changes = [b - a for b, a in zip(d.before.residuals, d.after.residuals, strict=True)]
+    shown = [i for i, run in enumerate(d.validate) if effect.explains(run.motion)]
+    moved, by = [d.validate[i] for i in shown], [changes[i] for i in shown]
     j = d.baseline.joints.index(joint)
-    moved, by = [run for run, _ in runs], [change for _, change in runs]
     # The phase imitates all that repeats, and so shows no cause.
     known = [v for v in VARIABLES if v.name != "phase" and knows(v, moved, j)]
-    shares = {v.name: variable_share(v, moved, by, j) for v in known} | {
-        "tone": tone(moved, by, j)[1]
-    }
+    shares = {v.name: variable_share(v, moved, by, j) for v in known}
+    shares["tone"] = tone(moved, by, j)[1]
     return joint, max(shares, key=lambda name: shares[name]), effect.acts_in
