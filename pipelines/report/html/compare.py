@@ -211,13 +211,7 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
 
 
 def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
-    """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism.
-
-    Raises
-    ------
-    InputError
-        If they differ.
-    """
+    """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism."""
     descriptions = {"": lambda session: in_words(session.joints), "mechanism ": _mechanism}
     # Equal joints are not enough: a leg that lies level has other parameters than one that hangs.
     for prefix, description in descriptions.items():
@@ -236,13 +230,7 @@ def _mechanism(session: Session) -> str | None:
 
 
 def _refuse_different_units(models: Iterable[ModelChanges]) -> None:
-    """Refuse parameters whose unit differs between the sessions.
-
-    Raises
-    ------
-    InputError
-        If a unit differs.
-    """
+    """Refuse parameters whose unit differs between the sessions."""
     for model in models:
         for change in model.changes:
             if change.first.unit != change.second.unit:

@@ -1,10 +1,7 @@
 """The parts of each joint's error, and its fall once the causes are named."""
 
-from typing import Any
-
 from pipelines.contracts.verdict import Verdict
 from pipelines.report.bars import Bar, Fall, Segment
-from pipelines.report.sections.section import Content
 from pipelines.wording.causes import any_label_in_words, shares_in_words
 from pipelines.wording.label import SHARES
 
@@ -19,20 +16,11 @@ CAUSES = 3
 """Number of colours for causes."""
 
 
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's bars of errors."""
-    verdict = content.verdict
-    if not verdict:
-        return {"falls": [], "budget": [], "with_causes": ""}
+def with_causes(verdict: Verdict) -> str:
+    """Return the title of the model with the causes."""
     # Of tied causes the model holds the most probable one.
-    which = (
-        "likeliest" if any(cause.indistinguishable_from for cause in verdict.causes) else "named"
-    )
-    return {
-        "falls": falls(verdict),
-        "budget": budget(verdict),
-        "with_causes": f"with the {which} cause{'s' * (len(verdict.causes) > 1)}",
-    }
+    tied = any(cause.indistinguishable_from for cause in verdict.causes)
+    return f"with the {'likeliest' if tied else 'named'} cause{'s' * (len(verdict.causes) > 1)}"
 
 
 def budget(verdict: Verdict) -> list[Bar]:

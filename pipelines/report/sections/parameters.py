@@ -8,7 +8,6 @@ import pandas as pd
 
 from pipelines.contracts import Table
 from pipelines.model import BASELINE
-from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
 
@@ -78,13 +77,6 @@ class Model:
     """Sentences on its method and its peculiarities."""
     angle_noise: tuple[str, ...]
     """Sentences on inertia underestimated because of noisy angles."""
-    validation: dict[str, dict[str, dict[str, float]]]
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's tables of models."""
-    shown, has_baseline = models(content.session), bool(content.session.baselines)
-    return {"has_baseline": has_baseline, "models": shown, "parameters": _side_by_side(shown)}
 
 
 def models(session: Session) -> list[Model]:
@@ -117,7 +109,7 @@ class Row:
         return min(ends), max(ends)
 
 
-def _side_by_side(shown: Sequence[Model]) -> list[Row]:
+def side_by_side(shown: Sequence[Model]) -> list[Row]:
     """Return each parameter of some models with its estimates."""
     by_key: dict[tuple[str, str, str, str], dict[int, Estimate]] = {}
     for number, model in enumerate(shown):
@@ -143,7 +135,6 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
         ),
         unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
         **{key: tuple(map(str, about.get(key) or ())) for key in SENTENCES},
-        validation=about.get("validation") or {},
     )
 
 
@@ -158,14 +149,11 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
     )
     # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
-    names = {key: row[key] for key in ("effect", "name", "symbol", "unit")}
-    numbers: dict[str, Any] = {
-        "value": float(row["value"]),
-        "low": low,
-        "high": high,
-    }
-    each_run = bool(row.get("each_run"))
-    return Estimate(**names, **numbers, joint=joint, run=run, each_run=each_run)
+    return Estimate(
+        *(row[key] for key in ("effect", "name", "symbol")),
+        *(joint, run, row["unit"], float(row["value"]), low, high),
+        each_run=bool(row.get("each_run")),
+    )
 
 
 def _method(method: Any) -> str:

@@ -1,14 +1,10 @@
-"""Find when a joint stands still, and write which errors the causes increase."""
-
-from typing import Any
+"""When a joint stands still."""
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.report.sections.section import Content
-from pipelines.wording.increased_errors import increased_errors
 
 SLOW = 0.1
 """Share of its rms speed below which a joint counts as standing."""
@@ -36,10 +32,3 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
     # One slow stretch excludes its whole window, whose error lasts to the window's end.
     return ~np.isin(windows, windows[span:][within & slow])
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's sentences on increased errors."""
-    session = content.session
-    verdict = session.verdict
-    return {"worse": increased_errors(verdict, session.joints) if verdict else []}
