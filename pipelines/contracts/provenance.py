@@ -48,7 +48,6 @@ def describe(
 @cache
 def _software() -> dict[str, str]:
     """Return the versions of Python and of the libraries that results depend on."""
-    # Libraries that compute or write results.
     libraries = ("numpy", "scipy", "numba", "pandas", "pyarrow")
     return {"python": platform.python_version()} | {name: version(name) for name in libraries}
 

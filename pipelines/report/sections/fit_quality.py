@@ -44,41 +44,52 @@ def drawn(model: str, rows: pd.DataFrame) -> DrawnTable:
 
 def torque_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each run and joint: torque, and the residual of each model."""
-    if session.residuals is None:
-        return
-    frame = session.residuals.frame
     for run in run_names(session):
-        of_run = frame[frame["file"] == run]
+        rows = residuals_of(session, run)
+        measured = rows[rows["model"] == rows["model"].iloc[0]]
+        models = [drawn(model, rows[rows["model"] == model]) for model in models_of(session)]
         for joint in session.joints:
-            yield _torque_chart(session, run, joint, of_run, session.noise_floor(joint))
+            floor = session.noise_floor(joint)
+            yield Chart(
+                key=f"torque-{run.removesuffix('.parquet')}-{joint.name}",
+                title=f"{joint.name} {joint.effort}",
+                caption=(
+                    "Measured and computed from the motion, in the blocks that were fitted; below,"
+                    " each model's error away from reversals"
+                    f"{', on the band of the noise floor' if floor else ''}."
+                ),
+                x_label="time, s",
+                x=measured["time_s"].to_numpy(),
+                panels=torque_panels(joint, measured, models, floor),
+                group=run,
+            )
 
 
-def _torque_chart(
-    session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None
-) -> Chart:
-    measured = frame[frame["model"] == frame["model"].iloc[0]]
-    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
-    return Chart(
-        key=f"torque-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {joint.effort}",
-        caption=(
-            "Measured and computed from the motion, in the blocks that were fitted; below, each"
-            " model's error away from reversals"
-            f"{', on the band of the noise floor' if floor else ''}."
-        ),
-        x_label="time, s",
-        x=measured["time_s"].to_numpy(),
-        panels=torque_panels(joint, measured, models, floor),
-        group=run,
-    )
+def residuals_of(session: Session, run: str) -> pd.DataFrame:
+    """Return the residuals of a run; no rows if it has none."""
+    if session.residuals is None:
+        return pd.DataFrame({"file": []})
+    frame = session.residuals.frame
+    return frame[frame["file"] == run]
 
 
 def angle_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart of simulated angles for each replayed run and joint."""
-    for run, replays in replayed(session).items():
-        tables = {model: session.table(one).frame for model, one in replays.items()}
+    for run, files in replayed(session).items():
+        replays = [drawn(model, session.table(one).frame) for model, one in files.items()]
         for joint in session.joints:
-            yield _angle_chart(run, joint, tables)
+            yield Chart(
+                key=f"angle-{run.removesuffix('.parquet')}-{joint.name}",
+                title=f"{joint.name} {joint.place} in simulations of one second",
+                caption=(
+                    f"Each second the model starts from the measured state and receives the"
+                    f" recorded {joint.effort}; below, its error."
+                ),
+                x_label="time, s",
+                x=replays[0].rows["time_s"].to_numpy(),
+                panels=window_panels(joint, replays),
+                group=run,
+            )
 
 
 def replayed(session: Session, kind: str = "windows") -> dict[str, dict[str, Artifact]]:
@@ -143,10 +154,9 @@ def _stated_error(replay: Artifact | None, key: str, joint: Joint, factor: float
 
 def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     """Yield a run's rms torque error away from reversals, and in all blocks that were fitted."""
-    if session.residuals is None:
+    rows = residuals_of(session, run)
+    if not len(rows):
         return
-    rows = session.residuals.frame
-    rows = rows[rows["file"] == run]
     floor = session.noise_floor(joint)
     grew_away_from_reversals = False
     # In this order, as the second note depends on the first result.
@@ -182,24 +192,3 @@ def _while_moving(
     # If all windows count, or none, the row would repeat another or be empty.
     if 0 < kept < of:
         yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
-
-
-def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
-    first = next(iter(tables.values()))
-    replays = [drawn(model, table) for model, table in tables.items()]
-    return Chart(
-        key=f"angle-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {joint.place} in simulations of one second",
-        caption=(
-            f"Each second the model starts from the measured state and receives the recorded"
-            f" {joint.effort}; below, its error."
-        ),
-        x_label="time, s",
-        x=first["time_s"].to_numpy(),
-        panels=window_panels(joint, replays),
-        group=run,
-    )
-
-
-def _stem(run: str) -> str:
-    return run.removesuffix(".parquet")

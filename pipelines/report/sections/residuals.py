@@ -4,8 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import pandas as pd
-
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Dependence
 from pipelines.plotting.chart import Chart
@@ -85,29 +83,23 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     frame = session.residuals.frame
     # Runs that no fit has seen, without reversals: no model of speed predicts a standing joint.
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
+    models = [drawn(model, judged[judged["model"] == model]) for model in models_of(session)]
     for joint in session.joints:
         # One height for all charts of a joint, so that their errors can be compared.
         reach = residual_reach(judged, joint)
         for one in _against(session, joint):
-            yield _chart(session, judged, joint, one, reach)
-
-
-def _chart(
-    session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None
-) -> Chart:
-    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
-    x, panel = residual_panel(joint, one.column, models, reach, session.noise_floor(joint))
-    return Chart(
-        key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
-        title=f"{joint.name} error against {one.title}",
-        caption=(
-            "Dots are blocks of validation runs away from reversals, lines their running means,"
-            f" each of {FEWEST} blocks or more; the band is the noise floor."
-        ),
-        x_label=one.label,
-        x=x,
-        panels=(panel,),
-    )
+            x, panel = residual_panel(joint, one.column, models, reach, session.noise_floor(joint))
+            yield Chart(
+                key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
+                title=f"{joint.name} error against {one.title}",
+                caption=(
+                    "Dots are blocks of validation runs away from reversals, lines their running"
+                    f" means, each of {FEWEST} blocks or more; the band is the noise floor."
+                ),
+                x_label=one.label,
+                x=x,
+                panels=(panel,),
+            )
 
 
 def most_explained_variable(session: Session, joint: Joint) -> str:

@@ -8,7 +8,13 @@ import numpy as np
 from pipelines.dynamics.plant import plant_from_table
 from pipelines.errors import ExoidError
 from pipelines.plotting.chart import Chart
-from pipelines.report.sections.fit_quality import models_of, replayed, run_names, scores
+from pipelines.report.sections.fit_quality import (
+    models_of,
+    replayed,
+    residuals_of,
+    run_names,
+    scores,
+)
 from pipelines.report.session import Session
 from pipelines.wording.causes import labels_in_words
 from pipelines.wording.numbers import digits
@@ -35,10 +41,7 @@ def runs(session: Session, charts: Sequence[Chart]) -> list[dict[str, Any]]:
 
 
 def _about(session: Session, name: str) -> str:
-    if session.residuals is None:
-        return ""
-    rows = session.residuals.frame
-    rows = rows[rows["file"] == name]
+    rows = residuals_of(session, name)
     if not len(rows):
         return ""
     kind = {"exo_alone": "nobody in it", "with_human": "with a person"}[rows["run"].iloc[0]]
