@@ -34,9 +34,9 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
     folder = open_experiment(config, out, allow_damaged=True)
     judged = Judge(folder.out).all(folder.steps)
-    console.emit(
-        [*(_damaged_as_json(file) for file in folder.damaged), *(_as_json(one) for one in judged)]
-    )
+    of_damaged = {"stage": "import", "state": "damaged", "why": [REMEDY], "command": None}
+    damaged = [of_damaged | {"target": file} for file in folder.damaged]
+    console.emit([*damaged, *map(_as_json, judged)])
     # Steps of a stage follow each other in the graph, as groupby needs.
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
     files = [file.relative_to(folder.out).as_posix() for file in folder.damaged]
@@ -62,18 +62,12 @@ def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     why = reasons[0] if reasons else ""
     if len(reasons) > 1:
         why += f" (and {len(reasons) - 1} more)"
-    targets = [one.step.target.relative_to(out) for one in stage]
-    return stage[0].step.stage, state, _result(targets, count[state]), why
-
-
-def _result(targets: Sequence[Path], counted: int) -> str:
-    if len(targets) == 1:
-        return targets[0].as_posix()
-    return f"{counted} of {len(targets)} in {targets[0].parent.as_posix()}/"
-
-
-def _damaged_as_json(file: Path) -> dict[str, Any]:
-    return {"stage": "import", "target": file, "state": "damaged", "why": [REMEDY], "command": None}
+    step = stage[0].step
+    result = step.target.relative_to(out)
+    if len(stage) == 1:
+        return step.stage, state, result.as_posix(), why
+    parts = f"{count[state]} of {len(stage)} in {result.parent.as_posix()}/"
+    return step.stage, state, parts, why
 
 
 def _as_json(one: "Judged") -> dict[str, Any]:

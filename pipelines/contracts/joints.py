@@ -29,19 +29,6 @@ QUANTITIES = {
     "temperature": "°C",
 }
 """Quantities at a joint, with their units at a revolute one."""
-ENDINGS = {
-    "rad": "rad",
-    "rad/s": "rad_s",
-    "rad/s²": "rad_s2",
-    "N·m": "nm",
-    "m": "m",
-    "m/s": "m_s",
-    "m/s²": "m_s2",
-    "N": "n",
-    "A": "a",
-    "°C": "c",
-}
-"""How the name of a column ends, by its unit."""
 
 
 def the(joint: str) -> str:
@@ -60,7 +47,9 @@ class Joint:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
         words = quantity.replace("angle", self.place).replace("torque", self.effort)
         own = f"{words}_{self.name}" if words.startswith("rmse_") else f"{self.name}_{words}"
-        return f"{own}_{ENDINGS[self.unit(quantity)]}"
+        # A unit such as rad/s² ends the name as rad_s2.
+        letters = str.maketrans({"/": "_", "²": "2", "·": None, "°": None})
+        return f"{own}_{self.unit(quantity).lower().translate(letters)}"
 
     def unit(self, quantity: str) -> str:
         """Return the unit of a quantity at this joint, as printed: ``"rad/s"``."""

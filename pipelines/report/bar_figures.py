@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from pipelines.plotting.matplotlib_charts import NARROW, WIDE, legend_below, rows_of_axes, sentence
 from pipelines.plotting.style import BLUE, CAUSES, GREY, NOISE, WANDERS
-from pipelines.report.bars import Bar, Fall
+from pipelines.report.sections.error_budget import Bar, Fall
 from pipelines.wording.numbers import digits
 
 TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {

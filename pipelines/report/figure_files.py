@@ -32,9 +32,7 @@ def draw(
     drawings: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]
 ) -> None:
     """Write figures as PDF and PNG into a folder; ``report`` receives the number written."""
-    # Resolution of PNG files.
-    dpi = 200
-    with plt.rc_context(STYLE | {"savefig.dpi": dpi}):
+    with plt.rc_context(STYLE | {"savefig.dpi": 200}):
         for number, name in enumerate(names):
             save(drawings[name](), folder / name)
             report(number + 1)

@@ -34,13 +34,11 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
     output : Path, optional
         Where the page is written, for the command line that repeats it.
     """
-    # Numbers in all charts below which thinning no longer makes the page smaller.
-    fewest_values = 20_000
     values = VALUES
     page = _page(session, title, output, values)
-    while len(page.encode()) > LARGEST_BYTES and values > fewest_values:
-        # The words of a page have a length of their own, so the room for numbers is found by
-        # trying.
+    # The words of a page have a length of their own, so the room for numbers is found by trying.
+    # Fewer numbers than that no longer make it smaller.
+    while len(page.encode()) > LARGEST_BYTES and values > 20_000:
         values //= 2
         page = _page(session, title, output, values)
     return page

@@ -80,8 +80,6 @@ def _frames(time: NDArray, error: NDArray) -> NDArray:
 
 
 def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
-    # Assumed ratio of lengths: no file holds the shank's, and no torque depends on it.
-    shank_to_thigh = 1.05
     drawn = drawn_as(session)
     if drawn == "slider":
         return drawn, (float(np.abs(measured).max()) or 1.0,)
@@ -89,4 +87,5 @@ def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tu
         return drawn, (1.0,)
     geometry = table.metadata.get("plant", {}).get("geometry", {})
     thigh = geometry.get("thigh_length_m") or 0.4
-    return drawn, (thigh, shank_to_thigh * thigh)
+    # An assumed ratio: no file holds the shank's length, and no torque depends on it.
+    return drawn, (thigh, 1.05 * thigh)

@@ -117,7 +117,6 @@ class Score:
 
 
 LARGER = "larger with the causes"
-STANDS = "a model of speed cannot predict the torque that holds a standing joint"
 SCORES = {
     "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
     "drives": (
@@ -168,7 +167,10 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         grew = floor is not None and torque_error_grew(*values, floor=floor)
         note = LARGER if grew else ""
         if grew and words == "reversals included" and not grew_away_from_reversals:
-            note += f"; only near reversals: {STANDS}"
+            note += (
+                "; only near reversals: a model of speed cannot predict the torque that holds a"
+                " standing joint"
+            )
         label = f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}"
         yield Score(label, values, note)
         grew_away_from_reversals = grew

@@ -11,9 +11,6 @@ from pipelines.model import BASELINE
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
 
-SENTENCES = ("collinear", "remarks", "angle_noise")
-"""Lists of sentences in the metadata of a model."""
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -70,12 +67,12 @@ class Model:
     title: str
     method: str
     estimates: tuple[Estimate, ...]
-    collinear: tuple[str, ...]
-    unrealizable: tuple[str, ...] | None
+    collinear: list[str]
+    unrealizable: list[str] | None
     """Reasons why no real machine has these values; None if the file has no such key."""
-    remarks: tuple[str, ...]
+    remarks: list[str]
     """Sentences on its method and its peculiarities."""
-    angle_noise: tuple[str, ...]
+    angle_noise: list[str]
     """Sentences on inertia underestimated because of noisy angles."""
 
 
@@ -124,7 +121,6 @@ def side_by_side(shown: Sequence[Model]) -> list[Row]:
 def _model(session: Session, artifact: Artifact, title: str) -> Model:
     table = session.table(artifact)
     about = table.metadata
-    unrealizable = about.get("unrealizable")
     return Model(
         file=session.shown(artifact.path),
         title=title,
@@ -133,8 +129,10 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
             replace(e, meaning=meaning(session, e.effect, e.joint, e.name))
             for e in estimates(table)
         ),
-        unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
-        **{key: tuple(map(str, about.get(key) or ())) for key in SENTENCES},
+        unrealizable=about.get("unrealizable"),
+        collinear=about.get("collinear") or [],
+        remarks=about.get("remarks") or [],
+        angle_noise=about.get("angle_noise") or [],
     )
 
 

@@ -23,11 +23,10 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     -------
     (n,) array of bool
     """
-    # Time over which speed is measured, s, so that encoder noise does not count as motion.
-    over_s = 0.1
     time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
     windows = frame["window"].to_numpy()
-    span = max(1, round(over_s / float(np.median(np.diff(time)))))
+    # Speed is measured over 0.1 s, so that encoder noise does not count as motion.
+    span = max(1, round(0.1 / float(np.median(np.diff(time)))))
     moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
     slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
     # One slow stretch excludes its whole window, whose error lasts to the window's end.
