@@ -28,24 +28,21 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
       exoid status
       exoid status --config my_experiment/exoid.toml
     """
-    from pipelines.errors import InputError
     from pipelines.workflow.freshness import Judge
-    from pipelines.workflow.imported import damage
 
     folder = open_experiment(config, out, allow_damaged=True)
     judged = Judge(folder.out).all(folder.steps)
     of_damaged = {"stage": "import", "state": "damaged", "why": [REMEDY], "command": None}
-    damaged = [of_damaged | {"target": file} for file in folder.damaged]
+    damaged = [of_damaged | {"target": file} for file in folder.imported.damaged]
     console.emit([*damaged, *map(_as_json, judged)])
     # Steps of a stage follow each other in the graph, as groupby needs.
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
-    files = [file.relative_to(folder.out).as_posix() for file in folder.damaged]
+    files = [file.relative_to(folder.out).as_posix() for file in folder.imported.damaged]
     rows = [("import", "damaged", file, REMEDY) for file in files]
     rows += [_line(stage, folder.out) for stage in stages]
     console.table(("stage", "state", "result", "why"), rows)
     # After the table, so that the state of all else is seen.
-    if folder.damaged:
-        raise InputError(damage(folder.damaged))
+    folder.imported.refuse_damaged()
     todo = sum(not one.done for one in judged)
     to_do = (
         f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what"

@@ -80,7 +80,9 @@ def _rules(steps: Sequence[Step]) -> Iterator[str]:
 def _rule(step: Step) -> Iterator[str]:
     # An input that is no result, such as a rig, counts by its hash in the settings.
     inputs = [file.as_posix() for file in step.inputs if file.is_relative_to("$(OUT)")]
-    settings = [f"$(SETTINGS)/{name}.json" for name in step.settings_files]
+    # By these files make notices a changed setting.
+    names = [f"run-{step.run}" if name == "run" else name for name in step.settings]
+    settings = [f"$(SETTINGS)/{name}.json" for name in names]
     yield ""
     yield f"{step.target.as_posix()}: {' '.join([*inputs, *settings, *_if_incomplete(step)])}"
     # make ignores the failure of a step that may fail.

@@ -17,7 +17,7 @@ from pipelines.report.html.report import report
 from pipelines.report.sections import commands, provenance
 from pipelines.report.sections.animation import animations
 from pipelines.report.sections.error_budget import budget
-from pipelines.report.sections.standstill import moving
+from pipelines.report.sections.fit_quality import moving
 from pipelines.report.session import find
 from pipelines.report.session_charts import charts
 from tests.report.sessions import (

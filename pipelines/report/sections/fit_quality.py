@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.plotting.chart import Chart, DrawnTable, Role
 from pipelines.plotting.residual_panels import torque_panels
 from pipelines.plotting.simulation_panels import window_panels
-from pipelines.report.sections.standstill import moving
 from pipelines.report.session import Artifact, Session
 from pipelines.wording.increased_errors import simulation_error_grew, torque_error_grew
 
@@ -19,6 +19,8 @@ MODELS = {
     "extended": (Role.AFTER, "with the causes"),
 }
 """Role and legend of the models of ``residuals/1``."""
+SLOW = 0.1
+"""Share of its rms speed below which a joint counts as standing."""
 
 
 def run_names(session: Session) -> list[str]:
@@ -194,3 +196,26 @@ def _while_moving(
     # If all windows count, or none, the row would repeat another or be empty.
     if 0 < kept < of:
         yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
+
+
+def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
+    """Return whether the measured joint moved throughout the window of each row.
+
+    Parameters
+    ----------
+    frame : DataFrame of n rows
+        A replay: ``time_s``, ``window``, and the measured angle as reference.
+    joint : Joint
+
+    Returns
+    -------
+    (n,) array of bool
+    """
+    time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
+    windows = frame["window"].to_numpy()
+    # Speed is measured over 0.1 s, so that encoder noise does not count as motion.
+    span = max(1, round(0.1 / float(np.median(np.diff(time)))))
+    moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
+    slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
+    # One slow stretch excludes its whole window, whose error lasts to the window's end.
+    return ~np.isin(windows, windows[span:][within & slow])

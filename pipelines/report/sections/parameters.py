@@ -148,8 +148,15 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
     # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     return Estimate(
-        *(row[key] for key in ("effect", "name", "symbol")),
-        *(joint, run, row["unit"], float(row["value"]), low, high),
+        effect=row["effect"],
+        name=row["name"],
+        symbol=row["symbol"],
+        joint=joint,
+        run=run,
+        unit=row["unit"],
+        value=float(row["value"]),
+        low=low,
+        high=high,
         each_run=bool(row.get("each_run")),
     )
 

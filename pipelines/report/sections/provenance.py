@@ -27,7 +27,7 @@ def context(session: Session) -> dict[str, Any]:
 
 def _origins(session: Session) -> list[dict[str, Any]]:
     """Return every file of a session with its inputs, oldest first."""
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "file": session.shown(one.path),
             "contract": one.contract,
