@@ -62,13 +62,12 @@ def simulate(
         raise SettingsError(
             "--reference and --replay exclude each other: a replay follows its recording; drop one"
         )
-    # Nothing is given, so the steps of the experiment are meant.
-    if parameters is output is run is reference is replay is None:
-        folder = open_experiment(config, problem="no parameters are given")
-        run_stages(context, folder, "simulate", "replay", again=again)
-        return
     if parameters is None:
         folder = open_experiment(config, problem="no parameters are given")
+        # Nothing is given, so the steps of the experiment are meant.
+        if output is run is reference is replay is None:
+            run_stages(context, folder, "simulate", "replay", again=again)
+            return
         parameters = folder.step("identify").target
     if output is None:
         output = open_experiment(config, problem="-o: missing").out / "simulated"

@@ -185,14 +185,14 @@ def _while_moving(
     values: list[float | None] = []
     kept = of = 0
     for model in models_of(session):
-        frame = session.table(replays[model]).frame if model in replays else None
-        chosen = frame[moving(frame, joint)] if frame is not None else None
-        if frame is None or chosen is None or not len(chosen):
-            values.append(None)
-            continue
-        # mrad, or mm at a prismatic joint.
-        values.append(1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2))))
-        kept, of = chosen["window"].nunique(), frame["window"].nunique()
+        values.append(None)
+        if model in replays:
+            frame = session.table(replays[model]).frame
+            chosen = frame[moving(frame, joint)]
+            if len(chosen):
+                # mrad, or mm at a prismatic joint.
+                values[-1] = 1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2)))
+                kept, of = chosen["window"].nunique(), frame["window"].nunique()
     # If all windows count, or none, the row would repeat another or be empty.
     if 0 < kept < of:
         yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
