@@ -16,24 +16,16 @@ def _end(number: int, frame: object) -> None:
 
 def main() -> None:
     """Run exoid as the shell's command."""
-    # New objects after which Python searches for unused ones.
-    collect_after = 50_000
-    # Environment variables of numpy's libraries. exoid's matrices are too small for several
-    # threads, which would only take the processor from other commands.
-    threads = (
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "OMP_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    )
     for name in EARLY:
         number = signal.Signals[name]
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _end)
-    for name in threads:
-        os.environ.setdefault(name, "1")
+    # For numpy's libraries: exoid's matrices are too small for several threads, which would only
+    # take the processor from other commands.
+    for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "VECLIB_MAXIMUM"):
+        os.environ.setdefault(f"{name}_THREADS", "1")
     # Loading creates many objects that stay; searching them repeatedly takes a fifth of the time.
-    gc.set_threshold(collect_after)
+    gc.set_threshold(50_000)
     from exoid_cli.app import main as run
 
     run()

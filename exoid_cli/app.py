@@ -181,23 +181,19 @@ def _fail(text: str, code: int) -> int:
 
 def _broken_pipe() -> int:
     """Discard further output, which nobody reads after ``exoid effects | head -1``."""
-    # Exit code of a stop by SIGPIPE, as in shells; Windows has no such signal.
-    broken_pipe = 128 + 13
     with open(os.devnull, "w") as devnull:
         os.dup2(devnull.fileno(), sys.stdout.fileno())
-    return broken_pipe
+    return 128 + 13  # as shells report a stop by SIGPIPE; Windows has no such signal
 
 
 def _command_line(arguments: Sequence[str]) -> int:
-    # The exit code that typer makes of KeyboardInterrupt.
-    interrupted = 130
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
     code = command.main(
         args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False
     )
-    if code == interrupted:
-        raise KeyboardInterrupt  # typer returns the exit code only, without a message
+    if code == 130:
+        raise KeyboardInterrupt  # of which typer makes this exit code, without a message
     return code or 0
 
 

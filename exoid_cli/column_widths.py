@@ -10,8 +10,6 @@ def column_widths(
     headings: Sequence[str], rows: Sequence[Sequence[str]], width: int
 ) -> list[int | None]:
     """Return each column's width; None for all where no line needs or allows a break."""
-    # Spaces between columns.
-    gap = 2
     table = [[heading, *cells] for heading, *cells in zip(headings, *rows, strict=True)]
     wanted = [
         max(cell_len(line) for text in column for line in text.split("\n")) for column in table
@@ -19,7 +17,7 @@ def column_widths(
     widths = [
         max(cell_len(piece) for text in column for piece in _pieces(text)) for column in table
     ]
-    room = width - gap * (len(table) - 1)
+    room = width - 2 * (len(table) - 1)  # two spaces between columns
     # Nothing to break, or even the shortest pieces do not fit.
     if sum(wanted) <= room or sum(widths) > room:
         return [None] * len(table)

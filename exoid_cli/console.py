@@ -44,12 +44,16 @@ class Console:
     @cached_property
     def out(self) -> "RichConsole":
         """Standard output."""
-        return _rich_console(stderr=False)
+        from rich.console import Console as RichConsole
+
+        return RichConsole(highlight=False)
 
     @cached_property
     def err(self) -> "RichConsole":
         """Standard error."""
-        return _rich_console(stderr=True)
+        from rich.console import Console as RichConsole
+
+        return RichConsole(stderr=True, highlight=False)
 
     def add_options(self, *, quiet: bool, json: bool) -> None:
         """Switch on the global options that are given; those given before stay on."""
@@ -192,15 +196,14 @@ class Console:
 
         The last picture is printed below the earlier output.
         """
-        # Longest time that drawing a live picture may delay other threads, s.
-        drawing_s = 0.0005
         if not self._may_move:
             yield
             return
         from rich.live import Live
 
         interval = sys.getswitchinterval()
-        sys.setswitchinterval(drawing_s)
+        # Longest time that drawing a live picture may delay other threads, s.
+        sys.setswitchinterval(0.0005)
         try:
             # On the alternate screen, so that the picture survives a resized window.
             with Live(picture, console=self.err, screen=True, refresh_per_second=10):
@@ -212,12 +215,6 @@ class Console:
     @property
     def _may_move(self) -> bool:
         return self.speaks and self.err.is_terminal
-
-
-def _rich_console(*, stderr: bool) -> "RichConsole":
-    from rich.console import Console as RichConsole
-
-    return RichConsole(stderr=stderr, highlight=False)
 
 
 def _as_text(text: "str | Text", style: str = "") -> "Text":

@@ -9,6 +9,7 @@ from pipelines.errors import InputError
 if TYPE_CHECKING:
     from pipelines.settings import Experiment
     from pipelines.workflow.graph import Step
+    from pipelines.workflow.imported import ImportedRuns
 
 NAME = "exoid.toml"
 
@@ -20,8 +21,7 @@ class ExperimentFolder:
     experiment: "Experiment"
     steps: "tuple[Step, ...]"
     out: Path
-    damaged: tuple[Path, ...] = ()
-    """Imported recordings that cannot be read; no step uses them."""
+    imported: "ImportedRuns"
 
     def of_stage(self, *stages: str) -> "list[Step]":
         """Return the steps of some stages."""
@@ -76,7 +76,7 @@ def open_experiment(
     if not allow_damaged:
         imported.refuse_damaged()
     steps = graph(experiment, file, folder, imported)
-    return ExperimentFolder(experiment, steps, folder, imported.damaged)
+    return ExperimentFolder(experiment, steps, folder, imported)
 
 
 def inputs_and_folder(

@@ -183,8 +183,7 @@ def _report(model: "Identified", machine: "Machine") -> None:
     rows = model.parameters.to_dict("records")
     unit = either(joint.unit("torque") for joint in machine.joints)
     about = {"parameters": rows, "validation": model.validation.as_json()}
-    keys = ("collinear", "unrealizable", "method", "remarks", "angle_noise")
-    console.emit(about | {key: getattr(model, key) for key in keys})
+    console.emit(about | {key: getattr(model, key) for key in ("method", *REMARKS)})
     show_parameters(rows, machine.joints, model.one_step.tolist())
     console.say("")
     errors_of_runs: list[tuple[str, ...]] = []

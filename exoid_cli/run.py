@@ -11,7 +11,7 @@ from exoid_cli.confirm import ask_before
 from exoid_cli.console import console
 from exoid_cli.experiment_folder import ExperimentFolder, open_experiment, why_no_step
 from exoid_cli.options import ConfigOption, OutOption, YesOption
-from exoid_cli.stage_runner import SkippedStep, bring_up_to_date
+from exoid_cli.stage_runner import bring_up_to_date
 
 
 def run(
@@ -59,20 +59,16 @@ def run(
     results, skipped = bring_up_to_date(
         context, folder, wanted, before=partial(ask_before, folder.experiment, yes=yes)
     )
-    console.emit([result.as_json() for result in results])
+    console.emit(results)
     fresh = len(wanted) - len(results) - len(skipped)
     up_to_date = f"; {fresh} {'was' if fresh == 1 else 'were'} up to date" if fresh else ""
     console.say(
         f"\n{len(results)} of {len(wanted)} steps done in"
-        f" {sum(result.seconds for result in results):.0f} s{up_to_date}"
+        f" {sum(result['seconds'] for result in results):.0f} s{up_to_date}"
     )
-    _say_skipped(skipped)
-
-
-def _say_skipped(skipped: Sequence[SkippedStep]) -> None:
-    """Repeat at the end which steps could not be done, those of one reason together."""
-    for reason in dict.fromkeys(step.reason for step in skipped):
-        targets = [skip.step.target.as_posix() for skip in skipped if skip.reason == reason]
+    # Repeated at the end, those of one reason together.
+    for reason in dict.fromkeys(reason for _, reason in skipped):
+        targets = [step.target.as_posix() for step, why in skipped if why == reason]
         console.say(f"not done, so left out: {', '.join(targets)}: {reason}")
 
 

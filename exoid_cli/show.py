@@ -10,11 +10,6 @@ from exoid_cli.console import console
 if TYPE_CHECKING:
     from pipelines.contracts.inspection import Inspection
 
-HASH = 12
-"""Characters of a hash that are shown, enough to distinguish files."""
-COLUMNS = 8
-"""Most columns of a table that lists objects."""
-
 
 def show(
     file: Annotated[
@@ -83,17 +78,15 @@ def _show_content(inspection: "Inspection") -> bool:
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     """Print the decision on each of the first candidates, and its reason."""
-    # Candidates that are shown.
-    first = 10
     from pipelines.wording.causes import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
-    for row in rows[:first]:
+    for row in rows[:10]:
         causes = " + ".join(map(any_label_in_words, row["causes"]))
         console.say(f"\n{row['rank']} {causes}: {row['verdict']}")
         console.note(labels_in_words(row["reason"], labels))
-    if len(rows) > first:
-        console.say(f"\n{len(rows) - first} more are in the file")
+    if len(rows) > 10:
+        console.say(f"\n{len(rows) - 10} more are in the file")
 
 
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:
@@ -106,9 +99,9 @@ def _folded(origin: dict[str, Any]) -> dict[str, Any]:
         versions = (f"{name} {version}" for name, version in origin["software"].items())
         folded["software"] = ", ".join(versions)
     if "inputs" in origin:
-        folded["inputs"] = {
-            entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]
-        } or "none"
+        # Twelve characters of a hash distinguish files.
+        inputs = {one["name"]: f"sha256 {one['sha256'][:12]}…" for one in origin["inputs"]}
+        folded["inputs"] = inputs or "none"
     return folded
 
 
@@ -130,7 +123,8 @@ def _is_table(value: Any) -> bool:
         return False
     if not all(isinstance(row, dict) for row in value):
         return False
-    return len(value[0]) <= COLUMNS and all(
+    # Wider ones would not fit a terminal.
+    return len(value[0]) <= 8 and all(
         row.keys() == value[0].keys()
         and not any(isinstance(cell, dict | list) for cell in row.values())
         for row in value
@@ -152,16 +146,12 @@ def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
 
 
 def _in_short(value: Any) -> str:
-    # Elements of a list that are shown.
-    few = 6
-    if isinstance(value, list) and (
-        len(value) > few or any(isinstance(item, list) for item in value)
-    ):
+    if not isinstance(value, list):
+        return str(_number(value))
+    if len(value) > 6 or any(isinstance(item, list) for item in value):
         rows = f"{len(value)} x {len(value[0])}" if isinstance(value[0], list) else str(len(value))
         return f"{rows} values; --json shows them"
-    if isinstance(value, list):
-        return ", ".join(map(_in_short, value)) or "none"
-    return str(_number(value))
+    return ", ".join(map(_in_short, value)) or "none"
 
 
 def _number(value: Any) -> Any:

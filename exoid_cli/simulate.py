@@ -62,13 +62,12 @@ def simulate(
         raise SettingsError(
             "--reference and --replay exclude each other: a replay follows its recording; drop one"
         )
-    # Nothing is given, so the steps of the experiment are meant.
-    if parameters is output is run is reference is replay is None:
-        folder = open_experiment(config, problem="no parameters are given")
-        run_stages(context, folder, "simulate", "replay", again=again)
-        return
     if parameters is None:
         folder = open_experiment(config, problem="no parameters are given")
+        # Nothing is given, so the steps of the experiment are meant.
+        if output is run is reference is replay is None:
+            run_stages(context, folder, "simulate", "replay", again=again)
+            return
         parameters = folder.step("identify").target
     if output is None:
         output = open_experiment(config, problem="-o: missing").out / "simulated"
@@ -125,16 +124,18 @@ def _track(
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
-    amplitude, omega = chosen.disturbance_nm, chosen.disturbance_rad_s
-    disturbance = {"amplitude_nm": amplitude, "omega_rad_s": omega}
-    counts, noise_rad = chosen.encoder_counts_per_turn, chosen.encoder_noise_rad
-    noise = {"counts_per_turn": counts, "angle_rad": noise_rad}
     described = describe(inputs, config) | {
         "joints": plant.machine.joint_metadata,
         "plant": plant.metadata(),
-        "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
-        "disturbance": disturbance,
-        "noise": noise,
+        "controller": {"type": "rbf", "reference": reference.name if reference else "gait"},
+        "disturbance": {
+            "amplitude_nm": chosen.disturbance_nm,
+            "omega_rad_s": chosen.disturbance_rad_s,
+        },
+        "noise": {
+            "counts_per_turn": chosen.encoder_counts_per_turn,
+            "angle_rad": chosen.encoder_noise_rad,
+        },
         "seed": chosen.seed,
     }
     SIMULATION.write(output / LOOP, frame, described)
@@ -148,11 +149,9 @@ def _track(
             draw_tracking(frame, plant.joints, output, *limits)
             if len(gains):
                 draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
-    worst = loop.worst_error(chosen.settled_after_s)
-    peak = abs(loop.run.torque).max(axis=0)
     names = [joint.name for joint in plant.joints]
-    errors = dict(zip(names, worst.tolist(), strict=True))
-    torques = dict(zip(names, peak.tolist(), strict=True))
+    errors = dict(zip(names, loop.worst_error(chosen.settled_after_s).tolist(), strict=True))
+    torques = dict(zip(names, abs(loop.run.torque).max(axis=0).tolist(), strict=True))
     result = {"largest_error_rad": errors, "peak_torque_nm": torques}
     console.emit(result | {"sweep": gains.to_dict("records")})
     angle, torque = (either(j.unit(q) for j in plant.joints) for q in ("angle", "torque"))
@@ -174,16 +173,14 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     from pipelines.mechanics.read import geometry_from, read_motion
     from pipelines.simulation import recorded
 
-    default = geometry_from(settings)
-    motion = read_motion(recording, settings.filter, default)
+    motion = read_motion(recording, settings.filter, geometry_from(settings))
     plant = plant_from_table(table, motion.run, motion.geometry, recording)
     with console.working(f"replaying {recording.name}"):
         replayed = replay(plant.model, motion)
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "filter", "mechanism")
-    joints = motion.machine.joint_metadata
-    about: dict[str, Any] = {"joints": joints, "plant": plant.metadata()}
+    about = {"joints": motion.machine.joint_metadata, "plant": plant.metadata()}
     shared = describe(inputs, config) | about
     names = [joint.name for joint in plant.joints]
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
@@ -201,9 +198,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         with console.working("following the references"):
             loop = recorded.follow_references(plant, motion)
         closed_loop = recorded.closed_loop_frame(loop, motion, plant.joints)
-        result["closed_loop_rmse_rad"] = dict(zip(names, loop.angle_rmse.tolist(), strict=True))
-        result["closed_loop_rmse_nm"] = dict(zip(names, loop.torque_rmse.tolist(), strict=True))
-        scores = {key: value for key, value in result.items() if key.startswith("closed")}
+        scores = {
+            "closed_loop_rmse_rad": dict(zip(names, loop.angle_rmse.tolist(), strict=True)),
+            "closed_loop_rmse_nm": dict(zip(names, loop.torque_rmse.tolist(), strict=True)),
+        }
+        result |= scores
         about_loop = scores | {"controller": motion.metadata["controller"]}
         SIMULATION.write(closed_loop_file, closed_loop, shared | about_loop)
     if settings.simulate.figures:

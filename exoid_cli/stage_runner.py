@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -19,34 +18,6 @@ Before = Callable[["Step"], Sequence[str]]
 """Called before a step; returns further arguments for its command."""
 
 
-@dataclass(frozen=True)
-class StepResult:
-    """A step that was run."""
-
-    step: "Step"
-    seconds: float
-    result: Any
-    """The document that the command prints with ``--json``."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it for programs."""
-        return {
-            "stage": self.step.stage,
-            "target": self.step.target,
-            "command": ["exoid", *self.step.command],
-            "seconds": round(self.seconds, 3),
-            "result": self.result,
-        }
-
-
-@dataclass(frozen=True)
-class SkippedStep:
-    """A step that failed and that later steps can do without."""
-
-    step: "Step"
-    reason: str
-
-
 def bring_up_to_date(
     context: typer.Context,
     folder: ExperimentFolder,
@@ -54,14 +25,16 @@ def bring_up_to_date(
     *,
     again: bool = False,
     before: Before = lambda step: (),
-) -> tuple[list[StepResult], list[SkippedStep]]:
+) -> "tuple[list[dict[str, Any]], list[tuple[Step, str]]]":
     """Run the wanted steps that are not up to date, or all of them if ``again``, in order.
 
-    Every step of the experiment is judged, because a step is stale where one it needs is.
+    Every step of the experiment is judged, because a step is stale where one it needs is. Return
+    the steps that were run, for programs, and those that failed, which later steps can do without,
+    with the reason.
     """
     from pipelines.workflow.freshness import Judge
 
-    judge, results, skipped = Judge(folder.out), list[StepResult](), list[SkippedStep]()
+    judge, results, skipped = Judge(folder.out), [], []
     for step in folder.steps:
         judged = judge.judge(step)
         if step not in wanted or (judged.done and not again):
@@ -73,7 +46,7 @@ def bring_up_to_date(
         except InputError as error:
             if not step.may_fail:
                 raise
-            skipped.append(SkippedStep(step, str(error)))
+            skipped.append((step, str(error)))
             console.warn(f"{error}; {step.target.as_posix()} is left out")
         # Judged again, so that steps that need its result see its new state.
         judge.judge(step)
@@ -92,10 +65,10 @@ def run_stages(
     wanted = folder.of_stage(*stages) or [folder.step(stages[0])]
     _check_inputs(folder, wanted)
     results, skipped = bring_up_to_date(context, folder, wanted, again=again, before=before)
-    console.emit([result.as_json() for result in results])
-    tried = [result.step for result in results] + [skip.step for skip in skipped]
+    console.emit(results)
+    tried = {result["target"] for result in results} | {step.target for step, _ in skipped}
     for step in wanted:
-        if step not in tried:
+        if step.target not in tried:
             console.say(f"{step.target.as_posix()}: up to date; --again makes it again")
 
 
@@ -122,8 +95,8 @@ def _check_inputs(folder: ExperimentFolder, wanted: "Sequence[Step]") -> None:
                 )
 
 
-def _run(context: typer.Context, judged: "Judged", more: Sequence[str]) -> StepResult:
-    """Print a step's command line and its reason, then run the command."""
+def _run(context: typer.Context, judged: "Judged", more: Sequence[str]) -> dict[str, Any]:
+    """Print a step's command line and its reason, then run the command; return it for programs."""
     name, *arguments = (*judged.step.command, *more)
     console.say_command(["exoid", name, *arguments], "; ".join(judged.why[:1]))
     began = time.monotonic()
@@ -136,5 +109,11 @@ def _run(context: typer.Context, judged: "Judged", more: Sequence[str]) -> StepR
         command.make_context(name, list(arguments), parent=root) as inner,
     ):
         inner.command.invoke(inner)
-    seconds = time.monotonic() - began
-    return StepResult(judged.step, seconds, documents[0] if documents else None)
+    return {
+        "stage": judged.step.stage,
+        "target": judged.step.target,
+        "command": ["exoid", *judged.step.command],
+        "seconds": round(time.monotonic() - began, 3),
+        # The document that the command prints with --json.
+        "result": documents[0] if documents else None,
+    }

@@ -28,24 +28,21 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
       exoid status
       exoid status --config my_experiment/exoid.toml
     """
-    from pipelines.errors import InputError
     from pipelines.workflow.freshness import Judge
-    from pipelines.workflow.imported import damage
 
     folder = open_experiment(config, out, allow_damaged=True)
     judged = Judge(folder.out).all(folder.steps)
-    console.emit(
-        [*(_damaged_as_json(file) for file in folder.damaged), *(_as_json(one) for one in judged)]
-    )
+    of_damaged = {"stage": "import", "state": "damaged", "why": [REMEDY], "command": None}
+    damaged = [of_damaged | {"target": file} for file in folder.imported.damaged]
+    console.emit([*damaged, *map(_as_json, judged)])
     # Steps of a stage follow each other in the graph, as groupby needs.
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
-    files = [file.relative_to(folder.out).as_posix() for file in folder.damaged]
+    files = [file.relative_to(folder.out).as_posix() for file in folder.imported.damaged]
     rows = [("import", "damaged", file, REMEDY) for file in files]
     rows += [_line(stage, folder.out) for stage in stages]
     console.table(("stage", "state", "result", "why"), rows)
     # After the table, so that the state of all else is seen.
-    if folder.damaged:
-        raise InputError(damage(folder.damaged))
+    folder.imported.refuse_damaged()
     todo = sum(not one.done for one in judged)
     to_do = (
         f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what"
@@ -62,18 +59,12 @@ def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     why = reasons[0] if reasons else ""
     if len(reasons) > 1:
         why += f" (and {len(reasons) - 1} more)"
-    targets = [one.step.target.relative_to(out) for one in stage]
-    return stage[0].step.stage, state, _result(targets, count[state]), why
-
-
-def _result(targets: Sequence[Path], counted: int) -> str:
-    if len(targets) == 1:
-        return targets[0].as_posix()
-    return f"{counted} of {len(targets)} in {targets[0].parent.as_posix()}/"
-
-
-def _damaged_as_json(file: Path) -> dict[str, Any]:
-    return {"stage": "import", "target": file, "state": "damaged", "why": [REMEDY], "command": None}
+    step = stage[0].step
+    result = step.target.relative_to(out)
+    if len(stage) == 1:
+        return step.stage, state, result.as_posix(), why
+    parts = f"{count[state]} of {len(stage)} in {result.parent.as_posix()}/"
+    return step.stage, state, parts, why
 
 
 def _as_json(one: "Judged") -> dict[str, Any]:

@@ -9,7 +9,7 @@ from exoid_cli.console import console
 
 if TYPE_CHECKING:
     from pipelines.contracts import Joint
-    from pipelines.contracts.verdict import Cause, Control, Known, Parameter, Verdict
+    from pipelines.contracts.verdict import Cause, Control, Parameter, Verdict
 
 
 ERRORS = {
@@ -43,7 +43,9 @@ def show_verdict(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     _show_router(verdict)
     _show_errors(verdict, joints)
     for known in verdict.known:
-        _show_known(known)
+        console.say(f"\n{known.label}, assumed present")
+        for parameter in known.parameters:
+            console.note(_in_words(parameter))
     for cause in verdict.causes:
         _show_cause(cause)
     # The gait that would be followed is a leg's.
@@ -128,12 +130,15 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     errors = {key: words for key, words in ERRORS.items() if getattr(verdict, key)}
     if not verdict.causes:
         del errors["extended_rmse_nm"]
-    headings = ("joint", *errors.values(), *["excess left"] * bool(verdict.causes))
-    rows = []
+    headings, rows = ["joint", *errors.values()], []
     for joint in joints:
-        excess = [_excess_left(verdict, joint.name)] * bool(verdict.causes)
         numbers = [f"{getattr(verdict, key)[joint.name]:{digits}}" for key in errors]
-        rows.append((joint.name, *numbers, *excess))
+        rows.append([joint.name, *numbers])
+    if verdict.causes:
+        headings.append("excess left")
+        for row in rows:
+            share = verdict.unexplained[row[0]]
+            row.append("at the floor" if share is None else f"{share:.0%}")
     effort = either(joint.effort for joint in joints)
     unit = either(joint.unit("torque") for joint in joints)
     _show_table(
@@ -147,18 +152,6 @@ def _show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str
     """Print a table whose columns are numbers but for the first."""
     console.say("")
     console.table(headings, rows, title=title, numbers=", ".join(headings[1:]))
-
-
-def _excess_left(verdict: "Verdict", joint: str) -> str:
-    """Return the remaining share of a joint's error beyond noise."""
-    share = verdict.unexplained[joint]
-    return "at the floor" if share is None else f"{share:.0%}"
-
-
-def _show_known(known: "Known") -> None:
-    console.say(f"\n{known.label}, assumed present")
-    for parameter in known.parameters:
-        console.note(_in_words(parameter))
 
 
 def _show_cause(cause: "Cause") -> None:

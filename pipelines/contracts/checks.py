@@ -164,51 +164,37 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
         )
 
 
-def refuse_implausible(column: pa.ChunkedArray, where: Place) -> None:
-    """Refuse numbers that no machine's quantity reaches.
+def refuse_implausible(column: pa.ChunkedArray, unit: str, where: Place) -> None:
+    """Refuse numbers that no machine's quantity reaches, and angles that no leg reaches in radians.
 
     Parameters
     ----------
     column : pyarrow.ChunkedArray
-        Numbers in SI units.
+        Numbers.
+    unit : str
+        Their SI unit.
     where : Place
         Its place, for the message.
 
     Raises
     ------
     ContractError
-        A number is larger than ``LARGEST``.
+        A number is larger than ``LARGEST``, or an angle than ``LARGEST_ANGLE_RAD``.
     """
-    remedy = "correct the unit or scale of the column, or drop the row"
-    _refuse_beyond(LARGEST, column, where, f", expected at most {LARGEST:g}; {remedy}")
-
-
-def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
-    """Refuse angles that no leg reaches in radians.
-
-    Parameters
-    ----------
-    column : pyarrow.ChunkedArray
-        Angles, rad.
-    where : Place
-        Its place, for the message.
-
-    Raises
-    ------
-    ContractError
-        An angle is larger than ``LARGEST_ANGLE_RAD``.
-    """
-    remedy = ", which looks like degrees; expected radians, multiply by pi/180"
-    _refuse_beyond(LARGEST_ANGLE_RAD, column, where, remedy)
-
-
-def _refuse_beyond(largest: float, column: pa.ChunkedArray, where: Place, remedy: str) -> None:
-    """Refuse the first number whose size exceeds ``largest``; ``remedy`` ends the message."""
+    limits = {
+        LARGEST: f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop"
+        " the row"
+    }
+    if unit == "rad":
+        limits[LARGEST_ANGLE_RAD] = (
+            ", which looks like degrees; expected radians, multiply by pi/180"
+        )
     # The two ends show whether any row is wrong; the row itself is sought only for the message.
-    ends = pc.min_max(column).as_py().values()
-    if any(end is not None and abs(end) > largest for end in ends):
-        row = first_true(pc.greater(pc.abs(column), largest))
-        raise ContractError(f"{where.row(row)}: found {column[row].as_py():.6g}{remedy}")
+    ends = [end for end in pc.min_max(column).as_py().values() if end is not None]
+    for largest, remedy in limits.items():
+        if any(abs(end) > largest for end in ends):
+            row = first_true(pc.greater(pc.abs(column), largest))
+            raise ContractError(f"{where.row(row)}: found {column[row].as_py():.6g}{remedy}")
 
 
 def refuse_time_not_increasing(

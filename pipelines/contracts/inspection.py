@@ -1,6 +1,5 @@
 """Describe any exoid file: its contract, its origin and its content."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,8 +60,11 @@ def inspect(path: Path) -> Inspection:
 
 def _table(path: Path) -> Inspection:
     contract = contract_of(path)
-    # Without checks: a table that breaks its contract is to be described as well.
-    table, metadata = parquet.load(path)
+    schema, metadata = parquet.header(path)
+    # Without checks: a table that breaks its contract is to be described as well. And not
+    # schema.empty_table(), for which Arrow imports pandas.
+    empty = pa.Table.from_batches([], schema)
+    table = pa.concat_tables([empty, *parquet.pieces(path)])
     fault = None
     try:
         contract.load(path)
@@ -115,7 +117,7 @@ def _document(path: Path) -> Inspection | None:
 
     # Only a file that calls itself JSON is refused for a fault of its text.
     is_json = path.suffix == ".json" and path.is_file()
-    content = verdict.parsed(path) if is_json else _parsed(path, _read_json)
+    content = verdict.parsed(path) if is_json else _parsed(path, verdict.parsed)
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
         return None
     fault = None
@@ -140,14 +142,10 @@ def _trajectory_toml(path: Path) -> Inspection | None:
     )
 
 
-def _read_json(path: Path) -> Any:
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
 def _parsed(path: Path, read: Callable[[Path], Any]) -> dict[str, Any]:
     """Return the file's content; an empty object for another kind of file."""
     try:
         content = read(path)
-    except (ValueError, FileNotFoundError, IsADirectoryError):
+    except (ContractError, ValueError, FileNotFoundError, IsADirectoryError):
         return {}  # its own reader reports the error
     return content if isinstance(content, dict) else {}

@@ -10,52 +10,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity at a joint: the pattern of its columns' names, and its unit."""
-
-    name: str
-    unit: str
-    """The unit at a revolute joint."""
-    prismatic_name: str = ""
-    """The pattern at a prismatic joint, where it is another one."""
-
-
-QUANTITIES: dict[str, Quantity] = {
-    "angle": Quantity("{joint}_angle_{unit}", "rad", "{joint}_position_{unit}"),
-    "angle_measured": Quantity(
-        "{joint}_angle_measured_{unit}", "rad", "{joint}_position_measured_{unit}"
-    ),
-    "reference": Quantity("{joint}_reference_{unit}", "rad"),
-    "error": Quantity("{joint}_error_{unit}", "rad"),
-    "velocity": Quantity("{joint}_velocity_{unit}", "rad/s"),
-    "velocity_measured": Quantity("{joint}_velocity_measured_{unit}", "rad/s"),
-    "acceleration": Quantity("{joint}_acceleration_{unit}", "rad/s²"),
-    "torque": Quantity("{joint}_torque_{unit}", "N·m", "{joint}_force_{unit}"),
-    "torque_measured": Quantity(
-        "{joint}_torque_measured_{unit}", "N·m", "{joint}_force_measured_{unit}"
-    ),
-    "predicted": Quantity("{joint}_predicted_{unit}", "N·m"),
-    "residual": Quantity("{joint}_residual_{unit}", "N·m"),
-    "network": Quantity("{joint}_network_{unit}", "N·m"),
-    "rmse_before": Quantity("rmse_before_{joint}_{unit}", "N·m"),
-    "rmse_after": Quantity("rmse_after_{joint}_{unit}", "N·m"),
-    "current": Quantity("{joint}_current_{unit}", "A"),
-    "temperature": Quantity("{joint}_temperature_{unit}", "°C"),
+QUANTITIES = {
+    "angle": "rad",
+    "angle_measured": "rad",
+    "reference": "rad",
+    "error": "rad",
+    "velocity": "rad/s",
+    "velocity_measured": "rad/s",
+    "acceleration": "rad/s²",
+    "torque": "N·m",
+    "torque_measured": "N·m",
+    "predicted": "N·m",
+    "residual": "N·m",
+    "network": "N·m",
+    "rmse_before": "N·m",
+    "rmse_after": "N·m",
+    "current": "A",
+    "temperature": "°C",
 }
-ENDINGS = {
-    "rad": "rad",
-    "rad/s": "rad_s",
-    "rad/s²": "rad_s2",
-    "N·m": "nm",
-    "m": "m",
-    "m/s": "m_s",
-    "m/s²": "m_s2",
-    "N": "n",
-    "A": "a",
-    "°C": "c",
-}
-"""How the name of a column ends, by its unit."""
+"""Quantities at a joint, with their units at a revolute one."""
 
 
 def the(joint: str) -> str:
@@ -72,13 +45,15 @@ class Joint:
 
     def column(self, quantity: str) -> str:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
-        one = QUANTITIES[quantity]
-        pattern = one.name if self.kind == "revolute" else one.prismatic_name or one.name
-        return pattern.format(joint=self.name, unit=ENDINGS[self.unit(quantity)])
+        words = quantity.replace("angle", self.place).replace("torque", self.effort)
+        own = f"{words}_{self.name}" if words.startswith("rmse_") else f"{self.name}_{words}"
+        # A unit such as rad/s² ends the name as rad_s2.
+        letters = str.maketrans({"/": "_", "²": "2", "·": None, "°": None})
+        return f"{own}_{self.unit(quantity).lower().translate(letters)}"
 
     def unit(self, quantity: str) -> str:
         """Return the unit of a quantity at this joint, as printed: ``"rad/s"``."""
-        return unit_at(self.kind, QUANTITIES[quantity].unit)
+        return unit_at(self.kind, QUANTITIES[quantity])
 
     @property
     def place(self) -> str:

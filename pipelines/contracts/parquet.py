@@ -77,38 +77,13 @@ def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tabl
                 yield pa.Table.from_batches([batch])
 
 
-def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """Return a file's whole table and its metadata.
-
-    Parameters
-    ----------
-    path : Path
-        A Parquet file.
-
-    Returns
-    -------
-    tuple
-        Arrow table and ``exoid`` metadata.
-
-    Raises
-    ------
-    ContractError
-        The file is damaged or of another program.
-    """
-    schema, metadata = header(path)
-    # Not schema.empty_table(), for which Arrow imports pandas.
-    empty = pa.Table.from_batches([], schema)
-    return pa.concat_tables([empty, *pieces(path)]), metadata
-
-
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    # Bytes of each column that are read ahead; by default Arrow reads the whole row group.
-    read_ahead = 2**20
     _refuse_unreadable(path)
     try:
-        # Not read_table(path), which takes a parent folder named "run=1" for a column.
-        with pq.ParquetFile(path, buffer_size=read_ahead) as file:
+        # Not read_table(path), which takes a parent folder named "run=1" for a column. Without a
+        # size of the buffer, Arrow reads ahead the whole row group of each column.
+        with pq.ParquetFile(path, buffer_size=2**20) as file:
             yield file
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
@@ -230,11 +205,9 @@ def _refuse_unreadable(path: Path) -> None:
 
 
 def _fault_of_bytes(path: Path) -> str:
-    # First bytes of an Arrow stream, and so of a run's journal.
-    stream = b"\xff\xff\xff\xff"
     start = _start(path)
-    # Its name may have been changed, so the content decides.
-    if start == stream:
+    # An Arrow stream begins so; a journal's name may have been changed.
+    if start == b"\xff\xff\xff\xff":
         return (
             f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)}"
             f" whole samples; `exoid recover {path}` makes a recording of it"

@@ -48,7 +48,6 @@ def describe(
 @cache
 def _software() -> dict[str, str]:
     """Return the versions of Python and of the libraries that results depend on."""
-    # Libraries that compute or write results.
     libraries = ("numpy", "scipy", "numba", "pandas", "pyarrow")
     return {"python": platform.python_version()} | {name: version(name) for name in libraries}
 
@@ -84,10 +83,6 @@ def recording_behind(path: Path) -> str:
     return sha256(path)
 
 
-IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</script>', re.DOTALL)
-"""The provenance in a report's page, in which no text contains ``<``."""
-
-
 def provenance_of(path: Path) -> dict[str, Any]:
     """Return a table's metadata, or the ``provenance`` of a JSON document or an HTML page.
 
@@ -101,7 +96,9 @@ def provenance_of(path: Path) -> dict[str, Any]:
     try:
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".html":
-            return dict(json.loads(IN_A_PAGE.findall(text)[-1]))
+            # No text in this script contains `<`.
+            script = r'<script type="application/json" id="made-of">([^<]*)</script>'
+            return dict(json.loads(re.findall(script, text)[-1]))
         return dict(json.loads(text)["provenance"])
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ContractError(f"{path}: has no record of its origin; make it again") from error

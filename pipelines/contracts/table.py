@@ -446,8 +446,9 @@ class Contract:
         # Only a column that the contract does not know can be a misspelt one.
         others = [name for name in table.column_names if name not in known_names]
         near = closest(column.name, others)
+        meaning = f"{column.meaning} ({column.unit})" if column.unit else column.meaning
         raise ContractError(
-            f"{source}: column {column.name} is missing, expected {_described(column)}; "
+            f"{source}: column {column.name} is missing, expected {meaning}; "
             f"a {self.label} table must have it"
             + (f"; if {near} is meant to be it, rename it" if near else "")
         )
@@ -466,9 +467,7 @@ class Contract:
         # Only physical quantities have a plausible range: a fitted parameter has its unit in
         # another column.
         if self.is_bounded and column.dtype == FLOAT and column.unit and column.name != self.time:
-            checks.refuse_implausible(values, where)
-            if column.unit == "rad":
-                checks.refuse_degrees(values, where)
+            checks.refuse_implausible(values, column.unit, where)
         about = {"unit": column.unit, "meaning": column.meaning}
         field = pa.field(column.name, column.dtype, metadata=about)
         return table.set_column(index, field, values)
@@ -482,7 +481,3 @@ class Contract:
             raise ContractError(
                 f"{source}: metadata {fault}; correct it in the file's `exoid` entry"
             ) from error
-
-
-def _described(column: Column) -> str:
-    return f"{column.meaning} ({column.unit})" if column.unit else column.meaning

@@ -290,17 +290,13 @@ class Verdict(_Object):
                 raise ValueError(
                     f"{key} is of {_listed(of_joints)}, noise_floor_nm of {_listed(joints)}"
                 )
-        for number, cause in enumerate(self.causes):
-            if cause.gain.joint not in joints:
-                raise ValueError(
-                    f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of"
-                    " noise_floor_nm"
-                )
-        for number, finding in enumerate(self.findings):
-            if finding.joint is not None and finding.joint not in joints:
-                raise ValueError(
-                    f"findings[{number}].joint is {finding.joint!r}, no joint of noise_floor_nm"
-                )
+        named: dict[str, str | None] = {
+            f"causes[{k}].gain.joint": one.gain.joint for k, one in enumerate(self.causes)
+        }
+        named |= {f"findings[{k}].joint": one.joint for k, one in enumerate(self.findings)}
+        for key, joint in named.items():
+            if joint is not None and joint not in joints:
+                raise ValueError(f"{key} is {joint!r}, no joint of noise_floor_nm")
         return self
 
     def _tables(self) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -23,16 +23,14 @@ def extremes(columns: NDArray, rows: int) -> NDArray[np.intp]:
     (m,) array of int
         Increasing.
     """
-    # Rows per column and stretch: its lowest, its highest, and one without a value.
-    each = 3
     n, k = columns.shape
     if n <= rows:
         return np.arange(n)
-    # The first and the last row are always kept.
-    stretches = max(1, (rows - 2) // (each * k))
-    kept = _of_stretches(columns, stretches)
+    # Three rows per column and stretch: its lowest, its highest, and one without a value. The first
+    # and the last row are always kept.
+    stretches = max(1, (rows - 2) // (3 * k))
+    kept = finer = _of_stretches(columns, stretches)
     # Extremes of smooth curves share rows, which leaves room for more stretches.
-    finer = kept
     while len(finer) <= rows:
         kept = finer
         stretches *= 2

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from pipelines.plotting.chart import Chart, Mark, Panel, Role, Series
 from pipelines.plotting.style import BLUE, GREY, NOISE
 
-ROWS = 6000
-"""Most rows of a chart: no printer resolves more, and the PDF would open slowly."""
 COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
 WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
 WIDE, NARROW = 7.2, 3.6
@@ -23,7 +21,8 @@ WIDE, NARROW = 7.2, 3.6
 
 def chart_figure(chart: Chart) -> Figure:
     """Return the figure of a chart, its panels one above the other."""
-    chart = chart.thinned(ROWS)
+    # No printer resolves more rows, and the PDF would open slowly.
+    chart = chart.thinned(6000)
     cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
     heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
     size = (NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights))

@@ -11,9 +11,6 @@ from pipelines.contracts.joints import Joint
 from pipelines.plotting.chart import DrawnTable, Mark, Panel, Role, Series
 from pipelines.signals.binned_mean import binned_mean
 
-DOTS = 2500
-"""Most dots of a panel; more would hide the shape of the cloud."""
-
 
 def torque_panels(
     joint: Joint, measured: pd.DataFrame, models: Sequence[DrawnTable], floor: float | None = None
@@ -82,7 +79,7 @@ def residual_panel(
     x = models[0].rows[column].to_numpy() if models else np.zeros(0)
     # The columns of a chart share x. Dots and means are therefore rows of one table, each with NaN
     # where the other has its places.
-    step = max(1, ceil(len(x) / DOTS))
+    step = max(1, ceil(len(x) / 2500))  # more dots would hide the shape of the cloud
     middles = _mean_along(x, x)[0] if len(x) else x
     places = np.concatenate([x[::step], middles])
     order = np.argsort(places, kind="stable")
@@ -103,11 +100,9 @@ def residual_panel(
 
 def residual_reach(scored: pd.DataFrame, joint: Joint) -> float | None:
     """Return half the height of a panel of a joint's residuals; None where none is scored."""
-    # Percentile of the residual's magnitude that a panel must show.
-    reach_percentile = 99.5
     size = np.abs(scored[joint.column("residual")].to_numpy())
     # A percentile with a margin, so that a few outliers do not flatten the cloud.
-    return 1.1 * float(np.percentile(size, reach_percentile)) if len(size) else None
+    return 1.1 * float(np.percentile(size, 99.5)) if len(size) else None
 
 
 def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:

@@ -11,9 +11,6 @@ from pipelines.plotting.chart import DrawnTable, Mark, Panel, Role, Series
 
 GAIN = "feedback_gain_nm_s_rad"
 """Column of the gains in a sweep."""
-REACH = 4.0
-"""Half the height of the panel of errors, in largest settled errors; the start from rest exceeds
-it."""
 
 
 def loop_panels(
@@ -38,11 +35,11 @@ def loop_panels(
     unit = joint.unit("angle")
     return (
         Panel(f"{joint.place}, {unit}", tuple(angles)),
-        # A height of zero is no range, so it becomes None.
+        # The start from rest exceeds the panel. A height of zero is no range, so it becomes None.
         Panel(
             f"error, m{unit}",
             tuple(_series(loops, joint.column("error"), 1e3)),
-            reach=REACH * worst or None,
+            reach=4.0 * worst or None,
         ),
         Panel(
             f"{joint.effort}, {joint.unit('torque')}", tuple(_series(loops, joint.column("torque")))

@@ -13,11 +13,16 @@ from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 from pipelines.settings import Experiment
 
-TABLES = ("parameters", "residuals", "motion", "recording", "trajectory", "simulation")
-OF_MACHINE = (*TABLES, "verdict")
+OF_MACHINE = (
+    "parameters",
+    "residuals",
+    "motion",
+    "recording",
+    "trajectory",
+    "simulation",
+    "verdict",
+)
 """Kinds of file whose metadata hold the joints, the most reliable first."""
-CONTRACT_KEY = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
-"""Recognizes a damaged document of exoid."""
 
 
 @dataclass(frozen=True)
@@ -218,17 +223,13 @@ class Session:
             self._tables[artifact.path] = contract_of(artifact.path).read(artifact.path)
         return self._tables[artifact.path]
 
-    def simulations(self, model: Artifact | None) -> list[Artifact]:
-        """Return the simulations of one model."""
-        return [one for one in self.of_kind("simulation") if model and one.has_input(model)]
-
     def simulations_by_model(self, kind: str) -> dict[str, list[Artifact]]:
         """Return the simulations of a kind of the ``baseline`` and the ``extended`` model."""
-        baseline = [one for model in self.baselines for one in self.simulations(model)]
-        extended = self.simulations(self.extended)
+        of_kind = [one for one in self.of_kind("simulation") if simulation_kind(one) == kind]
+        models = {"baseline": self.baselines, "extended": [self.extended] if self.extended else []}
         return {
-            "baseline": [one for one in baseline if simulation_kind(one) == kind],
-            "extended": [one for one in extended if simulation_kind(one) == kind],
+            name: [one for model in files for one in of_kind if one.has_input(model)]
+            for name, files in models.items()
         }
 
     def recorded(self, artifact: Artifact) -> Artifact | None:
@@ -271,7 +272,9 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
                 f"{folder}: {problem}, expected an experiment's folder; name the one that its"
                 " stages wrote to"
             )
-        for path in _files(folder):
+        for path in _below(folder):
+            if path.suffix not in (".parquet", ".json"):
+                continue
             try:
                 artifact = _artifact(path)
             except ContractError as error:
@@ -293,10 +296,6 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
     return Session(tuple(folders), tuple(artifacts.values()), unreadable, config)
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    return (path for path in _below(folder) if path.suffix in (".parquet", ".json"))
-
-
 def _below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*")):
         # Hidden folders hold temporary files and settings for make.
@@ -315,19 +314,19 @@ def _artifact(path: Path) -> Artifact | None:
 
 
 def _document(path: Path) -> Artifact | None:
-    documents = ("verdict/1", "detectability/1")
     try:
         content = verdicts.parsed(path)
     except ContractError:
         # JSON that cannot be parsed counts as exoid's only if it looks like it; others are left
         # alone.
-        if path.name == "verdict.json" or CONTRACT_KEY.search(
-            path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8", errors="replace")
+        if path.name == "verdict.json" or re.search(
+            r'"contract"\s*:\s*"(?:verdict|detectability)/', text
         ):
             raise
         return None  # Not written by exoid.
     contract = content.get("contract") if isinstance(content, dict) else None
-    if contract not in documents:
+    if contract not in ("verdict/1", "detectability/1"):
         return None
     if contract == "verdict/1":
         verdicts.check(content, str(path))

@@ -1,15 +1,31 @@
 """Every chart of a session, for the page and for figure files."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from pipelines.plotting.chart import Chart, thinned_alike
 from pipelines.report.sections.control import control_charts
 from pipelines.report.sections.fit_quality import angle_charts, torque_charts
 from pipelines.report.sections.key_figures import worst_joint
 from pipelines.report.sections.residuals import most_explained_variable, residual_charts
-from pipelines.report.sections.section import Charts
 from pipelines.report.session import Session
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Every chart of a session."""
+
+    hero: Chart | None
+    """The chart next to the verdict."""
+    measured: tuple[Chart, ...]
+    residuals: tuple[Chart, ...]
+    control: tuple[Chart, ...]
+
+    @property
+    def all(self) -> tuple[Chart, ...]:
+        """All charts in the page's order."""
+        hero = (self.hero,) if self.hero else ()
+        return (*hero, *self.measured, *self.residuals, *self.control)
 
 
 def charts(session: Session, values: int | None = None) -> Charts:

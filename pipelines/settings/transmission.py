@@ -11,7 +11,7 @@ from pipelines.settings.units import UNITS
 
 def dimension_at(kind: Kind, quantity: str) -> str:
     """Return the dimension of a quantity at a kind of joint: an angle, or a length."""
-    return UNITS[unit_at(kind, QUANTITIES[quantity].unit)].dimension
+    return UNITS[unit_at(kind, QUANTITIES[quantity])].dimension
 
 
 @dataclass(frozen=True)

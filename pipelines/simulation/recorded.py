@@ -82,12 +82,11 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
 
 
 def _drives(motion: Motion) -> Drives:
-    no_limit_nm = 1e9
     of_joints = [motion.metadata["controller"][joint] for joint in motion.joints]
     return make_drives(
         kp=np.array([c["kp_nm_rad"] for c in of_joints], dtype=float),
         kd=np.array([c["kd_nm_s_rad"] for c in of_joints], dtype=float),
-        limit=np.array([c.get("limit_nm") or no_limit_nm for c in of_joints]),
+        limit=np.array([c.get("limit_nm") or 1e9 for c in of_joints]),  # by default none
         # Metadata do not hold the encoders' resolution.
         counts_per_turn=np.zeros(len(of_joints)),
         # All joints share one loop, at the rate of the fastest drive.

@@ -14,9 +14,8 @@ def suggestion(word: str, known: list[str]) -> str:
 
 def closest(word: str, known: Sequence[str]) -> str | None:
     """Return the known name most similar to a mistyped or shortened word, if any is similar."""
-    # Likeness above which a name is suggested, as in difflib.
-    like = 0.6
-    similar = (name for name in known if _likeness(word, name) > like)
+    # The likeness above which difflib suggests a name, too.
+    similar = (name for name in known if _likeness(word, name) > 0.6)
     return max(similar, key=partial(_likeness, word), default=None)
 
 

@@ -9,14 +9,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.contracts.verdict import Finding, Law, Likely, Verdict
+    from pipelines.contracts.verdict import Finding, Verdict
     from pipelines.contracts.verdict import Node as Step
 
 LEAST = 0.01
 """Probability below which an alternative is not shown."""
-TIED = "one of these, which these data cannot separate"
-UNLISTED = "unlisted: "
-AGAINST = ", not named: the validation runs speak against it"
 
 
 @dataclass(frozen=True)
@@ -127,31 +124,29 @@ def _grow(root: Node, finding: "Finding") -> None:
     # That something is missing is one of the outcomes; it is a line only where no more is known.
     for one in path[1 : len(path) - is_cause] or path[: 1 - is_cause]:
         node = _under(node, (one.level, one.value), one.words, one.probability)
+    others = [(f"unlisted: {law.words}", law.probability) for law in finding.laws]
     if is_cause:
         _answer(node, path[-1], finding)
     else:
         node.is_answer = True
-        for cause in finding.causes:
-            _alternative(node, cause.words + AGAINST * cause.dropped, cause)
-    for law in finding.laws:
-        _alternative(node, UNLISTED + law.words, law)
+        against = ", not named: the validation runs speak against it"
+        causes = [(one.words + against * one.dropped, one.probability) for one in finding.causes]
+        others = causes + others
+    for words, probability in others:
+        if probability >= LEAST:
+            _under(node, words, words, probability)
 
 
 def _answer(node: Node, last: "Step", finding: "Finding") -> None:
     """Add a named cause, with those that are tied with it below one line for all of them."""
     first, *ties = finding.causes
     # A tie cannot be decided, so the probability is of all its members together.
-    words = TIED if ties else first.words
+    words = "one of these, which these data cannot separate" if ties else first.words
     here = _under(node, (last.level, last.value), words, finding.probability)
     here.is_answer = True
     if ties:
         for cause in finding.causes:
             _under(here, cause.words, cause.words, cause.probability)
-
-
-def _alternative(node: Node, words: str, entry: "Likely | Law") -> None:
-    if entry.probability >= LEAST:
-        _under(node, words, words, entry.probability)
 
 
 def _under(node: Node, key: Any, words: str, probability: float) -> Node:

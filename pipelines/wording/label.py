@@ -13,9 +13,6 @@ from pipelines.wording.law import LAW, law_in_words
 if TYPE_CHECKING:
     from pipelines.contracts.verdict import Cause, Tie
 
-NAMES = ("Coulomb", "Stribeck")
-"""Of people, whose capital stays."""
-
 SHARES = {
     "noise_floor": "noise floor",
     "repeatable_unexplained": "unexplained, repeats every period",
@@ -99,7 +96,9 @@ def amount(machine: Machine, joint: str, torque: float) -> str:
 
 def title_in_words(effect: Effect) -> str:
     """Return an effect's title as it stands within a sentence."""
-    return effect.title if effect.title.startswith(NAMES) else effect.title.lower()
+    # The capital of people's names stays.
+    is_name = effect.title.startswith(("Coulomb", "Stribeck"))
+    return effect.title if is_name else effect.title.lower()
 
 
 def in_words(effect: Effect) -> str:

@@ -78,9 +78,7 @@ def law_in_words(label: str, machine: Machine | None = None) -> str:
 
 def is_of_other_joint(label: str) -> bool:
     """Return whether a law depends on the other joint's motion."""
-    # Word in the kind of a law of the other joint's motion.
-    other = "other"
-    return other in kind_and_joint(label)[0].split("_")
+    return "other" in kind_and_joint(label)[0].split("_")
 
 
 def family_in_words(

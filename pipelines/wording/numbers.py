@@ -25,11 +25,9 @@ def digits_for(value: float, half: float | None) -> str:
     half : float or None
         Half-width of its interval; like ``digits`` without one.
     """
-    # Significant digits of half an interval, to which its middle and ends are rounded.
-    half_digits = 2
     if not half or not isfinite(half):
         return digits(value)
-    return _written(value, _decimals(half, half_digits))
+    return _written(value, _decimals(half, 2))
 
 
 def _decimals(value: float, significant: int) -> int:

@@ -111,7 +111,7 @@ class Judge:
         """Yield the remains of a run that was killed or stopped early."""
         journal, aborted = journal_of(target), aborted_of(target)
         if journal.exists():
-            yield (f"a run was killed: `exoid recover` makes a recording of {self._name(journal)}")
+            yield f"a run was killed: `exoid recover` makes a recording of {self._name(journal)}"
         if aborted.exists():
             yield f"a run was stopped early: {self._name(aborted)}"
 

@@ -49,11 +49,6 @@ class Step:
         """Every file that it makes."""
         return (self.target, *self.other_outputs)
 
-    @property
-    def settings_files(self) -> tuple[str, ...]:
-        """Names of the files by which make notices a changed setting."""
-        return tuple(f"run-{self.run}" if name == "run" else name for name in self.settings)
-
 
 def graph(
     experiment: Experiment, config: Path, out: Path, imported: ImportedRuns = ImportedRuns()

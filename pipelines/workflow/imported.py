@@ -1,6 +1,6 @@
 """Recordings that no command of an experiment makes again, and runs whose recordings these are."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,16 +32,11 @@ class ImportedRuns:
             Names the damaged files.
         """
         if self.damaged:
-            raise InputError(damage(self.damaged))
-
-
-def damage(files: Sequence[Path]) -> str:
-    """Return a message on recordings that cannot be read, with a remedy."""
-    names, them = ", ".join(file.as_posix() for file in files), "them" if len(files) > 1 else "it"
-    return (
-        f"{names}: damaged or truncated, and nothing is done without {them}; import {them} again,"
-        f" or remove {them}"
-    )
+            them = "them" if len(self.damaged) > 1 else "it"
+            raise InputError(
+                f"{', '.join(file.as_posix() for file in self.damaged)}: damaged or truncated, and"
+                f" nothing is done without {them}; import {them} again, or remove {them}"
+            )
 
 
 def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, ImportedRuns]:

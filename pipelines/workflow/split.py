@@ -18,11 +18,6 @@ from pipelines.workflow.imported import with_imported
 
 INCOMPLETE = "incomplete"
 """The phony prerequisite of a step that lacks one of its files."""
-ONE_AT_A_TIME = (
-    "# A rig makes one run at a time, and in real time no other step may delay its samples.",
-    ".NOTPARALLEL:",
-)
-"""Rules by which `make -j` does one step at a time."""
 
 
 def split(experiment: Experiment, folder: Path) -> None:
@@ -44,7 +39,8 @@ def split(experiment: Experiment, folder: Path) -> None:
             write_text(path, text)
     rules = list(_rules(steps))
     if records and not _may_run_in_parallel(experiment):
-        rules += ["", *ONE_AT_A_TIME]
+        why = "A rig makes one run at a time, and in real time no other step may delay its samples"
+        rules += ["", f"# {why}.", ".NOTPARALLEL:"]
     write_text(folder / "graph.mk", "\n".join(rules) + "\n")
 
 
@@ -84,7 +80,9 @@ def _rules(steps: Sequence[Step]) -> Iterator[str]:
 def _rule(step: Step) -> Iterator[str]:
     # An input that is no result, such as a rig, counts by its hash in the settings.
     inputs = [file.as_posix() for file in step.inputs if file.is_relative_to("$(OUT)")]
-    settings = [f"$(SETTINGS)/{name}.json" for name in step.settings_files]
+    # By these files make notices a changed setting.
+    names = [f"run-{step.run}" if name == "run" else name for name in step.settings]
+    settings = [f"$(SETTINGS)/{name}.json" for name in names]
     yield ""
     yield f"{step.target.as_posix()}: {' '.join([*inputs, *settings, *_if_incomplete(step)])}"
     # make ignores the failure of a step that may fail.

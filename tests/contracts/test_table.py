@@ -509,7 +509,7 @@ def test_a_damaged_page_is_one_line_that_names_the_file(tmp_path, swinging_leg, 
     content[4:400] = bytes(396)
     path.write_bytes(content)
     assert (
-        refusal(storage.load, path)
+        refusal(RECORDING.load, path)
         == f"{path}: is a damaged or truncated Parquet file; copy or make it again"
     )
 
@@ -522,7 +522,7 @@ def test_a_journal_is_recognised_and_its_whole_samples_are_counted(tmp_path):
         stream.write_batch(batch)
     path.write_bytes(path.read_bytes()[:-40])
     assert (
-        refusal(storage.load, path)
+        refusal(RECORDING.load, path)
         == f"{path}: is the journal of a run that was killed or still goes on, with 3 whole"
         " samples; "
         f"`exoid recover {path}` makes a recording of it"

@@ -17,7 +17,7 @@ from pipelines.report.html.report import report
 from pipelines.report.sections import commands, provenance
 from pipelines.report.sections.animation import animations
 from pipelines.report.sections.error_budget import budget
-from pipelines.report.sections.standstill import moving
+from pipelines.report.sections.fit_quality import moving
 from pipelines.report.session import find
 from pipelines.report.session_charts import charts
 from tests.report.sessions import (
@@ -162,7 +162,7 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     tmp_path,
 ):
     folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
-    lines = [command.line for command in commands.commands(find([folder]))]
+    lines = commands.commands(find([folder]))
     assert (
         lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o"
         f" {folder / 'recordings'}/"
@@ -175,12 +175,12 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     )
     assert "Inputs that are not in these folders" in report(find([folder]))
     (folder / "machine.toml").write_text("[joint]\n")
-    assert "--map old/machine.toml" in commands.commands(find([folder]))[0].line
+    assert "--map old/machine.toml" in commands.commands(find([folder]))[0]
 
 
 def test_the_commands_that_repeat_it_end_with_the_report(session_folder):
     session = find([session_folder])
-    assert commands.commands(session)[-1].line == f"exoid report {session_folder}"
+    assert commands.commands(session)[-1] == f"exoid report {session_folder}"
     assert f"exoid report {session_folder} --title Leg -o pages/leg.html" in report(
         session, "Leg", Path("pages/leg.html")
     )

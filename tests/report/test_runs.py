@@ -9,8 +9,8 @@ from pipelines.contracts.provenance import sha256
 from pipelines.report.html.report import report
 from pipelines.report.sections.fit_quality import scores
 from pipelines.report.sections.key_figures import tiles
-from pipelines.report.sections.not_simulated import refusal
 from pipelines.report.sections.parameters import models
+from pipelines.report.sections.validation_runs import refusal
 from pipelines.report.session import find
 from tests.report.sessions import (
     RUN,

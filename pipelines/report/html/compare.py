@@ -1,6 +1,6 @@
 """The comparison of two sessions: verdicts, errors, settings, and changes of parameters."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Any
@@ -13,7 +13,7 @@ from pipelines.report.sections.error_budget import torque_unit
 from pipelines.report.sections.headline import headline, lead, machine, status
 from pipelines.report.sections.parameters import Estimate, estimates
 from pipelines.report.sections.settings_diff import SettingDifference, settings_diff
-from pipelines.report.session import Artifact, Session
+from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, cause_in_words
 from pipelines.wording.numbers import digits
 
@@ -23,7 +23,6 @@ class Change:
     """One number of both sessions."""
 
     words: str
-    unit: str
     first: Estimate
     second: Estimate
 
@@ -51,31 +50,10 @@ class Change:
         return None if not self.half else abs(self.difference) > self.half
 
 
-@dataclass(frozen=True)
-class ModelChanges:
-    """One model of both sessions, parameter by parameter."""
-
-    title: str
-    files: tuple[str, str]
-    changes: tuple[Change, ...]
-    only: tuple[tuple[str, ...], tuple[str, ...]]
-    """Parameters of the first session only, and of the second only."""
-
-    @property
-    def beyond(self) -> int:
-        """Number of parameters that changed beyond their intervals."""
-        return sum(bool(change.is_beyond) for change in self.changes)
-
-    @property
-    def judged(self) -> int:
-        """Number of parameters with an interval of the difference."""
-        return sum(change.is_beyond is not None for change in self.changes)
-
-
 def changes(first: Sequence[Estimate], second: Sequence[Estimate]) -> list[Change]:
     """Return the parameters of both, in the order of the first."""
     others = {one.key: one for one in second}
-    return [Change(one.words, one.unit, one, others[one.key]) for one in first if one.key in others]
+    return [Change(one.words, one, others[one.key]) for one in first if one.key in others]
 
 
 @dataclass(frozen=True)
@@ -87,9 +65,9 @@ class Comparison:
     judged: int
     headline: str
     """The changes, most important first."""
-    errors: tuple[str, ...]
+    errors: list[str]
     """One line per joint and model: its errors and noise floors."""
-    settings: tuple[SettingDifference, ...]
+    settings: list[SettingDifference]
 
 
 def titles_of(first: Session, second: Session) -> tuple[str, str]:
@@ -115,9 +93,13 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compari
     pair = (first, second)
     _refuse_different_machines(pair, titles)
     models = list(_models(pair))
-    _refuse_different_units(models)
-    rows = _errors_and_floors(pair)
-    context: dict[str, Any] = {
+    # The last model has the most parameters; those of the other are not counted twice.
+    changed = [change.is_beyond for change in models[-1]["changes"]] if models else []
+    beyond, judged = changed.count(True), len(changed) - changed.count(None)
+    result, rows = _change_in_words(pair, beyond, judged), _errors_and_floors(pair)
+    settings = settings_diff(first, second)
+    context = {
+        "headline": result,
         "titles": titles,
         "machines": [machine(session) for session in pair],
         "verdicts": [session.verdict for session in pair],
@@ -126,19 +108,14 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compari
         "statuses": [status(session.verdict) for session in pair],
         "headlines": [headline(session) for session in pair],
         "models": models,
-        "settings": settings_diff(first, second),
+        "settings": settings,
         "errors_and_floors": rows,
-        # The last model has the most parameters; those of the other are not counted twice.
-        "beyond": models[-1].beyond if models else 0,
-        "judged": models[-1].judged if models else 0,
+        "judged": judged,
         "causes": _causes(pair),
-        "errors": _by_model(rows),
     }
-    beyond, judged, settings = context["beyond"], context["judged"], context["settings"]
-    sentence = context["headline"] = _change_in_words(pair, beyond, judged)
     text = render("compare.html", (), (), context, (*first.artifacts, *second.artifacts))
-    errors = tuple(row.words for row in rows)
-    return Comparison(text, beyond, judged, sentence, errors, tuple(settings))
+    errors = [row.words for row in rows]
+    return Comparison(text, beyond, judged, result, errors, settings)
 
 
 def _change_in_words(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
@@ -211,13 +188,7 @@ def _errors_and_floors(pair: tuple[Session, Session]) -> list[ErrorAndFloor]:
 
 
 def _refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
-    """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism.
-
-    Raises
-    ------
-    InputError
-        If they differ.
-    """
+    """Refuse sessions whose machines differ in their joints' names or kinds, or their mechanism."""
     descriptions = {"": lambda session: in_words(session.joints), "mechanism ": _mechanism}
     # Equal joints are not enough: a leg that lies level has other parameters than one that hangs.
     for prefix, description in descriptions.items():
@@ -235,46 +206,32 @@ def _mechanism(session: Session) -> str | None:
     return next((name for name in names if isinstance(name, str)), None)
 
 
-def _refuse_different_units(models: Iterable[ModelChanges]) -> None:
-    """Refuse parameters whose unit differs between the sessions.
-
-    Raises
-    ------
-    InputError
-        If a unit differs.
-    """
-    for model in models:
-        for change in model.changes:
-            if change.first.unit != change.second.unit:
-                raise InputError(
-                    f"{model.files[0]} and {model.files[1]}: {change.words} is in"
-                    f" {change.first.unit} and in {change.second.unit}, expected one unit. Compare"
-                    " two sessions of one machine"
-                )
-
-
-def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
+def _models(pair: tuple[Session, Session]) -> Iterator[dict[str, Any]]:
+    """Yield the changes of each model that both sessions have, parameter by parameter."""
+    kinds = {
+        "Rigid body and friction": [next(iter(session.baselines), None) for session in pair],
+        "With the causes that each names": [session.extended for session in pair],
+    }
     first, second = pair
-    kinds = (
-        ("Rigid body and friction", [next(iter(session.baselines), None) for session in pair]),
-        ("With the causes that each names", [session.extended for session in pair]),
-    )
-    for title, (one, other) in kinds:
+    for title, (one, other) in kinds.items():
         if one and other:
-            yield _model(title, first, one, second, other)
+            a, b = estimates(first.table(one)), estimates(second.table(other))
+            files = (first.shown(one.path), second.shown(other.path))
+            _refuse_different_units(changes(a, b), files)
+            only = (_only(first, a, b), _only(second, b, a))
+            yield {"title": title, "files": files, "changes": changes(a, b), "only": only}
 
 
-def _model(
-    title: str, first: Session, one: Artifact, second: Session, other: Artifact
-) -> ModelChanges:
-    a, b = estimates(first.table(one)), estimates(second.table(other))
-    files = (first.shown(one.path), second.shown(other.path))
-    return ModelChanges(
-        title, files, tuple(changes(a, b)), (_only(first, a, b), _only(second, b, a))
-    )
+def _refuse_different_units(changes: list[Change], files: tuple[str, str]) -> None:
+    for change in changes:
+        if change.first.unit != change.second.unit:
+            raise InputError(
+                f"{files[0]} and {files[1]}: {change.words} is in {change.first.unit} and in"
+                f" {change.second.unit}, expected one unit. Compare two sessions of one machine"
+            )
 
 
-def _only(session: Session, own: list[Estimate], others: list[Estimate]) -> tuple[str, ...]:
+def _only(session: Session, own: list[Estimate], others: list[Estimate]) -> list[str]:
     """Return the parameters of one session only, in words, with its named causes."""
     named = {cause.label for cause in session.causes}
     known = {other.key for other in others}
@@ -283,7 +240,7 @@ def _only(session: Session, own: list[Estimate], others: list[Estimate]) -> tupl
         label = f"{one.effect}@{one.joint}" if one.joint else one.effect
         cause = f" of {any_label_in_words(label)}, which it names" if label in named else ""
         results.append(f"{one.words}{cause}")
-    return tuple(results)
+    return results
 
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
@@ -311,12 +268,3 @@ def _cause_cell(session: Session, cause: Cause | None) -> dict[str, Any] | None:
         "high": high,
         "unit": torque_unit(session.verdict, cause.gain.joint),
     }
-
-
-def _by_model(rows: list[ErrorAndFloor]) -> list[tuple[str, list[ErrorAndFloor]]]:
-    """Return the errors of each model, with its title."""
-    models = dict.fromkeys(row.model for row in rows)
-    return [
-        (model[:1].upper() + model[1:], [row for row in rows if row.model == model])
-        for model in models
-    ]

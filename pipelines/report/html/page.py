@@ -29,8 +29,6 @@ LARGEST_BYTES = 5_000_000
 VALUES = 600_000
 """Numbers in all charts of a page: 5.3 bytes each as base64, which leaves room for words."""
 
-ASSETS = files("pipelines.report").joinpath("assets")
-
 
 def render(
     template: str,
@@ -77,7 +75,7 @@ def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
 @cache
 def _asset(name: str) -> str:
     """Return a file of the page."""
-    return ASSETS.joinpath(name).read_text(encoding="utf-8")
+    return files("pipelines.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 @cache

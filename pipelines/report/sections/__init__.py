@@ -1,1 +1,1 @@
-"""The sections of a report, one a file; each has a function ``context`` (see ``section.py``)."""
+"""The sections of a report, one a file: values of the page's template, from a session."""

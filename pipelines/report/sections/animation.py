@@ -1,7 +1,6 @@
 """The machine in motion: measured, and in simulations of one second with each model."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +8,7 @@ from numpy.typing import NDArray
 from pipelines.contracts import Table
 from pipelines.contracts.joint_units import Kind
 from pipelines.report.sections.fit_quality import MODELS, replayed
-from pipelines.report.sections.section import Content
-from pipelines.report.session import Session
+from pipelines.report.session import Artifact, Session
 
 FRAMES_HZ = 50.0
 LONGEST_S = 40.0
@@ -39,31 +37,20 @@ class Animation:
     labels: dict[str, str]
 
 
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's animations."""
-    return {
-        "is_leg": _drawn_as(content.session) == "leg",
-        "animations": animations(content.session),
-    }
-
-
 def animations(session: Session) -> list[Animation]:
     """Return an animation of each replayed run, if the machine can be drawn."""
-    if not _drawn_as(session):
+    if not drawn_as(session):
         return []
-    results = []
-    for run, replays in replayed(session).items():
-        tables = {model: session.table(one) for model, one in replays.items()}
-        results.append(_animation(session, run, tables))
-    return results
+    return [_animation(session, run, replays) for run, replays in replayed(session).items()]
 
 
-def _drawn_as(session: Session) -> str:
+def drawn_as(session: Session) -> str:
     """Return the drawing's name for a session's machine; empty if there is none."""
     return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
 
 
-def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animation:
+def _animation(session: Session, run: str, replays: dict[str, Artifact]) -> Animation:
+    tables = {model: session.table(one) for model, one in replays.items()}
     first = next(iter(tables.values()))
     time = first.frame["time_s"].to_numpy()
     rows = _frames(time, np.abs(first.stacked("error")).sum(axis=1))
@@ -93,13 +80,12 @@ def _frames(time: NDArray, error: NDArray) -> NDArray:
 
 
 def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
-    # Assumed ratio of lengths: no file holds the shank's, and no torque depends on it.
-    shank_to_thigh = 1.05
-    drawn = _drawn_as(session)
+    drawn = drawn_as(session)
     if drawn == "slider":
         return drawn, (float(np.abs(measured).max()) or 1.0,)
     if drawn == "pendulum":
         return drawn, (1.0,)
     geometry = table.metadata.get("plant", {}).get("geometry", {})
     thigh = geometry.get("thigh_length_m") or 0.4
-    return drawn, (thigh, shank_to_thigh * thigh)
+    # An assumed ratio: no file holds the shank's length, and no torque depends on it.
+    return drawn, (thigh, 1.05 * thigh)

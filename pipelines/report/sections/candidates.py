@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
 from pipelines.wording.numbers import digits
@@ -15,14 +14,8 @@ TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn"}
 Row = dict[Any, Any]
 
 
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's table of candidates."""
-    # Sets in sight; the others unfold.
-    most_candidates = 12
-    return {"candidates": _candidates(content.session), "most_candidates": most_candidates}
-
-
-def _candidates(session: Session) -> list[dict[str, Any]]:
+def candidates(session: Session) -> list[dict[str, Any]]:
+    """Return the rows of the template's table of candidates, the best first."""
     if session.candidates is None:
         return []
     rows = session.candidates.frame.sort_values("rank").to_dict("records")

@@ -1,34 +1,15 @@
 """Command lines that make the files of a session again."""
 
 import shlex
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pipelines.report.sections.provenance import resolved
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session, simulation_kind
 from pipelines.settings import Experiment
 from pipelines.settings.identify import IdentifySettings
 
 
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's list of commands."""
-    return {"commands": commands(content.session, content.output, content.title)}
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command line."""
-
-    line: str
-    needs_settings: bool
-    """Whether it names an exoid.toml that the session does not hold."""
-
-
-def commands(
-    session: Session, output: Path | None = None, title: str | None = None
-) -> list[Command]:
+def commands(session: Session, output: Path | None = None, title: str | None = None) -> list[str]:
     """Return the command lines that make the session's files again, in order, then the page."""
     stages = [_COMMANDS[kind](session, one) for kind in _COMMANDS for one in session.of_kind(kind)]
     page = ["report", *map(str, session.folders)]
@@ -38,27 +19,21 @@ def commands(
         page += ["--title", title]
     if output:
         page += ["-o", str(output)]
-    results = [command for command in stages if command] + [(page, False)]
     # One command makes several files, so its line comes up more than once.
-    lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in results)
-    return [Command(line, needs) for line, needs in lines]
+    return list(dict.fromkeys(shlex.join(["exoid", *words]) for words in [*stages, page] if words))
 
 
-Words = tuple[list[str], bool]
-"""The words of a command, and whether it needs an exoid.toml that the session does not hold."""
-
-
-def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Words:
+def _config(session: Session, artifact: Artifact, *, always: bool = False) -> list[str]:
     """Return the option that names the settings; none if the defaults suffice."""
     if session.config:
-        return ["--config", str(session.config)], False
+        return ["--config", str(session.config)]
     defaults = Experiment()
     # Files state their settings, so equal defaults make the same result without exoid.toml.
     usual = all(
         value == getattr(defaults, name).model_dump(mode="json")
         for name, value in resolved(artifact).items()
     )
-    return ([], False) if usual and not always else (["--config", "exoid.toml"], True)
+    return [] if usual and not always else ["--config", "exoid.toml"]
 
 
 def _path_of(session: Session, stated: dict[str, str]) -> str:
@@ -73,8 +48,7 @@ def _folder(path: Path) -> str:
     return f"{path.parent}/"
 
 
-def _design(session: Session, artifact: Artifact) -> Words | None:
-    config, needs = _config(session, artifact)
+def _design(session: Session, artifact: Artifact) -> list[str]:
     used, now = resolved(artifact).get("design") or {}, session.experiment
     # Options that took the place of the settings.
     options = [
@@ -83,22 +57,22 @@ def _design(session: Session, artifact: Artifact) -> Words | None:
         if now and key in used and used[key] != getattr(now.design, key)
         for word in (f"--{key}", str(used[key]))
     ]
-    return ["design", *config, *options, "-o", str(artifact.path)], needs
+    return ["design", *_config(session, artifact), *options, "-o", str(artifact.path)]
 
 
-def _record(session: Session, artifact: Artifact) -> Words | None:
+def _record(session: Session, artifact: Artifact) -> list[str]:
     inputs = _inputs(session, artifact)
     if "imported" in artifact.metadata:
-        return _import(session, artifact, inputs), False
+        return _import(artifact, inputs)
     run = (artifact.metadata.get("config") or {}).get("run") or {}
     if not run or not inputs:
-        return None
-    config, needs = _config(session, artifact, always=True)
+        return []
+    config = _config(session, artifact, always=True)
     words = ["acquire", *config, "--run", run["name"], "--trajectory", inputs[0]]
-    return [*words, "-o", str(artifact.path)], needs
+    return [*words, "-o", str(artifact.path)]
 
 
-def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str]:
+def _import(artifact: Artifact, inputs: list[str]) -> list[str]:
     """Return the words that import a log, by its path in these folders or in the first import."""
     given = artifact.metadata["imported"].get("given") or {}
     stated = zip(inputs, artifact.inputs, strict=True)
@@ -113,20 +87,18 @@ def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str
     return ["import", *sources, *(["--map", maps[0]] if maps else []), "-o", _folder(artifact.path)]
 
 
-def _filter(session: Session, artifact: Artifact) -> Words | None:
-    config, needs = _config(session, artifact)
+def _filter(session: Session, artifact: Artifact) -> list[str]:
     cutoff_hz = (resolved(artifact).get("filter") or {}).get("cutoff_hz", "auto")
     now = session.experiment
     changed = now is not None and cutoff_hz != now.filter.cutoff_hz
     option = ["--cutoff-hz", str(cutoff_hz)] if changed else []
-    words = ["filter", *_inputs(session, artifact), *config, *option]
-    return [*words, "-o", str(artifact.path)], needs
+    words = ["filter", *_inputs(session, artifact), *_config(session, artifact), *option]
+    return [*words, "-o", str(artifact.path)]
 
 
-def _identify(session: Session, artifact: Artifact) -> Words | None:
+def _identify(session: Session, artifact: Artifact) -> list[str]:
     if artifact is session.extended:
-        return None  # The diagnosis writes it.
-    config, needs = _config(session, artifact)
+        return []  # The diagnosis writes it.
     # Among the inputs, but given by an option of its own.
     causes = [_path_of(session, artifact.causes)] if artifact.causes else []
     runs = [path for path in _inputs(session, artifact) if path not in causes]
@@ -137,32 +109,32 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
         words += ["--method", settings["method"]]
     if settings.get("reversals"):
         words.append("--reversals")
-    return ["identify", *runs, *words, *config, "-o", _folder(artifact.path)], needs
+    words += [*_config(session, artifact), "-o", _folder(artifact.path)]
+    return ["identify", *runs, *words]
 
 
-def _diagnose(session: Session, artifact: Artifact) -> Words | None:
-    config, needs = _config(session, artifact)
+def _diagnose(session: Session, artifact: Artifact) -> list[str]:
     labels = (resolved(artifact).get("diagnose") or {}).get("known") or []
     known = [word for label in labels for word in ("--known", label)]
-    words = ["diagnose", *_inputs(session, artifact), *known, *config]
-    return [*words, "--out", _folder(artifact.path)], needs
+    words = ["diagnose", *_inputs(session, artifact), *known, *_config(session, artifact)]
+    return [*words, "--out", _folder(artifact.path)]
 
 
-def _simulate(session: Session, artifact: Artifact) -> Words | None:
+def _simulate(session: Session, artifact: Artifact) -> list[str]:
     inputs = _inputs(session, artifact)
     kind = simulation_kind(artifact)
     if kind == "drives" or not inputs:
-        return None  # Written together with the replay in windows.
-    config, needs = _config(session, artifact)
+        return []  # Written together with the replay in windows.
+    config = _config(session, artifact)
     if kind == "windows":
         words = ["simulate", inputs[0], "--replay", inputs[-1], *config]
-        return [*words, "-o", str(artifact.path)], needs
+        return [*words, "-o", str(artifact.path)]
     # The model is the first input, and a reference, if any, the second.
     reference = ["--reference", inputs[1]] if len(inputs) > 1 else []
     run = artifact.metadata.get("plant", {}).get("run", "with_human")
     option = [] if run == "with_human" else ["--run", run]
     words = ["simulate", inputs[0], *reference, *option, *config]
-    return [*words, "-o", _folder(artifact.path)], needs
+    return [*words, "-o", _folder(artifact.path)]
 
 
 _COMMANDS = {

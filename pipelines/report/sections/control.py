@@ -11,22 +11,11 @@ from pipelines.contracts.verdict import Verdict
 from pipelines.plotting.chart import Chart
 from pipelines.plotting.simulation_panels import GAIN, loop_panels, sweep_panel
 from pipelines.report.sections.fit_quality import drawn, models_of
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 from pipelines.workflow.graph import SWEEP
 
 
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's part on control."""
-    session, verdict = content.session, content.verdict
-    return {
-        "control": _comparison(verdict) if verdict else None,
-        "control_is_compared": "extended" in _loops(session),
-        "loops": content.charts.control,
-    }
-
-
-def _comparison(verdict: Verdict) -> dict[str, Any] | None:
+def comparison(verdict: Verdict) -> dict[str, Any] | None:
     """Return the table of tracking errors and torques; None without a simulated loop."""
     control = verdict.control
     loops = [("without", "rigid body and friction", control.without)]
@@ -48,7 +37,7 @@ def _comparison(verdict: Verdict) -> dict[str, Any] | None:
     }
 
 
-def _loops(session: Session) -> dict[str, Artifact]:
+def loops_of(session: Session) -> dict[str, Artifact]:
     """Return one adaptive loop of each model, with a wearer if there are several."""
     results = {}
     for model, simulations in session.simulations_by_model("loop").items():
@@ -61,7 +50,7 @@ def _loops(session: Session) -> dict[str, Artifact]:
 
 def control_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each joint, then the chart of the sweep."""
-    of_models = _loops(session)
+    of_models = loops_of(session)
     tables = {model: session.table(one).frame for model, one in of_models.items()}
     if not tables:
         return

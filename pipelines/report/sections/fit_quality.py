@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.plotting.chart import Chart, DrawnTable, Role
 from pipelines.plotting.residual_panels import torque_panels
 from pipelines.plotting.simulation_panels import window_panels
-from pipelines.report.sections.standstill import moving
 from pipelines.report.session import Artifact, Session
 from pipelines.wording.increased_errors import simulation_error_grew, torque_error_grew
 
@@ -19,6 +19,8 @@ MODELS = {
     "extended": (Role.AFTER, "with the causes"),
 }
 """Role and legend of the models of ``residuals/1``."""
+SLOW = 0.1
+"""Share of its rms speed below which a joint counts as standing."""
 
 
 def run_names(session: Session) -> list[str]:
@@ -44,41 +46,52 @@ def drawn(model: str, rows: pd.DataFrame) -> DrawnTable:
 
 def torque_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart for each run and joint: torque, and the residual of each model."""
-    if session.residuals is None:
-        return
-    frame = session.residuals.frame
     for run in run_names(session):
-        of_run = frame[frame["file"] == run]
+        rows = residuals_of(session, run)
+        measured = rows[rows["model"] == rows["model"].iloc[0]]
+        models = [drawn(model, rows[rows["model"] == model]) for model in models_of(session)]
         for joint in session.joints:
-            yield _torque_chart(session, run, joint, of_run, session.noise_floor(joint))
+            floor = session.noise_floor(joint)
+            yield Chart(
+                key=f"torque-{run.removesuffix('.parquet')}-{joint.name}",
+                title=f"{joint.name} {joint.effort}",
+                caption=(
+                    "Measured and computed from the motion, in the blocks that were fitted; below,"
+                    " each model's error away from reversals"
+                    f"{', on the band of the noise floor' if floor else ''}."
+                ),
+                x_label="time, s",
+                x=measured["time_s"].to_numpy(),
+                panels=torque_panels(joint, measured, models, floor),
+                group=run,
+            )
 
 
-def _torque_chart(
-    session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None
-) -> Chart:
-    measured = frame[frame["model"] == frame["model"].iloc[0]]
-    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
-    return Chart(
-        key=f"torque-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {joint.effort}",
-        caption=(
-            "Measured and computed from the motion, in the blocks that were fitted; below, each"
-            " model's error away from reversals"
-            f"{', on the band of the noise floor' if floor else ''}."
-        ),
-        x_label="time, s",
-        x=measured["time_s"].to_numpy(),
-        panels=torque_panels(joint, measured, models, floor),
-        group=run,
-    )
+def residuals_of(session: Session, run: str) -> pd.DataFrame:
+    """Return the residuals of a run; no rows if it has none."""
+    if session.residuals is None:
+        return pd.DataFrame({"file": []})
+    frame = session.residuals.frame
+    return frame[frame["file"] == run]
 
 
 def angle_charts(session: Session) -> Iterator[Chart]:
     """Yield a chart of simulated angles for each replayed run and joint."""
-    for run, replays in replayed(session).items():
-        tables = {model: session.table(one).frame for model, one in replays.items()}
+    for run, files in replayed(session).items():
+        replays = [drawn(model, session.table(one).frame) for model, one in files.items()]
         for joint in session.joints:
-            yield _angle_chart(run, joint, tables)
+            yield Chart(
+                key=f"angle-{run.removesuffix('.parquet')}-{joint.name}",
+                title=f"{joint.name} {joint.place} in simulations of one second",
+                caption=(
+                    f"Each second the model starts from the measured state and receives the"
+                    f" recorded {joint.effort}; below, its error."
+                ),
+                x_label="time, s",
+                x=replays[0].rows["time_s"].to_numpy(),
+                panels=window_panels(joint, replays),
+                group=run,
+            )
 
 
 def replayed(session: Session, kind: str = "windows") -> dict[str, dict[str, Artifact]]:
@@ -106,7 +119,6 @@ class Score:
 
 
 LARGER = "larger with the causes"
-STANDS = "a model of speed cannot predict the torque that holds a standing joint"
 SCORES = {
     "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
     "drives": (
@@ -143,10 +155,9 @@ def _stated_error(replay: Artifact | None, key: str, joint: Joint, factor: float
 
 def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
     """Yield a run's rms torque error away from reversals, and in all blocks that were fitted."""
-    if session.residuals is None:
+    rows = residuals_of(session, run)
+    if not len(rows):
         return
-    rows = session.residuals.frame
-    rows = rows[rows["file"] == run]
     floor = session.noise_floor(joint)
     grew_away_from_reversals = False
     # In this order, as the second note depends on the first result.
@@ -158,7 +169,10 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         grew = floor is not None and torque_error_grew(*values, floor=floor)
         note = LARGER if grew else ""
         if grew and words == "reversals included" and not grew_away_from_reversals:
-            note += f"; only near reversals: {STANDS}"
+            note += (
+                "; only near reversals: a model of speed cannot predict the torque that holds a"
+                " standing joint"
+            )
         label = f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}"
         yield Score(label, values, note)
         grew_away_from_reversals = grew
@@ -171,35 +185,37 @@ def _while_moving(
     values: list[float | None] = []
     kept = of = 0
     for model in models_of(session):
-        frame = session.table(replays[model]).frame if model in replays else None
-        chosen = frame[moving(frame, joint)] if frame is not None else None
-        if frame is None or chosen is None or not len(chosen):
-            values.append(None)
-            continue
-        # mrad, or mm at a prismatic joint.
-        values.append(1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2))))
-        kept, of = chosen["window"].nunique(), frame["window"].nunique()
+        values.append(None)
+        if model in replays:
+            frame = session.table(replays[model]).frame
+            chosen = frame[moving(frame, joint)]
+            if len(chosen):
+                # mrad, or mm at a prismatic joint.
+                values[-1] = 1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2)))
+                kept, of = chosen["window"].nunique(), frame["window"].nunique()
     # If all windows count, or none, the row would repeat another or be empty.
     if 0 < kept < of:
         yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
 
 
-def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
-    first = next(iter(tables.values()))
-    replays = [drawn(model, table) for model, table in tables.items()]
-    return Chart(
-        key=f"angle-{_stem(run)}-{joint.name}",
-        title=f"{joint.name} {joint.place} in simulations of one second",
-        caption=(
-            f"Each second the model starts from the measured state and receives the recorded"
-            f" {joint.effort}; below, its error."
-        ),
-        x_label="time, s",
-        x=first["time_s"].to_numpy(),
-        panels=window_panels(joint, replays),
-        group=run,
-    )
+def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
+    """Return whether the measured joint moved throughout the window of each row.
 
+    Parameters
+    ----------
+    frame : DataFrame of n rows
+        A replay: ``time_s``, ``window``, and the measured angle as reference.
+    joint : Joint
 
-def _stem(run: str) -> str:
-    return run.removesuffix(".parquet")
+    Returns
+    -------
+    (n,) array of bool
+    """
+    time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
+    windows = frame["window"].to_numpy()
+    # Speed is measured over 0.1 s, so that encoder noise does not count as motion.
+    span = max(1, round(0.1 / float(np.median(np.diff(time)))))
+    moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
+    slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
+    # One slow stretch excludes its whole window, whose error lasts to the window's end.
+    return ~np.isin(windows, windows[span:][within & slow])

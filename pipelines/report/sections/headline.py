@@ -5,7 +5,6 @@ from typing import Any
 from pipelines.contracts.joints import either
 from pipelines.contracts.verdict import Verdict
 from pipelines.report.sections.recordings import origin
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import causes_in_words
 
@@ -21,11 +20,10 @@ HEADLINES = {
 }
 
 
-def context(content: Content) -> dict[str, Any]:
+def context(session: Session) -> dict[str, Any]:
     """Return the values that the template's top and several of its parts use."""
-    session, verdict = content.session, content.verdict
+    verdict = session.verdict
     return {
-        "title": content.title or session.name,
         "machine": machine(session),
         "status": status(verdict),
         "headline": headline(session),

@@ -1,14 +1,12 @@
 """The numbers of the first screen: probability, gain, remaining error and simulation error."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
 from pipelines.contracts.verdict import Cause, Verdict
 from pipelines.report.sections.error_budget import falls, torque_unit
 from pipelines.report.sections.fit_quality import replayed
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.wording.causes import cause_in_words
 from pipelines.wording.increased_errors import simulation_error_grew
@@ -25,11 +23,6 @@ class Tile:
     small: str
     is_worse: bool = False
     """Whether the number speaks against naming the causes."""
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's key figures."""
-    return {"tiles": tiles(content.session)}
 
 
 def tiles(session: Session) -> list[Tile]:

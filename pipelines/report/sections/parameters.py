@@ -8,12 +8,8 @@ import pandas as pd
 
 from pipelines.contracts import Table
 from pipelines.model import BASELINE
-from pipelines.report.sections.section import Content
 from pipelines.report.sections.symbols import meaning
 from pipelines.report.session import Artifact, Session
-
-SENTENCES = ("collinear", "remarks", "angle_noise")
-"""Lists of sentences in the metadata of a model."""
 
 
 @dataclass(frozen=True)
@@ -71,20 +67,13 @@ class Model:
     title: str
     method: str
     estimates: tuple[Estimate, ...]
-    collinear: tuple[str, ...]
-    unrealizable: tuple[str, ...] | None
+    collinear: list[str]
+    unrealizable: list[str] | None
     """Reasons why no real machine has these values; None if the file has no such key."""
-    remarks: tuple[str, ...]
+    remarks: list[str]
     """Sentences on its method and its peculiarities."""
-    angle_noise: tuple[str, ...]
+    angle_noise: list[str]
     """Sentences on inertia underestimated because of noisy angles."""
-    validation: dict[str, dict[str, dict[str, float]]]
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's tables of models."""
-    shown, has_baseline = models(content.session), bool(content.session.baselines)
-    return {"has_baseline": has_baseline, "models": shown, "parameters": _side_by_side(shown)}
 
 
 def models(session: Session) -> list[Model]:
@@ -117,7 +106,7 @@ class Row:
         return min(ends), max(ends)
 
 
-def _side_by_side(shown: Sequence[Model]) -> list[Row]:
+def side_by_side(shown: Sequence[Model]) -> list[Row]:
     """Return each parameter of some models with its estimates."""
     by_key: dict[tuple[str, str, str, str], dict[int, Estimate]] = {}
     for number, model in enumerate(shown):
@@ -132,7 +121,6 @@ def _side_by_side(shown: Sequence[Model]) -> list[Row]:
 def _model(session: Session, artifact: Artifact, title: str) -> Model:
     table = session.table(artifact)
     about = table.metadata
-    unrealizable = about.get("unrealizable")
     return Model(
         file=session.shown(artifact.path),
         title=title,
@@ -141,9 +129,10 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
             replace(e, meaning=meaning(session, e.effect, e.joint, e.name))
             for e in estimates(table)
         ),
-        unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
-        **{key: tuple(map(str, about.get(key) or ())) for key in SENTENCES},
-        validation=about.get("validation") or {},
+        unrealizable=about.get("unrealizable"),
+        collinear=about.get("collinear") or [],
+        remarks=about.get("remarks") or [],
+        angle_noise=about.get("angle_noise") or [],
     )
 
 
@@ -158,14 +147,18 @@ def _estimate(row: Mapping[Any, Any]) -> Estimate:
     )
     # A missing text is NaN in a table, as the joint of a rigid body.
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
-    names = {key: row[key] for key in ("effect", "name", "symbol", "unit")}
-    numbers: dict[str, Any] = {
-        "value": float(row["value"]),
-        "low": low,
-        "high": high,
-    }
-    each_run = bool(row.get("each_run"))
-    return Estimate(**names, **numbers, joint=joint, run=run, each_run=each_run)
+    return Estimate(
+        effect=row["effect"],
+        name=row["name"],
+        symbol=row["symbol"],
+        joint=joint,
+        run=run,
+        unit=row["unit"],
+        value=float(row["value"]),
+        low=low,
+        high=high,
+        each_run=bool(row.get("each_run")),
+    )
 
 
 def _method(method: Any) -> str:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 from pipelines.settings import Experiment
 
@@ -15,9 +14,8 @@ SECTIONS = tuple(name for name in Experiment.model_fields if name not in ("acqui
 REMEDY = "`exoid run` or `make` makes them again"
 
 
-def context(content: Content) -> dict[str, Any]:
+def context(session: Session) -> dict[str, Any]:
     """Return the values of the template's list of files, and its warnings."""
-    session = content.session
     return {
         "warnings": [*_stale(session), *_changed_settings(session)],
         "settings": json.dumps(settings(session), indent=1, ensure_ascii=False),
@@ -27,54 +25,29 @@ def context(content: Content) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class Input:
-    """One file that another was computed from."""
-
-    name: str
-    sha256: str
-    state: str
-    """``found`` (the session holds the same bytes), ``changed`` (a file of that name with other
-    bytes) or ``elsewhere``."""
-
-
-@dataclass(frozen=True)
-class Origin:
-    """One file and its inputs."""
-
-    file: str
-    contract: str
-    created_by: str
-    created_at: str
-    sha256: str
-    inputs: tuple[Input, ...]
-
-    @property
-    def here(self) -> list[str]:
-        """Names of the inputs that the session holds and lists with their hashes."""
-        return [one.name for one in self.inputs if one.state == "found"]
+def _origins(session: Session) -> list[dict[str, Any]]:
+    """Return every file of a session with its inputs, oldest first."""
+    rows: list[dict[str, Any]] = [
+        {
+            "file": session.shown(one.path),
+            "contract": one.contract,
+            "created_by": str(one.metadata.get("created_by") or "unknown"),
+            "created_at": str(one.metadata.get("created_at") or ""),
+            "sha256": one.sha256,
+            "inputs": [stated | {"state": _state(session, stated)} for stated in one.inputs],
+        }
+        for one in session.artifacts
+    ]
+    return sorted(rows, key=lambda row: (row["created_at"], row["file"]))
 
 
-def _origins(session: Session) -> list[Origin]:
-    """Return every file of a session, oldest first."""
-    rows = []
-    for one in session.artifacts:
-        by = str(one.metadata.get("created_by") or "unknown")
-        when = str(one.metadata.get("created_at") or "")
-        inputs = tuple(_input(session, stated) for stated in one.inputs)
-        rows.append(Origin(session.shown(one.path), one.contract, by, when, one.sha256, inputs))
-    return sorted(rows, key=lambda origin: (origin.created_at, origin.file))
-
-
-def _input(session: Session, stated: dict[str, str]) -> Input:
+def _state(session: Session, stated: dict[str, str]) -> str:
+    """Return ``found``, ``changed`` (the file of that name has other bytes) or ``elsewhere``."""
     if session.file_of(stated["name"], stated["sha256"]):
-        state = "found"
+        return "found"
     # The same name with other bytes: the input was made again after it was used.
-    elif any(one.path.name == stated["name"] for one in session.artifacts):
-        state = "changed"
-    else:
-        state = "elsewhere"
-    return Input(stated["name"], stated["sha256"], state)
+    is_here = any(one.path.name == stated["name"] for one in session.artifacts)
+    return "changed" if is_here else "elsewhere"
 
 
 @dataclass(frozen=True)
@@ -94,7 +67,7 @@ def outside(session: Session) -> list[Outside]:
     results: dict[str, Outside] = {}
     for one in session.artifacts:
         for stated in one.inputs:
-            if _input(session, stated).state != "elsewhere":
+            if _state(session, stated) != "elsewhere":
                 continue
             name, role = _role(one, stated["name"])
             digest = stated["sha256"]
@@ -122,23 +95,20 @@ def _stale(session: Session) -> list[str]:
     """Return a sentence for each file that changed after other files were made of it."""
     by_file: dict[str, list[str]] = {}
     for origin in _origins(session):
-        for one in origin.inputs:
-            if one.state == "changed":
-                by_file.setdefault(one.name, []).append(origin.file)
+        for one in origin["inputs"]:
+            if one["state"] == "changed":
+                by_file.setdefault(one["name"], []).append(origin["file"])
     return [
-        f"{name} has changed since {_few(files)} {'was' if len(files) == 1 else 'were'} made of it;"
-        f" {REMEDY}"
+        f"{name} has changed since {_few(files)} made of it; {REMEDY}"
         for name, files in by_file.items()
     ]
 
 
 def _few(files: Sequence[str]) -> str:
-    """Return the first files by name, and the number of the others."""
-    # Number of files that a warning names.
-    few = 3
-    more = [f"{len(files) - few} more files"] if len(files) > few else []
-    *most, last = [*files[:few], *more]
-    return f"{', '.join(most)} and {last}" if most else last
+    """Return the first three files by name, the number of the others, and their verb."""
+    more = [f"{len(files) - 3} more files"] if len(files) > 3 else []
+    *most, last = [*files[:3], *more]
+    return f"{', '.join(most)} and {last} were" if most else f"{last} was"
 
 
 def _software(session: Session) -> list[tuple[str, list[str]]]:
@@ -180,7 +150,6 @@ def _changed_settings(session: Session) -> list[str]:
             if any(setting[key] != value for key, value in is_now.items() if key in setting):
                 by_value.setdefault(name, []).append(session.shown(one.path))
     return [
-        f"{_few(files)} {'was' if len(files) == 1 else 'were'} made with another [{name}] than"
-        f" {session.config.name} has now; {REMEDY}"
+        f"{_few(files)} made with another [{name}] than {session.config.name} has now; {REMEDY}"
         for name, files in by_value.items()
     ]

@@ -1,111 +1,70 @@
 """The quality of each recording: from its metadata, and from its time stamps."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pipelines.contracts import MOTION, RECORDING
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Artifact, Session
 
 ROUNDING = 1e-4
 """Unevenness that rounding explains, in sample periods."""
+RATE_TOLERANCE = 0.005
+"""Relative difference of sampling rates that counts as equal."""
 
 
-@dataclass(frozen=True)
-class Run:
-    """One recording, or a motion if there are no recordings."""
-
-    file: str
-    run: str
-    purpose: str
-    about: str
-    """Rig, subject and session, from the file."""
-    samples: int
-    duration_s: float
-    rate_hz: float
-    """From the file."""
-    measured_rate_hz: float
-    """Inverse of the median time step."""
-    jitter_ms: float
-    """Half the width of the interval that contains 98 % of the time steps."""
-    gaps: int
-    missing: int
-    abort: str
-    recovered: bool
-    latency: dict[str, float] | None
-    """Response times of the devices: ``median_ms``, ``p99_ms``, ``longest_ms``; None if absent."""
-    clocks: tuple[str, ...]
-    imported: str
-    filter: str
-    """Filter and reason of its cut-off; empty if the run was not filtered."""
-
-    @property
-    def rate_is_off(self) -> bool:
-        """Whether the time stamps contradict the stated rate."""
-        # Relative difference of sampling rates that counts as equal.
-        rate_tolerance = 0.005
-        return abs(self.measured_rate_hz / self.rate_hz - 1.0) > rate_tolerance
-
-    @property
-    def is_even(self) -> bool:
-        """Whether all time steps are equal up to rounding."""
-        return self.jitter_ms * 1e-3 * self.rate_hz < ROUNDING
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes on import, clocks and filter."""
-        notes = {
-            "imported from": self.imported,
-            "clocks": "; ".join(self.clocks),
-            "filtered by": self.filter,
-        }
-        return [f"{words} {note}" for words, note in notes.items() if note]
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's table of recordings."""
-    return {"recordings": _runs(content.session)}
-
-
-def _runs(session: Session) -> list[Run]:
-    """Return every run of a session, in the order of their files."""
-    recordings = session.of_kind("recording")
+def recordings(session: Session) -> list[dict[str, Any]]:
+    """Return every run of a session, in the order of their files; motions without recordings."""
     # A motion has the file name of its recording.
-    filters = {one.path.name: one for one in session.of_kind("motion")}
-    chosen = recordings or list(filters.values())
-    return [_run(session, one, filters.get(one.path.name)) for one in chosen]
+    motions = {one.path.name: one for one in session.of_kind("motion")}
+    chosen = session.of_kind("recording") or list(motions.values())
+    return [_run(session, one, motions.get(one.path.name)) for one in chosen]
 
 
-def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> Run:
+def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> dict[str, Any]:
     about, time = artifact.metadata, _time(artifact)
+    gaps, rate_hz = about.get("gaps") or [], float(about["sample_rate_hz"])
+    step_s, jitter_s = _steps(time)
+    imported = _imported(about.get("imported"))
+    notes = {
+        "imported from": imported,
+        "clocks": "; ".join(_clock(*one) for one in (about.get("clocks") or {}).items()),
+        "filtered by": _filter(motion.metadata.get("filter")) if motion else "",
+    }
+    return {
+        "file": session.shown(artifact.path),
+        "run": about["run"],
+        "purpose": about["purpose"],
+        "about": origin(artifact),
+        "samples": len(time),
+        "duration_s": float(time[-1] - time[0]),
+        "rate_hz": rate_hz,
+        "measured_rate_hz": 1.0 / step_s,
+        "rate_is_off": abs(1.0 / step_s / rate_hz - 1.0) > RATE_TOLERANCE,
+        "jitter_ms": 1e3 * jitter_s,
+        "is_even": jitter_s * rate_hz < ROUNDING,
+        "gaps": len(gaps),
+        "missing": sum(count for _, count in gaps),
+        "abort": about.get("abort"),
+        "recovered": about.get("recovered"),
+        "latency": about.get("latency"),
+        "imported": imported,
+        "notes": [f"{words} {note}" for words, note in notes.items() if note],
+    }
+
+
+def _steps(time: np.ndarray) -> tuple[float, float]:
+    """Return the usual step of time stamps (n,), NaN of a single one, and its unevenness, s.
+
+    That is half the width of the interval that contains 98 % of the steps.
+    """
     step = np.diff(time)
-    usual = float(np.median(step)) if len(step) else float("nan")
+    if not len(step):
+        return float("nan"), 0.0
+    usual = float(np.median(step))
     # Gaps are counted on their own, and are no jitter.
-    near = step[step < 1.5 * usual] if len(step) else step
-    # Half of 98 %, so that a single late row does not count.
-    jitter = float(np.subtract(*np.percentile(near, [99, 1]))) / 2 if len(near) else 0.0
-    gaps = about.get("gaps") or []
-    return Run(
-        file=session.shown(artifact.path),
-        run=about["run"],
-        purpose=about["purpose"],
-        about=origin(artifact),
-        samples=len(time),
-        duration_s=float(time[-1] - time[0]),
-        rate_hz=float(about["sample_rate_hz"]),
-        measured_rate_hz=1.0 / usual if usual > 0 else float("nan"),
-        jitter_ms=1e3 * jitter,
-        gaps=len(gaps),
-        missing=sum(count for _, count in gaps),
-        abort=about.get("abort") or "",
-        recovered=bool(about.get("recovered")),
-        latency=about.get("latency"),
-        clocks=tuple(_clock(joint, clock) for joint, clock in (about.get("clocks") or {}).items()),
-        imported=_imported(about.get("imported")),
-        filter=_filter(motion.metadata.get("filter")) if motion else "",
-    )
+    high, low = np.percentile(step[step < 1.5 * usual], [99, 1])
+    return usual, float(high - low) / 2
 
 
 def origin(artifact: Artifact) -> str:

@@ -1,17 +1,14 @@
 """Residuals of each model against angle, speed, load and time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import pandas as pd
 
 from pipelines.contracts import Joint
 from pipelines.contracts.verdict import Dependence
 from pipelines.plotting.chart import Chart
 from pipelines.plotting.residual_panels import residual_panel, residual_reach
 from pipelines.report.sections.fit_quality import drawn, models_of
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 from pipelines.signals.binned_mean import FEWEST
 
@@ -35,44 +32,27 @@ class Against:
     column: str
 
 
-@dataclass(frozen=True)
-class Predicted:
-    """A variable and the share of the error that it predicts."""
-
-    words: str
-    before: float
-    after: float | None
-
-
-@dataclass(frozen=True)
-class JointResiduals:
-    """One joint's residual charts, and the variables on which its error depends."""
-
-    name: str
-    charts: tuple[Chart, ...]
-    depends: tuple[Predicted, ...]
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's charts of residuals."""
-    session = content.session
+def by_joint(session: Session, charts: Sequence[Chart]) -> list[dict[str, Any]]:
+    """Return each joint with its charts, and the variables on which its error depends."""
     rows = []
     for joint in session.joints:
-        prefix = f"residual-{joint.name}-"
-        charts = [chart for chart in content.charts.residuals if chart.key.startswith(prefix)]
-        if charts:
-            depends = tuple(_predicted(session, joint))
-            rows.append(JointResiduals(joint.name, tuple(charts), depends))
-    return {"residuals": rows, "hero": content.charts.hero}
-
-
-def _predicted(session: Session, joint: Joint) -> list[Predicted]:
-    words = {one.variable: one.title for one in _against(session, joint)}
-    rows = []
-    for one in session.dependences(joint):
-        title = words.get(one.variable, one.variable.replace("_", " "))
-        rows.append(Predicted(title, one.share_before, one.share_after if session.causes else None))
+        own = [chart for chart in charts if chart.key.startswith(f"residual-{joint.name}-")]
+        if own:
+            rows.append({"name": joint.name, "charts": own, "depends": _predicted(session, joint)})
     return rows
+
+
+def _predicted(session: Session, joint: Joint) -> list[dict[str, Any]]:
+    """Return variables in words, and the share of the error that each predicts."""
+    titles = {one.variable: one.title for one in _against(session, joint)}
+    return [
+        {
+            "words": titles.get(one.variable, one.variable.replace("_", " ")),
+            "before": one.share_before,
+            "after": one.share_after if session.causes else None,
+        }
+        for one in session.dependences(joint)
+    ]
 
 
 def _against(session: Session, joint: Joint) -> list[Against]:
@@ -103,29 +83,23 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     frame = session.residuals.frame
     # Runs that no fit has seen, without reversals: no model of speed predicts a standing joint.
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
+    models = [drawn(model, judged[judged["model"] == model]) for model in models_of(session)]
     for joint in session.joints:
         # One height for all charts of a joint, so that their errors can be compared.
         reach = residual_reach(judged, joint)
         for one in _against(session, joint):
-            yield _chart(session, judged, joint, one, reach)
-
-
-def _chart(
-    session: Session, frame: pd.DataFrame, joint: Joint, one: Against, reach: float | None
-) -> Chart:
-    models = [drawn(model, frame[frame["model"] == model]) for model in models_of(session)]
-    x, panel = residual_panel(joint, one.column, models, reach, session.noise_floor(joint))
-    return Chart(
-        key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
-        title=f"{joint.name} error against {one.title}",
-        caption=(
-            "Dots are blocks of validation runs away from reversals, lines their running means,"
-            f" each of {FEWEST} blocks or more; the band is the noise floor."
-        ),
-        x_label=one.label,
-        x=x,
-        panels=(panel,),
-    )
+            x, panel = residual_panel(joint, one.column, models, reach, session.noise_floor(joint))
+            yield Chart(
+                key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
+                title=f"{joint.name} error against {one.title}",
+                caption=(
+                    "Dots are blocks of validation runs away from reversals, lines their running"
+                    f" means, each of {FEWEST} blocks or more; the band is the noise floor."
+                ),
+                x_label=one.label,
+                x=x,
+                panels=(panel,),
+            )
 
 
 def most_explained_variable(session: Session, joint: Joint) -> str:

@@ -1,6 +1,5 @@
 """Meaning, unit and equation of the symbols of a model's parameters, from the effects."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from pipelines.contracts import Joint
@@ -10,36 +9,19 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.model import effect_named
-from pipelines.report.sections.section import Content
 from pipelines.report.session import Session
 
 
-@dataclass(frozen=True)
-class Term:
-    """One term of the models."""
-
-    title: str
-    equation: str
-    parameters: tuple[Parameter, ...]
-
-
-def context(content: Content) -> dict[str, Any]:
-    """Return the values of the template's list of terms."""
-    return {"terms": _terms(content.session)}
-
-
-def _terms(session: Session) -> list[Term]:
-    """Return each term of a session's models once, without unknown effects."""
-    rows = [
-        (row["effect"], row["joint"] if isinstance(row["joint"], str) else None)
-        for one in session.of_kind("parameters")
-        for row in session.table(one).frame[["effect", "joint"]].to_dict("records")
-    ]
-    results: dict[str, Term] = {}
-    for name, joint in rows:
-        effect = _bound(session, name, joint)
-        if effect and name not in results:
-            results[name] = Term(effect.title, effect.equation, parameters(effect))
+def terms(session: Session) -> list[dict[str, Any]]:
+    """Return title, equation and parameters of each known effect in a session's models."""
+    results: dict[str, dict[str, Any]] = {}
+    for one in session.of_kind("parameters"):
+        for row in session.table(one).frame[["effect", "joint"]].to_dict("records"):
+            name, joint = row["effect"], row["joint"] if isinstance(row["joint"], str) else None
+            effect = _bound(session, name, joint)
+            if effect and name not in results:
+                about = {"title": effect.title, "equation": effect.equation}
+                results[name] = about | {"parameters": _parameters(effect)}
     return list(results.values())
 
 
@@ -65,14 +47,12 @@ def _parameters_of(
     session: Session, effect_name: str, joint: str | None, name: str
 ) -> list[Parameter]:
     effect = _bound(session, effect_name, joint)
-    return [one for one in parameters(effect) if one.name == name] if effect else []
+    return [one for one in _parameters(effect) if one.name == name] if effect else []
 
 
-def parameters(effect: Effect) -> tuple[Parameter, ...]:
+def _parameters(effect: Effect) -> list[Parameter]:
     """Return an effect's parameters, in the units of its joint."""
-    return tuple(
-        one.at(effect.on, effect.joint) if effect.joint else one for one in effect.parameters
-    )
+    return [one.at(effect.on, effect.joint) if effect.joint else one for one in effect.parameters]
 
 
 def _bound(session: Session, name: str, joint: str | None) -> Effect | None:
