@@ -131,14 +131,9 @@ def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> I
             yield probe.finding(f'{measured}; with unit = "{unit}" the two agree: correct {where}')
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
-    yield probe.finding(
-        f"{measured};"
-        f" {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
-    )
-
-
-def _scale(register, rate: float) -> str:
-    return f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
+    scale = f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
+    otherwise = f"compare {where} with the manual: scale = {scale}"
+    yield probe.finding(f"{measured}; {mended or otherwise}")
 
 
 def _keeps_time(time: NDArray, seconds: float) -> bool:

@@ -17,13 +17,9 @@ class Rate:
     """Statistics of cycles without pauses."""
 
     cycles_hz: float
-    cycle: Latency
     late: float
     """Share of cycles that are longer than a sample; 0 where no rate is known."""
-
-    def as_json(self) -> dict:
-        """Return it as JSON objects."""
-        return {"cycles_hz": self.cycles_hz, "late": self.late, "cycle": self.cycle.as_json()}
+    cycle: Latency
 
 
 async def cycles(
@@ -61,7 +57,7 @@ async def cycles(
         durations.append(time.perf_counter() - start)
     took = np.array(durations)
     late = float(np.mean(took > 1.0 / rate_hz)) if rate_hz else 0.0
-    return Rate(len(took) / float(took.sum()), Latency.of(took), late)
+    return Rate(len(took) / float(took.sum()), late, Latency.of(took))
 
 
 def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:

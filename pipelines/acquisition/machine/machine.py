@@ -26,9 +26,6 @@ from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 
-LOOKS = 9
-"""Readings from which the offset between the drives' counters is determined."""
-
 Answer = TypeVar("Answer")
 
 
@@ -142,9 +139,7 @@ class Machine:
             A drive reports a fault.
         """
         # Several times: between two requests a drive may go on to its next sample.
-        looks = [
-            await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)
-        ]
+        looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(9)]
         for reading in looks[-1]:
             if reading.fault:
                 raise DeviceError(reading.fault)
