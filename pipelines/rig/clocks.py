@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from pipelines.rig.plant import Samples
 from pipelines.signals.interpolation import cubic_weights
 
-KEPT = 16
-"""Earlier samples of the plant that the interpolation keeps."""
-
 
 class OwnClock:
     """Samples of a device whose clock gains ``ppm`` and began at ``offset_s``, from the plant's."""
@@ -47,7 +44,7 @@ class OwnClock:
             return chunk[:0]
         numbers, self._sampled = np.arange(self._sampled, count), count
         seen = _joined(self._seen)
-        self._seen = [seen[-KEPT:]]
+        self._seen = [seen[-16:]]  # more than the cubics need
         instants = (numbers + 0.5) / (self._rate * self._gain)
         values = _between(
             seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0)

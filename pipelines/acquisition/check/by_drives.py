@@ -27,7 +27,6 @@ GAIN = 0.25
 """Largest deviation of the ratio of angle and set-point from one."""
 LEAST_CORRELATION = 0.2
 """Least correlation of torque and speed that shows the torque's sign."""
-JOINTS = ("hip", "knee")
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
     """
     # Largest angle at the start: a drive of wrong sign leaps by twice that when it is enabled.
     near_zero_rad = 0.1
-    for joint, angle in zip(JOINTS, angles, strict=True):
+    for joint, angle in zip(("hip", "knee"), angles, strict=True):
         if abs(angle) > near_zero_rad:
             raise SettingsError(
                 f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{near_zero_rad:g}"

@@ -99,9 +99,7 @@ def remedy(
         # A costlier explanation is not named next to a likelier one.
         if best and one.cost > best[0][0].cost:
             break
-        values = (series.counted if counts else series.of)(
-            name, one.register, bytes_swapped=one.bytes_swapped
-        )
+        values = series.of(name, one.register, bytes_swapped=one.bytes_swapped, counts=counts)
         # Zeros are always possible, and so no evidence.
         if values.any() and plausible(values):
             best.append((one, float(values[-1])))

@@ -27,7 +27,8 @@ class Latency:
         durations : (n,) array
             s, at least one.
         """
-        quantiles_ms = 1e3 * np.quantile(durations, [0.0, 0.5, 0.99, 1.0])
+        shares = [0.0, 0.5, 0.99, 1.0]
+        least, median, p99, most = (1e3 * np.quantile(durations, shares)).tolist()
         logs = np.log(durations)
         counts, _ = np.histogram(logs, 16, (logs.min(), logs.max() + 1e-12))
-        return cls(len(durations), *quantiles_ms.tolist(), tuple(counts.tolist()))
+        return cls(len(durations), least, median, p99, most, tuple(counts.tolist()))

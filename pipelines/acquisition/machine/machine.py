@@ -108,11 +108,8 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             return
-        setting = (
-            "acquire.sample_rate_hz"
-            if self.rig.sampling == "cyclic"
-            else "record_rate_hz in the rig file"
-        )
+        is_recorded = self.rig.sampling == "recorder"
+        setting = "record_rate_hz in the rig file" if is_recorded else "acquire.sample_rate_hz"
         rate_hz = cycle_hz * self.samples_per_cycle
         await all_answers(refuse_other_rate(drive, rate_hz, setting) for drive in self.drives)
 

@@ -18,9 +18,6 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import aborted_of
 from pipelines.errors import ContractError
 
-LARGEST = 1e9
-"""Largest credible rate, Hz, and duration, s."""
-
 
 @dataclass(frozen=True)
 class JournalSummary:
@@ -109,7 +106,8 @@ def _rate_and_duration(journal: JournalFile) -> tuple[float, float]:
         seconds = float(journal.metadata["config"]["run"]["duration_s"])
     except (KeyError, TypeError, ValueError):
         rate_hz = seconds = 0.0
-    is_of_a_run = 0.0 < rate_hz <= LARGEST and 0.0 < seconds <= LARGEST
+    largest = 1e9  # credible rate, Hz, and duration, s
+    is_of_a_run = 0.0 < rate_hz <= largest and 0.0 < seconds <= largest
     if not is_of_a_run or not {"time_s", "sequence"} <= set(journal.schema.names):
         raise ContractError(
             f"{journal.path}: columns or metadata are not those of a run; nothing was changed"
