@@ -27,15 +27,12 @@ class BackgroundPrinter:
     def __exit__(self, *_: object) -> None:
         # None ends the thread; if the queue is full it is dropped, and the daemon thread dies at
         # exit.
-        self._put(None)
+        self.print(None)
         # Bounded, as a terminal stopped by Ctrl-S would never take the last lines.
         self._thread.join(CLOSING_S)
 
-    def print(self, text: str) -> None:
+    def print(self, text: str | None) -> None:
         """Queue a line, or drop it if the queue is full; never wait, never fail."""
-        self._put(text)
-
-    def _put(self, text: str | None) -> None:
         with suppress(queue.Full):
             self._queue.put_nowait(text)
 

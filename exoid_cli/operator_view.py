@@ -19,12 +19,8 @@ NEAR = 0.05
 """Share of the range between two limits within which one of them is near."""
 
 # Blue and orange differ to everyone, and words repeat whatever a colour says.
-PLAIN, CALM, URGENT, FAINT = (
-    Style(),
-    Style(color="bright_blue"),
-    Style(color="dark_orange", bold=True),
-    Style(dim=True),
-)
+PLAIN, FAINT = Style(), Style(dim=True)
+CALM, URGENT = Style(color="bright_blue"), Style(color="dark_orange", bold=True)
 
 Line = list[tuple[str, Style]]
 

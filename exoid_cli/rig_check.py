@@ -1,5 +1,6 @@
 """``exoid rig check``: compare a rig with its file."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -76,7 +77,7 @@ def check(
     if move and not yes:
         confirm_move()
     report = check_rig(file, rate_hz, run, OperatorPrompt() if by_hand else None, move=move)
-    console.emit(report.as_json())
+    console.emit(asdict(report))
     _show(report)
     if report.findings:
         count = len(report.findings)
@@ -105,11 +106,11 @@ def _show(report: "RigReport") -> None:
         console.say("\nSensors, mean ± noise in N")
         headings = ("", "x", "y", "z", "samples/s")
         console.table(headings, map(_sensor, sensors), numbers=", ".join(headings[1:]))
-    if report.answers:
+    if report.moved:
         console.say("\nMoved by the drives")
         rows = [
             (a.joint, f"{a.gain:.3f}", f"{a.delay_s * 1e3:.0f}", f"{a.torque_with_speed:.2f}")
-            for a in report.answers
+            for a in report.moved
         ]
         headings = ("joint", "angle per set-point", "delay ms", "torque-velocity correlation")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
@@ -136,8 +137,8 @@ def _identity(device: "DeviceReport") -> str:
 def _times(latency: "Latency | None") -> tuple[str, ...]:
     if latency is None:
         return ("", "", "", "", "")
-    numbers = (latency.least, latency.median, latency.p99, latency.most)
-    return (*(f"{number * 1e3:.2f}" for number in numbers), _small(latency.histogram))
+    numbers = (latency.min_ms, latency.median_ms, latency.p99_ms, latency.max_ms)
+    return (*(f"{number:.2f}" for number in numbers), _small(latency.histogram))
 
 
 def _small(histogram: tuple[int, ...]) -> str:
@@ -173,9 +174,9 @@ def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
         console.note(f"{rate.late:.1%} of them take longer than a sample")
     cycle = rate.cycle
     steps = len(cycle.histogram)
-    ratio = cycle.most / cycle.least
+    ratio = cycle.max_ms / cycle.min_ms
     # The histogram's bins are equally wide in the logarithm of the duration.
-    edges = [cycle.least * ratio ** (k / steps) * 1e3 for k in range(steps + 1)]
+    edges = [cycle.min_ms * ratio ** (k / steps) for k in range(steps + 1)]
     most = max(cycle.histogram)
     rows = [
         (f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms", count, "█" * -(-count * 30 // most))

@@ -53,15 +53,13 @@ class Exchange:
         joint = self.machine.drives.index(drive)
         async with drive.device.turn():
             now = time.monotonic()
-            if self.is_stale(joint, now) or self._supervisor.is_late(now):
+            # One that may be anywhere by now is asked where it is first.
+            tracker = self._supervisor.trackers[joint]
+            if tracker.is_stale(now) or self._supervisor.is_late(now):
                 await self.find(joint)
                 # The cycle's step is outdated by now; `hold` steps by the host's clock.
                 decide = self._supervisor.hold
             return await drive.exchange(decide(joint, time.monotonic()))
-
-    def is_stale(self, joint: int, now: float) -> bool:
-        """Return whether a drive must be asked where it is before it is sent a set-point."""
-        return self._supervisor.trackers[joint].is_stale(now)
 
     async def find(self, joint: int) -> tuple[Reading, float]:
         """Ask a drive where it is, to go on from there.

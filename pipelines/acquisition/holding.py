@@ -14,7 +14,6 @@ class Holding:
     """One task a drive, for as long as the plan is followed."""
 
     def __init__(self, exchange: Exchange, supervisor: Supervisor) -> None:
-        """Hold the drives of an exchange."""
         self._exchange, self._supervisor = exchange, supervisor
         self._ended = asyncio.Event()
         self.tasks: list[asyncio.Future] = []

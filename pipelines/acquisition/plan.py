@@ -12,7 +12,7 @@ from pipelines.acquisition.plan_checks import (
     refuse_run_outside,
 )
 from pipelines.acquisition.set_points import SetPoints
-from pipelines.errors import InputError
+from pipelines.errors import DeviceError, InputError
 from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.rig import RigSettings
@@ -101,8 +101,8 @@ def check_trajectory(
     return samples
 
 
-def check_start(rig: RigSettings, angle: NDArray) -> str | None:
-    """Return why the leg must not be moved from where it stands.
+def check_start(rig: RigSettings, angle: NDArray) -> None:
+    """Refuse to move the leg from where it stands outside its limits.
 
     Parameters
     ----------
@@ -111,19 +111,18 @@ def check_start(rig: RigSettings, angle: NDArray) -> str | None:
     angle : (J,) array
         Where the leg stands, rad.
 
-    Returns
-    -------
-    str or None
-        None if it may be moved.
+    Raises
+    ------
+    DeviceError
+        Names the joint and its angle.
     """
     for drive, value in zip(rig.drive, angle, strict=True):
         low, high = drive.angle_rad
         if not low <= value <= high:
-            return (
+            raise DeviceError(
                 f"the {drive.joint} stands at {value:.3f} rad, outside its limits {low:g} to"
                 f" {high:g} rad; move the leg by hand, or check the encoder's zero"
             )
-    return None
 
 
 def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) -> NDArray:

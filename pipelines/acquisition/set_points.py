@@ -53,14 +53,11 @@ class SetPoints:
         """
         # Slices beyond an array's end are empty, so each part contributes only its own rows.
         first, stop = self.first, self.stop
-        before, after = (
-            self._lead_in[begin:end],
-            self._lead_out[max(begin - stop, 0) : max(end - stop, 0)],
-        )
+        before = self._lead_in[begin:end]
+        after = self._lead_out[max(begin - stop, 0) : max(end - stop, 0)]
         begin, end = max(begin, first), min(end, stop)
-        return np.concatenate(
-            [before, *([self._run(begin - first, end - first)] if begin < end else []), after]
-        )
+        run = [self._run(begin - first, end - first)] if begin < end else []
+        return np.concatenate([before, *run, after])
 
     def pieces(self) -> Iterator[tuple[int, NDArray]]:
         """Yield all set-points in pieces; a piece begins with the last one of the piece before.

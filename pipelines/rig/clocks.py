@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from pipelines.rig.plant import Samples
 from pipelines.signals.interpolation import cubic_weights
 
-KEPT = 16
-"""Earlier samples of the plant that the interpolation keeps."""
-
 
 class OwnClock:
     """Samples of a device whose clock gains ``ppm`` and began at ``offset_s``, from the plant's."""
@@ -44,10 +41,10 @@ class OwnClock:
         latest = (chunk.sequence[-1] + 1 - delay) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
         if count <= self._sampled:
-            return _last(chunk, 0)
+            return chunk[:0]
         numbers, self._sampled = np.arange(self._sampled, count), count
         seen = _joined(self._seen)
-        self._seen = [_last(seen, KEPT)]
+        self._seen = [seen[-16:]]  # more than the cubics need
         instants = (numbers + 0.5) / (self._rate * self._gain)
         values = _between(
             seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0)
@@ -75,11 +72,6 @@ def _between(seen: Samples, at: NDArray) -> Samples:
 def _weighted(values: NDArray, places: NDArray, weights: NDArray) -> NDArray:
     shape = (*weights.shape, *(1,) * (values.ndim - 1))
     return (weights.reshape(shape) * values[places]).sum(axis=0)
-
-
-def _last(samples: Samples, count: int) -> Samples:
-    begin = max(len(samples.sequence) - count, 0)
-    return Samples(**{name: values[begin:] for name, values in vars(samples).items()})
 
 
 def _joined(chunks: Sequence[Samples]) -> Samples:

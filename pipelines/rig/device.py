@@ -147,10 +147,10 @@ class Drive(Device):
         if self.clock:
             samples = self.clock.sampled(samples)
             if len(samples.sequence):
-                self.sample = one(samples, -1)
+                self.sample = samples[-1:]
         if self.ring:
             for k, sequence in enumerate(samples.sequence.tolist()):
-                self.ring.append(sequence, self._values(one(samples, k)))
+                self.ring.append(sequence, self._values(samples[k : k + 1]))
 
     def latched(self) -> Samples:
         """Return the sample that the device has latched."""
@@ -199,10 +199,3 @@ class Sensor(Device):
         x, y, z = sample.forces[0, self.cuff]
         sequence = sample.sequence[0] % (self.read.span("sequence") or 2**63)
         self._put(self.read, {"sequence": sequence, "force_x": x, "force_y": y, "force_z": z})
-
-
-def one(samples: Samples, k: int) -> Samples:
-    """Return the k-th sample."""
-    # For k = -1 the end must be None, as slice(-1, 0) is empty.
-    places = slice(k, k + 1 or None)
-    return Samples(**{name: values[places] for name, values in vars(samples).items()})

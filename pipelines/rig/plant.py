@@ -45,6 +45,9 @@ class Samples:
     truth: NDArray
     """(n, 4, J) true link angle, speed, acceleration and motor angle, for tests."""
 
+    def __getitem__(self, places: slice) -> "Samples":
+        return Samples(**{name: values[places] for name, values in vars(self).items()})
+
 
 class Plant:
     """A leg in motion; each call of ``run`` continues from the last state."""
@@ -244,11 +247,8 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
     ambient, heating, time_constant = warming
     n, joints = reference.shape
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
-    truth, human, temperature = (
-        np.empty((n, 4, joints)),
-        np.zeros((n, joints)),
-        np.empty((n, joints)),
-    )
+    truth, human = np.empty((n, 4, joints)), np.zeros((n, joints))
+    temperature = np.empty((n, joints))
     direction = np.empty(joints)
     for k in range(n):
         t = (first + k) * period

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import SettingsError, about
 from pipelines.rig.clocks import OwnClock
-from pipelines.rig.device import Device, Drive, Sensor, one
+from pipelines.rig.device import Device, Drive, Sensor
 from pipelines.rig.plant import Plant
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
@@ -109,15 +109,8 @@ class VirtualRig:
     def _servo(self, rig: RigSettings, drive: DriveSettings, rest: float) -> Servo:
         registers, deceleration = rig.map.drive[drive.map], rig.safety.deceleration_rad_s2
         rate, heartbeat_s = self.plant.sample_rate_hz, self.plant.settings.heartbeat_s
-        return Servo(
-            registers,
-            rest,
-            drive.angle_rad,
-            rate,
-            deceleration,
-            heartbeat_s,
-            self.samples_per_cycle,
-        )
+        cycle = self.samples_per_cycle
+        return Servo(registers, rest, drive.angle_rad, rate, deceleration, heartbeat_s, cycle)
 
     def _advance(self, angle: NDArray, count: int = 1) -> None:
         """Advance by ``count`` samples without new set-points, from measured angles (J,) rad."""
@@ -137,5 +130,5 @@ class VirtualRig:
             samples = self.plant.run(references, np.array(enabled))
             for drive in self.drives:
                 drive.record(samples)
-        self.sample = one(samples, -1)
+        self.sample = samples[-1:]
         self._waiting = set(self.drives)

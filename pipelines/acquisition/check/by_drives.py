@@ -25,11 +25,8 @@ PERIOD_S = 4.0
 """Period of the hip; the knee moves twice as fast, which distinguishes their answers."""
 GAIN = 0.25
 """Largest deviation of the ratio of angle and set-point from one."""
-LITTLE, MUCH = -GAIN, 2.0
-"""Range of that ratio for a joint that lags behind as it begins to move."""
 LEAST_CORRELATION = 0.2
 """Least correlation of torque and speed that shows the torque's sign."""
-JOINTS = ("hip", "knee")
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ def refuse_far_from_zero(angles: Sequence[float]) -> None:
     """
     # Largest angle at the start: a drive of wrong sign leaps by twice that when it is enabled.
     near_zero_rad = 0.1
-    for joint, angle in zip(JOINTS, angles, strict=True):
+    for joint, angle in zip(("hip", "knee"), angles, strict=True):
         if abs(angle) > near_zero_rad:
             raise SettingsError(
                 f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{near_zero_rad:g}"
@@ -80,11 +77,8 @@ def move_by_drives(
     progress: list[Progress] = []
     try:
         with _folder() as folder:
-            rig_file, excitation, output = (
-                folder / "rig.toml",
-                folder / "excitation.toml",
-                folder / "guided.parquet",
-            )
+            names = "rig.toml", "excitation.toml", "guided.parquet"
+            rig_file, excitation, output = (folder / name for name in names)
             rig_file.write_text(_toml_file(_tight(rig, start)))
             excitation.write_text(_toml_file(_motion(start)))
             acquire(rig_file, settings, excitation, output, rate_hz, report=progress.append)
@@ -254,5 +248,6 @@ def _check_stopped(rig: RigSettings, progress: Sequence[Progress]) -> Iterator[F
         # Least squares through the start, for one joint alone: a short movement may not separate
         # the two.
         gains[j] = away @ (angle - angle[0]) / (away @ away)
-        if not LITTLE <= gains[j] <= MUCH:
+        # A joint lags behind as it begins to move, and may then overshoot.
+        if not -GAIN <= gains[j] <= 2.0:
             yield from _check_answer(rig, j, gains, 0.0)

@@ -75,7 +75,7 @@ def check_rig(
             try:
                 if not report.by_hand:
                     refuse_far_from_zero(start)
-                report.answers, report.findings = move_by_drives(
+                report.moved, report.findings = move_by_drives(
                     present, start, rate_hz or _measured_rate(report), run
                 )
             except InputError as error:  # the report so far must not be lost

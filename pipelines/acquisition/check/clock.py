@@ -12,9 +12,6 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
-RATES_HZ = (0.5, 1e5)
-"""Range of credible sample rates, where none is known."""
-
 
 @dataclass(frozen=True)
 class Clock:
@@ -45,14 +42,14 @@ def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
     Clock
         Rates in Hz, or None where they are unknown, and the usual step of the counter.
     """
-    counter = series.counted("sequence")
+    counter = series.of("sequence", counts=True)
     steps = np.diff(counter)
     # Repeated answers of one sample show no step of the counter.
     steps = steps[steps != 0]
     moved = float(counter[-1] - counter[0])
     clock_rate = None
     if "time" in series.block.registers and seconds > 0:
-        time = series.counted("time")
+        time = series.of("time", counts=True)
         clock_rate = float(time[-1] - time[0]) / seconds
     return Clock(
         moved / seconds if moved and not probe.in_lockstep else None,
@@ -86,7 +83,7 @@ def _check_counter(
 ) -> Iterator[Finding]:
     # Answers per change of the counter that prove that its steps are the device's own.
     often = 3.0
-    counter, where = series.counted("sequence"), f"{probe.map_path}.read.sequence"
+    counter, where = series.of("sequence", counts=True), f"{probe.map_path}.read.sequence"
     steps = np.diff(counter)
     if _counts(counter, seconds, rate_hz):
         changes = np.count_nonzero(steps)
@@ -114,13 +111,13 @@ def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
         return False
     measured = (counter[-1] - counter[0]) / seconds
     if rate_hz is None:
-        return bool(RATES_HZ[0] <= measured <= RATES_HZ[1])
+        return bool(0.5 <= measured <= 1e5)  # a credible sample rate
     # A sample more or less at either end.
     return bool(abs(measured - rate_hz) <= RATE_TOLERANCE * rate_hz + 2.0 / seconds)
 
 
 def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
-    time, where = series.counted("time"), f"{probe.map_path}.read.time"
+    time, where = series.of("time", counts=True), f"{probe.map_path}.read.time"
     if _keeps_time(time, seconds):
         return
     register, rate = series.block.registers["time"], clock.clock_rate or 0.0
@@ -131,14 +128,9 @@ def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> I
             yield probe.finding(f'{measured}; with unit = "{unit}" the two agree: correct {where}')
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
-    yield probe.finding(
-        f"{measured};"
-        f" {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}",
-    )
-
-
-def _scale(register, rate: float) -> str:
-    return f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
+    scale = f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
+    otherwise = f"compare {where} with the manual: scale = {scale}"
+    yield probe.finding(f"{measured}; {mended or otherwise}")
 
 
 def _keeps_time(time: NDArray, seconds: float) -> bool:

@@ -29,11 +29,7 @@ class Interpretation:
 
 
 def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
-    """Yield every other description of a register, the likeliest first."""
-    return iter(sorted((one for one in _all(name, block) if one.cost), key=lambda one: one.cost))
-
-
-def _all(name: str, block: Block) -> Iterator[Interpretation]:
+    """Yield every description of a register; that of the rig file itself has no cost."""
     was = block.registers[name]
     others = (register for other, register in block.registers.items() if other != name)
     taken = {address for register in others for address in register.addresses}
@@ -97,13 +93,13 @@ def remedy(
     """
     most_named = 2
     best: list[tuple[Interpretation, float]] = []
-    for one in _interpretations(name, series.block):
+    others = [one for one in _interpretations(name, series.block) if one.cost]
+    # The likeliest first.
+    for one in sorted(others, key=lambda one: one.cost):
         # A costlier explanation is not named next to a likelier one.
         if best and one.cost > best[0][0].cost:
             break
-        values = (series.counted if counts else series.of)(
-            name, one.register, bytes_swapped=one.bytes_swapped
-        )
+        values = series.of(name, one.register, bytes_swapped=one.bytes_swapped, counts=counts)
         # Zeros are always possible, and so no evidence.
         if values.any() and plausible(values):
             best.append((one, float(values[-1])))

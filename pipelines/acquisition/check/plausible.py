@@ -70,12 +70,8 @@ class Expectation:
         step_rad = 0.01
         # Misread words may be NaN, or so large that their difference overflows.
         with np.errstate(invalid="ignore", over="ignore"):
-            return bool(
-                (
-                    np.abs(np.diff(values))
-                    > self.fastest * (np.diff(seconds) + period_s) + step_rad
-                ).any()
-            )
+            longest = self.fastest * (np.diff(seconds) + period_s) + step_rad
+            return bool((np.abs(np.diff(values)) > longest).any())
 
 
 def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
@@ -123,7 +119,6 @@ def has_plausible_size(values: NDArray) -> NDArray:
 
 
 def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]:
-    temperature_c = (-20.0, 150.0)
     # Largest current of a disabled drive, as a share of its joint's torque limit.
     torque_at_rest = 0.1
     # Largest speed of a leg that swings freely, as a multiple of its joint's limit.
@@ -149,10 +144,7 @@ def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]
             f"expected less than {current:.2g} A of a disabled drive",
             "does another master drive it? Else compare {where} with its manual",
         ),
-        "temperature": Expectation(
-            *temperature_c,
-            f"expected {temperature_c[0]:g} to {temperature_c[1]:g} °C",
-        ),
+        "temperature": Expectation(-20.0, 150.0, "expected -20 to 150 °C"),
     }
 
 
@@ -180,15 +172,11 @@ def _check_register(
         why = "which is not a credible value"
     # A leg may stand a little outside its limits; that is no misread register.
     misread = name != "angle" or leaps or abs(value) > turn_rad or not np.isfinite(value)
-    mended = None
-    if misread:
-        mended = remedy(
-            name,
-            unit,
-            where,
-            series,
-            lambda v: bool(expected.holds(v).all() and not expected.leaps(v, seconds, period_s)),
-        )
+
+    def is_possible(v: NDArray) -> bool:
+        return bool(expected.holds(v).all() and not expected.leaps(v, seconds, period_s))
+
+    mended = remedy(name, unit, where, series, is_possible) if misread else None
     todo = mended or expected.otherwise.format(where=where)
     yield probe.finding(f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
 

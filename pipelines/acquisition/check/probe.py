@@ -28,7 +28,12 @@ class Series:
     """(n, registers of the block)."""
 
     def of(
-        self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
+        self,
+        name: str,
+        register: Register | None = None,
+        *,
+        bytes_swapped: bool = False,
+        counts: bool = False,
     ) -> NDArray:
         """Return a quantity's values.
 
@@ -40,6 +45,8 @@ class Series:
             Another way to decode it.
         bytes_swapped : bool, optional
             Whether to swap the bytes of each word.
+        counts : bool, optional
+            Whether it is a counter or clock, whose wraparounds are removed.
 
         Returns
         -------
@@ -52,31 +59,11 @@ class Series:
         words = self.words[:, start : start + one.count]
         if bytes_swapped:
             words = (words >> 8) | ((words & 0xFF) << 8)
-        return np.array([one.decode(row)[name] for row in words.tolist()])
-
-    def counted(
-        self, name: str, register: Register | None = None, *, bytes_swapped: bool = False
-    ) -> NDArray:
-        """Return the values of a counter or clock without wraparounds.
-
-        Parameters
-        ----------
-        name : str
-            The quantity.
-        register : Register, optional
-            Another way to decode it.
-        bytes_swapped : bool, optional
-            Whether to swap the bytes of each word.
-
-        Returns
-        -------
-        (n,) array
-            In SI units.
-        """
-        # By the span of the register under test: another type wraps around elsewhere.
-        unwrapped = Unwrapper(Block({name: register or self.block.registers[name]}).span(name))
-        values = self.of(name, register, bytes_swapped=bytes_swapped)
-        return np.array([unwrapped(value) for value in values])
+        values = [one.decode(row)[name] for row in words.tolist()]
+        if counts:
+            # By the span of the register under test: another type wraps around elsewhere.
+            values = list(map(Unwrapper(one.span(name)), values))
+        return np.array(values)
 
     @property
     def fresh(self) -> NDArray:

@@ -17,18 +17,12 @@ class Rate:
     """Statistics of cycles without pauses."""
 
     cycles_hz: float
-    cycle: Latency
     late: float
     """Share of cycles that are longer than a sample; 0 where no rate is known."""
-
-    def as_json(self) -> dict:
-        """Return it as JSON objects."""
-        return {"cycles_hz": self.cycles_hz, "late": self.late, "cycle": self.cycle.as_json()}
+    cycle: Latency
 
 
-async def cycles(
-    probes: Sequence[Probe], seconds: float, rate_hz: float | None, fewest: int = 20
-) -> Rate:
+async def cycles(probes: Sequence[Probe], seconds: float, rate_hz: float | None) -> Rate:
     """Read devices in cycles as in a run; each probe keeps its answers.
 
     In real time nothing is written. In lockstep each cycle advances the disabled drives by a
@@ -39,10 +33,11 @@ async def cycles(
     probes : sequence of Probe
         Drives first.
     seconds : float
-        Duration, unless ``fewest`` cycles take longer.
+        Duration, unless the fewest cycles take longer.
     rate_hz : float, optional
         The rate of the experiment.
     """
+    fewest = 20
     drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
     durations: list[float] = []
     began = time.perf_counter()
@@ -61,7 +56,7 @@ async def cycles(
         durations.append(time.perf_counter() - start)
     took = np.array(durations)
     late = float(np.mean(took > 1.0 / rate_hz)) if rate_hz else 0.0
-    return Rate(len(took) / float(took.sum()), Latency.of(took), late)
+    return Rate(len(took) / float(took.sum()), late, Latency.of(took))
 
 
 def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
@@ -84,11 +79,9 @@ def check_rate(rate: Rate, drives: Rate, rate_hz: float) -> Iterator[Finding]:
     if rate.cycles_hz >= rate_hz and rate.late <= most_late:
         return
     enough = drives.cycles_hz >= rate_hz and drives.late <= most_late
-    remedy = (
-        "raise `every` of the sensors"
-        if enough
-        else "lower acquire.sample_rate_hz, or use several lines"
-    )
+    remedy = "lower acquire.sample_rate_hz, or use several lines"
+    if enough:
+        remedy = "raise `every` of the sensors"
     yield Finding(
         "rig",
         f"all devices can be asked {rate.cycles_hz:.0f} times a second (drives:"

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -46,37 +46,21 @@ class DeviceReport:
     noise: dict[str, float] = field(default_factory=dict)
     """Standard deviation of each."""
 
-    def as_json(self) -> dict:
-        """Return it as JSON objects."""
-        return asdict(self) | {"latency": self.latency.as_json() if self.latency else None}
-
 
 @dataclass
 class RigReport:
-    """The measurements of a rig, and the findings."""
+    """The measurements of a rig, and the findings, by the keys of ``exoid rig check --json``."""
 
     rate_hz: float | None
     """The rate of the experiment."""
+    by_hand: bool = False
+    """Whether a person moved the leg."""
+    moved: list[Answer] = field(default_factory=list)
+    """Answers of the joints to their set-points."""
     devices: list[DeviceReport] = field(default_factory=list)
     together: Rate | None = None
     drives_alone: Rate | None = None
-    by_hand: bool = False
-    """Whether a person moved the leg."""
-    answers: list[Answer] = field(default_factory=list)
-    """Answers of the joints to their set-points."""
     findings: list[Finding] = field(default_factory=list)
-
-    def as_json(self) -> dict:
-        """Return it as JSON objects."""
-        return {
-            "rate_hz": self.rate_hz,
-            "by_hand": self.by_hand,
-            "moved": [asdict(answer) for answer in self.answers],
-            "devices": [device.as_json() for device in self.devices],
-            "together": self.together and self.together.as_json(),
-            "drives_alone": self.drives_alone and self.drives_alone.as_json(),
-            "findings": [asdict(finding) for finding in self.findings],
-        }
 
 
 def probes_of(machine: Machine) -> list[Probe]:
@@ -206,10 +190,10 @@ def _check_device(
         # In lockstep time is counted in samples: the computer's clock shows only how fast it
         # simulates.
         seconds = (len(series.asked) - 1) * probe.every / rate_hz
-    elif rate_hz and report.latency.median > SLOW * probe.every / rate_hz:
+    elif rate_hz and report.latency.median_ms > 1e3 * SLOW * probe.every / rate_hz:
         findings.append(
             probe.finding(
-                f"takes {report.latency.median * 1e3:.3g} ms to answer, too long for a sample of"
+                f"takes {report.latency.median_ms:.3g} ms to answer, too long for a sample of"
                 f" {rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its"
                 " own, raise its baud rate, or ask less often",
             )

@@ -49,11 +49,9 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
             )
         return
     ratio = float(integral @ angle / (angle @ angle))
-    correlation = (
-        float(integral @ angle / np.sqrt((integral @ integral) * (angle @ angle)))
-        if integral.any()
-        else 0.0
-    )
+    correlation = 0.0
+    if integral.any():
+        correlation = float(integral @ angle / np.sqrt((integral @ integral) * (angle @ angle)))
     if abs(correlation) < correlated:
         yield probe.finding(
             f"velocity does not follow the angle (correlation {correlation:.2f}); compare"

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.plausible import has_plausible_size
@@ -30,8 +29,9 @@ def check_zeros(
     enough = 20
     # Share of the register's range from which a force counts as saturated.
     near_end = 0.999
-    forces = _fresh_forces(series)
-    if not all(has_plausible_size(forces[:, i]).all() for i in range(len(AXES))):
+    # Of each new sample, (n, 3) N.
+    forces = np.column_stack([series.of(axis) for axis in AXES])[series.fresh]
+    if not has_plausible_size(forces).all():
         return  # the registers have to be corrected first
     where = f"{probe.map_path}.read"
     for i, axis in enumerate(AXES):
@@ -55,8 +55,3 @@ def check_zeros(
             f"all three forces are constant ({listed} N) over {len(forces)} samples, without any"
             " noise; is the sensor connected, and are these its live registers?",
         )
-
-
-def _fresh_forces(series: Series) -> NDArray:
-    """Return the forces of each new sample, (n, 3) N."""
-    return np.column_stack([series.of(axis) for axis in AXES])[series.fresh]

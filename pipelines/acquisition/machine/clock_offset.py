@@ -13,8 +13,6 @@ import numpy as np
 
 BUCKET_S = 0.5
 """Time within which a drift may be neglected: 50 ppm are 25 us then."""
-FLOOR = 0.01
-"""Smallest credible width of bounds, in samples: request and reply take different times."""
 
 
 class Bounds:
@@ -128,6 +126,8 @@ class Drift:
         """
         # Time constant with which old bounds are forgotten: a quartz depends on its temperature.
         memory_s = 300.0
+        # Smallest credible width of bounds, in samples: request and reply take different times.
+        narrowest = 0.01
         # At one instant t the drives have the numbers (t - origin) / period.
         lead = (first[0] - other[0]) * self._rate_hz
         width = np.hypot(first[1], other[1]) * self._rate_hz
@@ -136,7 +136,7 @@ class Drift:
             # matter.
             self._origin = sequence, lead
         # Uniform between the bounds: their width is sqrt(12) standard deviations.
-        weight = 12.0 / (width**2 + 12.0 * FLOOR**2)
+        weight = 12.0 / (width**2 + 12.0 * narrowest**2)
         row = np.array([1.0, (sequence - self._origin[0]) / self._rate_hz])
         memory = np.exp(-BUCKET_S / memory_s)
         self._sums = memory * self._sums + weight * np.outer(row, row)

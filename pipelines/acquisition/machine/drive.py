@@ -94,26 +94,22 @@ class Drive:
 
     async def read_values(self) -> Mapping[str, float]:
         """Read all quantities outside any exchange, SI units."""
-        block = self.read_block
-        return self._decode(block, await self.device.read(block.address, block.count))
+        return await self._read(self.read_block, in_motion=False)
 
     async def read_status(self) -> int:
         """Read the status word alone."""
-        block = self._status_block
         # With a short time-out: other drives on the line may still be moving.
-        words = await self.device.read(block.address, block.count, in_motion=True)
-        return int(self._decode(block, words)["status"])
+        return int((await self._read(self._status_block, in_motion=True))["status"])
 
     async def count(self) -> int:
         """Read the sample counter alone; return the last known count where there is no answer."""
         asked = time.perf_counter()
-        block = self._counter_block
         try:
-            words = await self.device.read(block.address, block.count, in_motion=True)
+            values = await self._read(self._counter_block, in_motion=True)
         except Unanswered:
             # As if no new sample had come: pacing waits on, until the watchdog expires.
             return self._newest_sequence
-        return self._note_newest(self._decode(block, words)["sequence"], asked)
+        return self._note_newest(values["sequence"], asked)
 
     async def drain(self, newest: int) -> list[Reading]:
         """Return new samples of the drive's own record.
@@ -259,10 +255,13 @@ class Drive:
             {"reference": reference, "control": control, "heartbeat": self._heartbeat}
         )
 
-    def _decode(self, block: Block, words: list[int]) -> Mapping[str, float]:
-        return self._refuse_not_finite(block.decode(words))
+    async def _read(self, block: Block, *, in_motion: bool) -> Mapping[str, float]:
+        words = await self.device.read(block.address, block.count, in_motion=in_motion)
+        values = block.decode(words)
+        self._refuse_not_finite(values)
+        return values
 
-    def _refuse_not_finite(self, values: Mapping[str, float]) -> Mapping[str, float]:
+    def _refuse_not_finite(self, values: Mapping[str, float]) -> None:
         # Quantities that must be finite: NaN would mean that the drive does not report them.
         must_be_finite = ("sequence", "time", "status", "velocity", "temperature", "reference")
         for name in must_be_finite:
@@ -271,7 +270,6 @@ class Drive:
                     f"{self.device.label}: its {name} is {values[name]}, expected a number; compare"
                     " the register map in the rig file with the device's manual"
                 )
-        return values
 
     def _reading(self, words: list[int], asked: float) -> Reading:
         values = self.read_block.decode(words)

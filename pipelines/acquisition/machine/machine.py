@@ -26,9 +26,6 @@ from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 
-LOOKS = 9
-"""Readings from which the offset between the drives' counters is determined."""
-
 Answer = TypeVar("Answer")
 
 
@@ -111,11 +108,8 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             return
-        setting = (
-            "acquire.sample_rate_hz"
-            if self.rig.sampling == "cyclic"
-            else "record_rate_hz in the rig file"
-        )
+        is_recorded = self.rig.sampling == "recorder"
+        setting = "record_rate_hz in the rig file" if is_recorded else "acquire.sample_rate_hz"
         rate_hz = cycle_hz * self.samples_per_cycle
         await all_answers(refuse_other_rate(drive, rate_hz, setting) for drive in self.drives)
 
@@ -142,9 +136,7 @@ class Machine:
             A drive reports a fault.
         """
         # Several times: between two requests a drive may go on to its next sample.
-        looks = [
-            await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)
-        ]
+        looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(9)]
         for reading in looks[-1]:
             if reading.fault:
                 raise DeviceError(reading.fault)

@@ -12,8 +12,6 @@ Position = Callable[[int], float | None]
 """From a sample of the first drive to another's fractional sample then; None while unknown."""
 
 INTERPOLATED = tuple(f.name for f in fields(Reading) if f.type in (float, "float"))
-MOST_WAITING = 100_000
-"""Most samples that wait for another drive's; the watchdog ends a run long before."""
 
 
 class Track:
@@ -83,7 +81,8 @@ class Alignment:
     def __init__(self, positions: Sequence[Position]) -> None:
         """Align drives by their positions, one for each drive but the first."""
         self._positions = positions
-        self._first: deque[Reading] = deque(maxlen=MOST_WAITING)
+        # As many may wait for another drive's; the watchdog ends a run long before.
+        self._first: deque[Reading] = deque(maxlen=100_000)
         self._tracks = [Track() for _ in positions]
 
     def rows(self, samples: Sequence[Sequence[Reading]]) -> list[tuple[Reading, ...]]:

@@ -4,7 +4,6 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,41 +23,6 @@ SECOND_LOOK = (0.3, 0.65)
 """Earliest and latest second reading of a drive with its own clock, in samples: none is missed."""
 AIM = 0.1
 """Standard deviation of the second reading's instant about the drive's next sample, in samples."""
-
-
-class Sampling(Protocol):
-    """Decides which rows are recorded."""
-
-    async def rows(self, row: Row) -> list[Row]:
-        """Return the rows that are complete with this cycle's row.
-
-        Parameters
-        ----------
-        row : Row
-            The cycle's sample of all drives.
-
-        Returns
-        -------
-        list of Row
-            Oldest first.
-        """
-
-    def end(self) -> None:
-        """Cancel all requests to the drives besides those of the cycle."""
-
-    def clocks(self, since_s: float) -> dict[str, dict]:
-        """Return each drive's clock error.
-
-        Parameters
-        ----------
-        since_s : float
-            First drive's clock, at which offsets are given, s.
-
-        Returns
-        -------
-        dict
-            By joint; empty where there is one clock.
-        """
 
 
 class LatchedSampling:
@@ -210,7 +174,7 @@ class AlignedSampling:
         return lambda sequence: drift.estimate.position(sequence) if drift.estimate else None
 
     async def rows(self, row: Row) -> list[Row]:
-        """Return the rows that are complete now; every sample of them was checked."""
+        """Return the rows that are complete now, oldest first; every sample was checked."""
         now = time.monotonic()
         self._bucket_ends = self._bucket_ends or now + BUCKET_S
         pairs = zip(self._sources, row.drives, strict=True)
@@ -278,6 +242,10 @@ class AlignedSampling:
                 "corrected": True,
             }
         return clocks
+
+
+Sampling = LatchedSampling | AlignedSampling
+"""Decides which rows are recorded."""
 
 
 def sources_of(machine: Machine, cycle_hz: float) -> list[RecorderSource | CycleSource]:

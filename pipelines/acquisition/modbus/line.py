@@ -83,19 +83,19 @@ class Line:
             await self._open()
 
     async def _open(self) -> None:
-        if not self.client.connected and not await self._connected():
-            raise DeviceError(f"{self._label}: {await self._refusal()}")
-
-    async def _connected(self) -> bool:
+        if self.client.connected:
+            return
         self.client.ctx.comm_params.timeout_connect = self._timeout_s
         try:
-            return await self.client.connect()
+            is_open = await self.client.connect()
         except BAD_SETTINGS as error:
             raise DeviceError(
                 f"{self._label}: the serial port cannot be set up like that ({error}); correct"
                 " baud_rate, parity or stop_bits in the rig file (a pseudo-terminal needs parity ="
                 ' "none")'
             ) from error
+        if not is_open:
+            raise DeviceError(f"{self._label}: {await self._refusal()}")
 
     def close(self) -> None:
         """Close the connection, if it is open."""

@@ -92,7 +92,11 @@ class ReplyCheck:
             return pdu
         self._note_reply(pdu.dev_id)
         reason = None if isinstance(pdu, InvalidReply) else self._mismatch(pdu)
-        return pdu if reason is None else _invalid(pdu, reason)
+        if reason is None:
+            return pdu
+        invalid = InvalidReply(reason)
+        invalid.dev_id, invalid.transaction_id = pdu.dev_id, pdu.transaction_id
+        return invalid
 
     def _mismatch(self, reply: ModbusPDU) -> str | None:
         asked = self._asked
@@ -108,12 +112,6 @@ class ReplyCheck:
                 f" {asked.address}"
             )
         return None
-
-
-def _invalid(reply: ModbusPDU, reason: str) -> InvalidReply:
-    invalid = InvalidReply(reason)
-    invalid.dev_id, invalid.transaction_id = reply.dev_id, reply.transaction_id
-    return invalid
 
 
 def check_replies(client: ModbusBaseClient, note_reply: Callable[[int], None]) -> None:

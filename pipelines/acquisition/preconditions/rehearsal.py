@@ -6,15 +6,10 @@ out jerks the leg. So the rehearsal is made while the drives are still disabled.
 
 from math import ceil
 
-from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.machine import Machine, all_answers
-from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.sampling import sources_of
 from pipelines.acquisition.pacing import PhaseLock
 from pipelines.errors import DeviceError
-
-REHEARSED_S, FEWEST = 0.5, 20
-"""Duration of the rehearsal, and its fewest cycles."""
 
 
 async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
@@ -27,7 +22,8 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
     """
     # Largest allowed share of late cycles: the computer may be busy for a moment.
     most_late = 0.1
-    cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
+    rehearsed_s, fewest = 0.5, 20
+    cycles = max(fewest, ceil(rehearsed_s * cycle_hz))
     allowed = most_late * cycles
     late, done = await _late(machine, cycle_hz, cycles, allowed)
     if late <= allowed:
@@ -52,7 +48,7 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
         late += count > last + 1
         last = count
         # With reads in place of exchanges, so that nothing is written.
-        row = (await machine.cycle(done, _look)).row
+        row = (await machine.cycle(done, lambda drive: drive.look(in_motion=True))).row
         done += 1
         if row and sources:
             await all_answers(
@@ -61,7 +57,3 @@ async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) 
     for source in sources:
         await source.pending.result()
     return late, done
-
-
-async def _look(drive: Drive) -> Reading:
-    return await drive.look(in_motion=True)

@@ -9,15 +9,13 @@ from pipelines.mechanics.motion import CUFFS
 
 Columns = dict[str, Callable[[Row], float]]
 
-QUANTITIES = ("angle", "torque", "reference", "velocity", "current", "temperature")
-
 
 def columns_of(machine: Machine) -> Columns:
     """Return the recording's columns except time, each with its value as a function of a row."""
     columns: Columns = {}
     for j, drive in enumerate(machine.drives):
         joint = Joint(drive.settings.joint)
-        for quantity in QUANTITIES:
+        for quantity in ("angle", "torque", "reference", "velocity", "current", "temperature"):
             if quantity in drive.recorded:
                 columns[joint.column(quantity)] = _of_drive(j, quantity)
     for sensor in machine.sensors:

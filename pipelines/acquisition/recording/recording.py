@@ -4,7 +4,7 @@ It is made in pieces, so that a long run takes no more memory than a short one.
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,6 @@ from pipelines.acquisition.recording.valid_rows import valid_batches
 from pipelines.contracts import RECORDING
 from pipelines.contracts.run_paths import aborted_of
 from pipelines.errors import ContractError
-
-LARGEST = 1e9
-"""Largest credible rate, Hz, and duration, s."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +31,9 @@ class JournalSummary:
     """First missing time, s, and number of missing samples, without those after an early end."""
     abort: str | None
     """Why the run was stopped early, None if it was not."""
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: dict[str, Any]
     """Metadata that were not known before the run."""
-    damaged: bool = False
+    damaged: bool
     """Whether samples that were written are missing, or bytes have no meaning."""
 
     @property
@@ -82,26 +79,24 @@ def summarize(journal: JournalFile) -> JournalSummary:
             offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
         index = sequence + offset
         # With the last sample of the batch before, as a gap may lie between the two.
-        gaps = gaps + _gaps(np.concatenate([[reached - 1], index]), rate_hz)
+        gaps += _gaps(np.concatenate([[reached - 1], index]), rate_hz)
         samples += len(index)
         reached = int(index[-1]) + 1
     damaged = journal.damaged > 0
     if last_words is None:
         # Neither a killed run nor one on a full disk can write its last words.
-        abort: str | None = (
+        abort = (
             f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its"
-            " disk was full"
+            f" disk was full{', or its last words are damaged' if damaged else ''}"
         )
-        if damaged:
-            abort = f"{abort}, or its last words are damaged"
-        return JournalSummary(samples, planned, rate_hz, gaps, abort, damaged=damaged)
-    abort = last_words[ABORT].decode() or None
-    if abort is None:
+        return JournalSummary(samples, planned, rate_hz, gaps, abort, {}, damaged)
+    abort = last_words[ABORT].decode()
+    if not abort:
         # After an early end the rest of the plan is no gap.
-        gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
+        gaps += _gaps(np.array([reached - 1, planned]), rate_hz)
     metadata = json.loads(last_words[METADATA])
-    damaged = damaged or int(last_words[ROWS]) != journal.rows
-    return JournalSummary(samples, planned, rate_hz, gaps, abort, metadata, damaged)
+    damaged |= int(last_words[ROWS]) != journal.rows
+    return JournalSummary(samples, planned, rate_hz, gaps, abort or None, metadata, damaged)
 
 
 def _rate_and_duration(journal: JournalFile) -> tuple[float, float]:
@@ -111,7 +106,8 @@ def _rate_and_duration(journal: JournalFile) -> tuple[float, float]:
         seconds = float(journal.metadata["config"]["run"]["duration_s"])
     except (KeyError, TypeError, ValueError):
         rate_hz = seconds = 0.0
-    is_of_a_run = 0.0 < rate_hz <= LARGEST and 0.0 < seconds <= LARGEST
+    largest = 1e9  # credible rate, Hz, and duration, s
+    is_of_a_run = 0.0 < rate_hz <= largest and 0.0 < seconds <= largest
     if not is_of_a_run or not {"time_s", "sequence"} <= set(journal.schema.names):
         raise ContractError(
             f"{journal.path}: columns or metadata are not those of a run; nothing was changed"

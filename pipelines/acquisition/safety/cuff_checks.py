@@ -13,7 +13,6 @@ class CuffChecks:
     """The last readings of each cuff sensor."""
 
     def __init__(self, sample_rate_hz: float) -> None:
-        """Begin without a reading."""
         self._rate = sample_rate_hz
         self._held = {name: StuckValue() for name in CUFFS}
 

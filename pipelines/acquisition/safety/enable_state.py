@@ -12,7 +12,6 @@ class EnableState:
     """The last report of one drive on whether it is enabled."""
 
     def __init__(self, joint: str) -> None:
-        """Watch the drive of a joint."""
         self.joint = joint
         self.enabled: bool | None = None
         """The last report; None while the drive has made none."""
@@ -58,7 +57,6 @@ class EnableStates:
     """The enable states of all drives; a fault, or a drive that dropped out, ends the run."""
 
     def __init__(self, drives: Sequence[DriveSettings]) -> None:
-        """Watch the drives of a rig."""
         self._states = [EnableState(drive.joint) for drive in drives]
 
     def __getitem__(self, joint: int) -> EnableState:

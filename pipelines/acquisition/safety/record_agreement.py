@@ -23,11 +23,8 @@ class RecordAgreement:
     def __init__(self, rig: RigSettings, joint: int, rate_hz: float) -> None:
         """Compare the record of a joint's drive, which holds samples at a rate."""
         drive = rig.drive[joint]
-        self._label, self._where, self._rate_hz = (
-            rig.label_of(drive),
-            f"map.drive.{drive.map}",
-            rate_hz,
-        )
+        self._label, self._where = rig.label_of(drive), f"map.drive.{drive.map}"
+        self._rate_hz = rate_hz
         self._exchanged: OrderedDict[int, Reading] = OrderedDict()
         self._compared, self._xx, self._xy, self._yy = 0, 0.0, 0.0, 0.0
 

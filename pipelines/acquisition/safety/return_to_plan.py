@@ -2,7 +2,7 @@
 
 from math import copysign, sqrt
 
-from pipelines.acquisition.safety.limits import clamped, refuse_leap
+from pipelines.acquisition.safety.limits import clamped
 from pipelines.errors import DeviceError
 from pipelines.settings.rig.devices import DriveSettings
 from pipelines.settings.rig.safety import SafetySettings
@@ -74,27 +74,6 @@ def step_to_plan(
     reference = base + (due - before if is_on_plan else next_speed * took_s)
     _refuse_to_lag(drive, safety, abs(due - reference))
     return (due if abs(reference - due) < NO_LAG_RAD else reference), next_speed
-
-
-def refuse_leap_of_plan(drive: DriveSettings, path: Path, rate_hz: float) -> None:
-    """Refuse a plan that leaps between two cycles, or leaves its limits.
-
-    Parameters
-    ----------
-    drive : DriveSettings
-        With the limits of the joint.
-    path : Path
-        Set-points of the plan, rad.
-    rate_hz : float
-        Cycles a second.
-
-    Raises
-    ------
-    DeviceError
-        Names the joint, the set-point and the limit.
-    """
-    due, before, _ = path
-    refuse_leap(drive, before, due, 1.0 / rate_hz)
 
 
 def _refuse_to_lag(drive: DriveSettings, safety: SafetySettings, lag: float) -> None:

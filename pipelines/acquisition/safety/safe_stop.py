@@ -23,7 +23,6 @@ class SafeStop:
         enable_states: EnableStates,
         checks: SampleChecks,
     ) -> None:
-        """Stop the drives that are tracked."""
         self._safety, self._rate = safety, sample_rate_hz
         self._trackers, self._enable_states, self._checks = trackers, enable_states, checks
         self.pressing = False

@@ -3,9 +3,6 @@
 from collections import deque
 from dataclasses import dataclass
 
-LENGTH = 1024
-"""Set-points that are kept, since a drive's records come later than the exchanges."""
-
 
 @dataclass(frozen=True)
 class SetPoint:
@@ -19,8 +16,8 @@ class SetPointHistory:
     """A joint's set-points along its drive's own counter."""
 
     def __init__(self) -> None:
-        """Begin without any."""
-        self._sent: deque[tuple[int, SetPoint]] = deque(maxlen=LENGTH)
+        # As many are kept, since a drive's records come later than the exchanges.
+        self._sent: deque[tuple[int, SetPoint]] = deque(maxlen=1024)
 
     def add(self, count: int, reference: float) -> None:
         """Note the set-point (rad) that was sent while a sample was the newest."""

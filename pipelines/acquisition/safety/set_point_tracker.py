@@ -9,12 +9,7 @@ from math import isnan
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.acquisition.safety.limits import clamped, refuse_leap, slowed
-from pipelines.acquisition.safety.return_to_plan import (
-    NO_LAG_RAD,
-    Path,
-    refuse_leap_of_plan,
-    step_to_plan,
-)
+from pipelines.acquisition.safety.return_to_plan import NO_LAG_RAD, Path, step_to_plan
 from pipelines.settings.rig import RigSettings
 
 SLACK_SAMPLES = 2
@@ -145,7 +140,9 @@ class SetPointTracker:
 
     def _towards(self, path: Path, cycle: int, now: float) -> tuple[float, float]:
         """Return a set-point along the plan, or on the way back to it, and its speed, rad/s."""
-        refuse_leap_of_plan(self.drive, path, self._rate)
+        # The plan itself must not leap between two cycles, or leave its limits.
+        due, before, _ = path
+        refuse_leap(self.drive, before, due, 1.0 / self._rate)
         self._move_base_on(cycle)
         took_s = min(self._elapsed_s(now), 1.0 / self._rate)
         return step_to_plan(

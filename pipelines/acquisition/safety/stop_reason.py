@@ -10,7 +10,6 @@ class StopReason:
     """The reasons to stop one run."""
 
     def __init__(self) -> None:
-        """Begin without a reason."""
         self.text: str | None = None
         """The first reason to stop early; None while there is none."""
         self.further: list[str] = []

@@ -27,8 +27,8 @@ def findings_of(report):
 def test_a_right_rig_answers_its_set_points(checked):
     report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
     assert findings_of(report) == ""
-    assert [answer.joint for answer in report.answers] == ["hip", "knee"]
-    for answer in report.answers:
+    assert [answer.joint for answer in report.moved] == ["hip", "knee"]
+    for answer in report.moved:
         assert answer.gain == pytest.approx(1.0, abs=by_drives.GAIN)
         assert 0 <= answer.delay_s < 0.1
         assert answer.torque_with_speed > by_drives.LEAST_CORRELATION
@@ -65,7 +65,7 @@ def test_a_set_point_of_another_sign_than_its_angle_is_reported_and_nothing_is_m
         "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle"
         in findings_of(report)
     )
-    assert report.answers == []
+    assert report.moved == []
 
 
 @pytest.mark.parametrize("scale", ["-1e-5", "3e-5"])
@@ -86,13 +86,13 @@ def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checke
 def test_devices_on_one_line_are_moved_like_others(checked):
     report = checked(options=MOVE, on_a_line=True, rest_rad="[0.0, 0.0]")
     assert findings_of(report) == ""
-    assert [answer.joint for answer in report.answers] == ["hip", "knee"]
+    assert [answer.joint for answer in report.moved] == ["hip", "knee"]
 
 
 def test_a_leg_away_from_zero_is_not_moved_before_its_signs_are_known(checked):
     report = checked(options=MOVE, rest_rad="[0.3, -0.6]", coulomb_nm="[40.0, 40.0]")
     assert "as a drive of wrong sign leaps" in findings_of(report)
-    assert (report.answers, len(report.devices)) == ([], 6)  # the report so far is kept
+    assert (report.moved, len(report.devices)) == ([], 6)  # the report so far is kept
 
 
 def test_a_movement_that_the_rigs_limits_do_not_allow_is_reported_with_the_rest_and_leaves_no_files(
@@ -135,5 +135,5 @@ def test_nothing_is_moved_where_something_is_wrong(checked):
         fault=note,
         rest_rad="[0.0, 0.0]",
     )
-    assert report.findings and not report.answers
+    assert report.findings and not report.moved
     assert set(controls) <= {0}

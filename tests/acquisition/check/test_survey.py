@@ -42,10 +42,10 @@ def test_a_right_rig_has_no_findings(checked, shipped, run):
         )
         assert (
             0
-            < device.latency.least
-            <= device.latency.median
-            <= device.latency.p99
-            <= device.latency.most
+            < device.latency.min_ms
+            <= device.latency.median_ms
+            <= device.latency.p99_ms
+            <= device.latency.max_ms
         )
         assert sum(device.latency.histogram) == device.latency.count
 

@@ -17,7 +17,6 @@ from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.rig import server
-from pipelines.rig.device import one
 from pipelines.rig.plant import Samples
 from pipelines.rig.virtual_rig import build_plant
 from pipelines.settings import datasets
@@ -108,7 +107,7 @@ def served(
     def remembered(*arguments: object) -> Samples:
         samples = advance(*arguments)
         for k, number in enumerate(samples.sequence.tolist()):
-            latched[number] = Latched(one(samples, k), time.monotonic())
+            latched[number] = Latched(samples[k : k + 1], time.monotonic())
         return samples
 
     plant.run = remembered
