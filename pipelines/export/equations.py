@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.contracts import Joint
-from pipelines.effects import Effect, Parameter, Side
+from pipelines.effects import Side
 from pipelines.effects.kernel import Instant
 from pipelines.export.exported import Exported, column_of, shift_of
 from pipelines.export.format import Degree, Holding, exact, left_out
@@ -139,7 +139,8 @@ def equations(exported: Exported) -> Equations:
     terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
     named = [(term, parameter) for term in terms for parameter in term.effect.fitted]
     # Two effects can have parameters of one name at a joint; the file's own names are taken, too.
-    names = unique((_constant_name(term.effect, parameter) for term, parameter in named), RESERVED)
+    full = ((term.effect.joint, term.effect.name, parameter.name) for term, parameter in named)
+    names = unique((identifier("_".join(filter(None, parts))) for parts in full), RESERVED)
     constants = [
         Constant(name, float(value), parameter.unit, f"{term.effect.label}: {parameter.meaning}")
         for name, (term, parameter), value in zip(
@@ -165,10 +166,6 @@ def equations(exported: Exported) -> Equations:
         _add_equations(model, term, values, model.memories)
         model.memory_of.extend([term.effect.label] * term.effect.states)
     return model
-
-
-def _constant_name(effect: Effect, parameter: Parameter) -> str:
-    return identifier("_".join(filter(None, (effect.joint, effect.name, parameter.name))))
 
 
 def _add_equations(model: Equations, term: Term, values: list[Formula], first: int) -> None:

@@ -70,8 +70,6 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
-    # Shift of the centre of mass of a body on two slides.
-    off_centre_m = 0.01
     element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
     kind = "hinge" if body.joint.kind == "revolute" else "slide"
     hinge = {"type": kind, "axis": numbers(*body.axis)}
@@ -81,13 +79,14 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     if soft:
         ET.SubElement(element, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
-    # MuJoCo treats two slides of a body centred at their frame as independent. The shift has no
-    # effect on the motion of a slide.
-    offset = (
-        off_centre_m * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
+    centre = body.centre
+    if soft and kind == "slide":
+        # MuJoCo treats two slides of a body centred at their frame as independent. A shift by 1 cm
+        # has no effect on the motion of a slide.
+        centre = centre + np.array([0.01, 0.0, 0.0])
+    ET.SubElement(
+        element, "inertial", pos=numbers(*centre), mass=number(body.mass), diaginertia=inertia
     )
-    centre = numbers(*(body.centre + offset))
-    ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
     # No contacts: the shapes are nominal, and links that touch would add forces.
     ET.SubElement(

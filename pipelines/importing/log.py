@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting
-from pipelines.importing.quantities.conversion import columns_of, counter_turn, quantity
+from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
@@ -55,8 +55,12 @@ class Log:
     @property
     def turns(self) -> dict[str, float]:
         """A turn of the counter in SI, for each of the recording's columns that has a counter."""
-        turns = {one.target: counter_turn(one.reading, one.gain) for one in self.channels}
-        return {target: turn for target, turn in turns.items() if turn is not None}
+        turns = {}
+        for one in self.channels:
+            if one.reading.wraps_at is not None:
+                gain = one.gain * one.reading.known_unit.factor * one.reading.scale
+                turns[one.target] = abs(gain * one.reading.wraps_at)
+        return turns
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
         """Return every channel at the instants of a run.
@@ -188,8 +192,9 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
-        rows = max(map(len, columns.values()))
-        run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), note)
+        rows, rate_hz = max(map(len, columns.values())), float(settings.time.rate_hz or 0.0)
+        note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
+        run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}

@@ -16,6 +16,11 @@ from pipelines.validation.toml import read_toml
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
+Gravity = Annotated[float, Field(ge=0.0, le=30.0)]
+"""In m/s², up to more than on any planet; 9.81 m/s² in cm/s² is beyond it."""
+Length = Annotated[float, Field(gt=0.0, le=5.0)]
+"""In m, up to more than any limb or machine for one; 389.52 mm and 38.952 cm are beyond it."""
+
 
 class Settings(BaseModel):
     """One table of a settings file; every field has a description, and its unit in its name."""

@@ -15,7 +15,7 @@ from pipelines.errors import SettingsError
 from pipelines.settings import transmission
 from pipelines.settings.base import Positive, Settings, load_toml
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.units import unit_named, units_of
+from pipelines.settings.units import ALIASES, UNITS, Unit, unit_named, units_of
 from pipelines.validation.suggestion import closest, similar_file
 
 LARGEST = 1e12
@@ -115,6 +115,11 @@ class ReadingSettings(Settings):
             raise ValueError("begins_at: needs wraps_at; set wraps_at, or remove it")
         return self
 
+    @property
+    def known_unit(self) -> Unit:
+        """Its unit, which the map has checked."""
+        return UNITS[ALIASES.get(self.unit, self.unit)]
+
 
 class ForceSettings(ReadingSettings):
     """One axis of a cuff force sensor."""
@@ -158,11 +163,9 @@ class JointReadingSettings(ReadingSettings):
         target : str
             Dimension of the quantity.
         """
-        unit = unit_named(self.unit)
-        assert unit is not None, "the joint checks its units"
         numbers = {key: getattr(self, key) for key in transmission.KEYS}
         given = {key: value for key, value in numbers.items() if value is not None}
-        return transmission.gain(unit.dimension, target, given, self.gear_ratio)
+        return transmission.gain(self.known_unit.dimension, target, given, self.gear_ratio)
 
 
 class JointSettings(Settings):

@@ -7,8 +7,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joint_units import Kind
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Settings
-from pipelines.settings.physical_bounds import Gravity, Length
+from pipelines.settings.base import Gravity, Length, Settings
 from pipelines.validation.suggestion import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}

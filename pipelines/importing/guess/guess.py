@@ -11,7 +11,7 @@ from pipelines.errors import InputError, about
 from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_known
-from pipelines.importing.guess.names import Meaning, meanings
+from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
@@ -39,7 +39,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
         columns, typed = _typed_columns(source)
-        names = meanings(source.names)
+        names = [meaning(name) for name in source.names]
         time = guess_time(names, columns, typed)
         if time is None:
             raise InputError(_no_clock(names, columns))
@@ -92,9 +92,11 @@ def _typed_columns(source: Source) -> tuple[Columns, dict[str, str]]:
 
 
 def _no_clock(names: Sequence[Meaning], columns: Mapping[str, NDArray]) -> str:
-    back = [m.column for m in names if m.quantity == "time" and _goes_back(columns[m.column])]
-    if back:
-        return f"its clock, {back[0]!r}, runs backwards; reverse the order of its rows"
+    for m in names:
+        values = columns[m.column]
+        is_clock = m.quantity == "time" and values.dtype.kind in "iuf"
+        if is_clock and clock.runs_backwards(values.astype(float)):
+            return f"its clock, {m.column!r}, runs backwards; reverse the order of its rows"
     return (
         f"no time column found: none of {_in_short([m.column for m in names])} increases steadily"
         f" for ten rows at {clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz. Write the map by hand,"
@@ -116,10 +118,6 @@ def _in_short(names: Sequence[str]) -> str:
     most_names = 20
     more = f" and {len(names) - most_names} more" if len(names) > most_names else ""
     return ", ".join(names[:most_names]) + more
-
-
-def _goes_back(values: NDArray) -> bool:
-    return values.dtype.kind in "iuf" and clock.runs_backwards(values.astype(float))
 
 
 def _numeric(values: NDArray) -> NDArray:

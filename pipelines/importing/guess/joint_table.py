@@ -128,15 +128,7 @@ class _JointWriter:
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
 
     def write_angle(self, time_s: NDArray, fit: TorqueFit | None) -> None:
-        """Write the table of the angle.
-
-        Parameters
-        ----------
-        time_s : (n,) array
-            s.
-        fit : TorqueFit or None
-            Fit of the torque, which shows the zero; None without a torque.
-        """
+        """Write the table of the angle; a fit of the torque shows its zero."""
         self._write_column("angle")
         why, sure = self.units.why, self.units.sure
         if self.too_far:

@@ -112,11 +112,6 @@ class Meaning:
         return 3 * self.commanded + 2 * self.filtered + (not self.measured)
 
 
-def meanings(names: Iterable[str]) -> list[Meaning]:
-    """Return the meaning of each name."""
-    return [meaning(name) for name in names]
-
-
 def meaning(name: str) -> Meaning:
     """Return the meaning of a name."""
     plain = TWIN.sub("", name)

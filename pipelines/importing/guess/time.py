@@ -223,17 +223,7 @@ def _stands_still(values: NDArray) -> bool:
 def _stamps(values: NDArray) -> tuple[NDArray, NDArray]:
     """Return the rows of each stamp of a coarse clock, and its distance from the next.
 
-    The first and the last stamp are left out, as their rows may not be complete.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Stamps.
-
-    Returns
-    -------
-    (k,) array, (k,) array
-        Numbers of rows, and steps in the clock's unit.
+    The first and the last of the stamps (n,) are left out, as their rows may not be complete.
     """
     begins = np.flatnonzero(np.diff(values)) + 1
     return np.diff(begins), np.diff(values[begins])

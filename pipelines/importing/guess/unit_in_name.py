@@ -26,24 +26,8 @@ OTHERS = (
         for angle in ("rad", "deg", "°", "m", "mm", "rev")
         for square in ("²", "2", "^2")
     ),
-    *(
-        "Nm/s",
-        "Nm/rad",
-        "Nm/deg",
-        "Nm/A",
-        "Nms",
-        "A/s",
-        "V/s",
-        "W",
-        "kW",
-        "Hz",
-        "kHz",
-        "J",
-        "bar",
-        "Pa",
-        "kg",
-        "Ohm",
-    ),
+    *("Nm/s", "Nm/rad", "Nm/deg", "Nm/A", "Nms", "A/s", "V/s"),
+    *("W", "kW", "Hz", "kHz", "J", "bar", "Pa", "kg", "Ohm"),
 )
 """Units of quantities that no map has."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")

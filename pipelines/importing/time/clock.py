@@ -14,10 +14,6 @@ from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 
-RESTART_S, RESTART_PERIODS = 1.0, 20
-"""A clock starts over that steps back by more than the longer of these, s and samples."""
-LEAD_PERIODS, LEAD_S = 20, 0.2
-"""Long before is more than the longer of these, samples and s."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
 LONGEST = 29
@@ -231,22 +227,6 @@ def _unwrapped(since: NDArray, modulus: float, note: Note) -> NDArray:
     return since
 
 
-def uniform(rows: int, rate_hz: float, note: Note) -> Run:
-    """Return the run of a log without a clock.
-
-    Parameters
-    ----------
-    rows : int
-        Number of rows.
-    rate_hz : float
-        Their rate, Hz.
-    note : callable
-        Takes what is reported about the clock.
-    """
-    note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
-    return Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
-
-
 def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     """Divide a log into runs whose times strictly increase.
 
@@ -267,7 +247,12 @@ def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
         note(f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out")
-    _refuse_backwards(time_s[rows])
+    time = time_s[rows]
+    if runs_backwards(time):
+        raise InputError(
+            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
+            " last; reverse the order of its rows, or correct time.column in the map"
+        )
     # Outliers first: one stamp far ahead would look like a clock that starts over after it.
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
@@ -293,25 +278,21 @@ def runs_backwards(time: NDArray) -> bool:
     return bool(len(steps)) and bool(np.mean(steps < 0.0) > backwards)
 
 
-def _refuse_backwards(time: NDArray) -> None:
-    if runs_backwards(time):
-        raise InputError(
-            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
-            " last; reverse the order of its rows, or correct time.column in the map"
-        )
-
-
 def _period(time_s: NDArray) -> float:
     steps = np.diff(time_s)
     steps = steps[steps > 0.0]
     return float(np.median(steps)) if len(steps) else np.inf
 
 
+def _far(time: NDArray) -> float:
+    """Return the step, s, back by more than which a clock starts over: 1 s, or 20 periods."""
+    return max(1.0, 20 * _period(time))
+
+
 def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
     """Leave out single stamps far from both neighbours, which are close to each other."""
     time = time_s[rows]
-    far = max(RESTART_S, RESTART_PERIODS * _period(time))
-    step = np.diff(time)
+    far, step = _far(time), np.diff(time)
     stray = (
         (np.abs(step[:-1]) > far) & (np.abs(step[1:]) > far) & (np.abs(time[2:] - time[:-2]) < far)
     )
@@ -328,8 +309,7 @@ def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
 def _begins(time: NDArray) -> list[int]:
     """Return the first row, and each row at which the clock starts over."""
     # Two kinds of restart: a step far back, then, between those, a small one that lasts.
-    far = max(RESTART_S, RESTART_PERIODS * _period(time))
-    cuts = [0, *(np.flatnonzero(np.diff(time) < -far) + 1), len(time)]
+    cuts = [0, *(np.flatnonzero(np.diff(time) < -_far(time)) + 1), len(time)]
     begins = []
     for first, last in pairwise(cuts):
         begins.append(int(first))
@@ -407,10 +387,9 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
 
 def _lead(time: NDArray) -> int:
     """Return the number of rows at the beginning that are long before the rest."""
-    # At most so many rows at the beginning are left out if they are long before the rest.
-    lead_rows = 5
-    steps = np.diff(time[: lead_rows + 1])
-    far = np.flatnonzero(steps > max(LEAD_S, LEAD_PERIODS * _period(time)))
+    # At most 5 rows: more of them are a run of their own. Long before is 0.2 s and 20 periods.
+    steps = np.diff(time[:6])
+    far = np.flatnonzero(steps > max(0.2, 20 * _period(time)))
     return int(far[-1]) + 1 if len(far) else 0
 
 
