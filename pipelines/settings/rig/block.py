@@ -72,7 +72,7 @@ def check_counter(register: Register, name: str) -> None:
     ValueError
         It has a scale, an offset or a sign.
     """
-    if not register.is_plain_count:
+    if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or offset"

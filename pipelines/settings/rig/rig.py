@@ -23,7 +23,7 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings
+from pipelines.settings.rig.line import LineSettings, TcpLine
 from pipelines.settings.rig.plant import PlantSettings
 from pipelines.settings.rig.register import DIMENSION
 from pipelines.settings.rig.register_map import Maps
@@ -222,8 +222,10 @@ class RigSettings(Settings):
             _check_block_reach(f"map.sensor.{sensor.map}.read", block, limits, sensor.cuff)
 
     def line_of(self, device: DeviceSettings) -> LineSettings:
-        """Return the line that a device is on."""
-        return device.line_among(self.line)
+        """Return the line that a device is on: a shared one, else its own by TCP."""
+        if device.line is None:
+            return TcpLine(host=device.host, port=device.port)
+        return self.line[device.line]
 
     def turn_of(self, sensor: SensorSettings) -> int:
         """Return the cycle, among its ``every``, in which a sensor is read: they take turns."""
