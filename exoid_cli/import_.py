@@ -113,18 +113,17 @@ def _recordings(
     """Write the recordings of all files, or none of them; describe each file."""
     from pipelines.contracts import RECORDING
     from pipelines.contracts.atomic import all_or_none
-    from pipelines.importing.quantities.turn_offset import Beginnings
-    from pipelines.importing.recordings import recordings
+    from pipelines.importing.recordings import Begins, recordings
 
     sources: dict[Path, Path] = {}
     # One for all files, because counters are compared across logs.
-    before = Beginnings()
+    begins: Begins = {}
     logs: list[dict[str, Any]] = []
     with all_or_none(output) as folder:
         for file in files:
             written: list[dict[str, Any]] = []
             with console.working(f"reading {file.name}"):
-                for recording in recordings(file, settings, map_, before):
+                for recording in recordings(file, settings, map_, begins):
                     path = output / recording.file
                     # Asked before it is written, as the second recording would replace the first.
                     if path in sources:

@@ -16,13 +16,13 @@ from typing import Any
 from pipelines.errors import ExoidError
 
 OF_MATH = ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2")
-OTHERS: dict[str, Callable[..., Any]] = {
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in OF_MATH},
     "abs": abs,
     "max": max,
     "min": min,
     "sign": lambda x: (x > 0) - (x < 0),
 }
-FUNCTIONS = {name: getattr(math, name) for name in OF_MATH} | OTHERS
 """Functions that an equation may call, and that every format can write."""
 
 

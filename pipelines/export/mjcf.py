@@ -16,7 +16,7 @@ from pipelines.effects import Element
 from pipelines.export.bodies import NOMINAL, Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, approximate
-from pipelines.export.holding import held_friction, holding_from, sound_friction
+from pipelines.export.holding import held_friction, holding_from
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -113,7 +113,8 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     friction = exported.of(Element.FRICTION, name)
     drag = exported.of(Element.QUADRATIC_DAMPING, name)
     if friction and _friction(friction).degree is not Degree.NOT:
-        coulomb, damping[0] = sound_friction(friction)
+        # MuJoCo refuses negative values; `held_friction` states the loss.
+        coulomb, damping[0] = np.maximum(friction.values, 0.0)
         attributes["frictionloss"] = number(coulomb)
         # Two steps are the shortest time constant that MuJoCo allows.
         attributes["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)

@@ -135,7 +135,8 @@ class Log:
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
         reading, of_time = channel.reading, noting("time", findings)
-        stamps = clock.stamps(self.columns[str(reading.time)], self.settings, of_time)
+        column = str(reading.time)
+        stamps = clock.stamps(self.columns[column], column, self.settings, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {reading.time!r} differ in length")
@@ -198,10 +199,9 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}
-    for stamped in clocks - {None}:
-        clock.check_unit(columns[str(stamped)], str(stamped), settings.time.unit)
     columns = _as_numbers(columns, clocks, findings)
-    stamps = clock.stamps(columns[settings.time.column], settings.time, note)
+    column = settings.time.column
+    stamps = clock.stamps(columns[column], column, settings.time, note)
     origin = clock.first_stamp(stamps)
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, note))

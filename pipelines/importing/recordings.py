@@ -17,7 +17,6 @@ from pipelines.errors import InputError, SettingsError, about
 from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
-from pipelines.importing.quantities.turn_offset import Beginnings
 from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
@@ -26,6 +25,8 @@ from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
 """Least number of rows of a recording."""
+
+Begins = dict[str, tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Imported:
 
 
 def recordings(
-    path: Path, settings: ImportMap, map_path: Path, before: Beginnings
+    path: Path, settings: ImportMap, map_path: Path, begins: Begins
 ) -> Iterator[Imported]:
     """Yield the recordings that a map makes of a log.
 
@@ -64,8 +65,8 @@ def recordings(
         The map.
     map_path : Path
         File of the map.
-    before : Beginnings
-        First readings of the counters in logs before this one.
+    begins : dict of str to (float, str)
+        First readings of counters, SI, and the logs that had them; this log adds its own.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def recordings(
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
-            for recording in _recordings_of(run, suffix, log, settings, wanted, before):
+            for recording in _recordings_of(run, suffix, log, settings, wanted, begins):
                 recording.metadata["imported"] |= of_log
                 recording.metadata.update(provenance)
                 yield recording
@@ -142,7 +143,7 @@ def _recordings_of(
     log: Log,
     settings: ImportMap,
     wanted: Sequence[RecordingSettings],
-    before: Beginnings,
+    begins: Begins,
 ) -> Iterator[Imported]:
     path, findings = log.source.path, [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
@@ -157,7 +158,7 @@ def _recordings_of(
     _note_period(columns, settings, wanted, note)
     # On the whole run: short spans show less, and each would repeat the remarks.
     findings += plausibility.check(columns, settings)
-    findings += before.check(f"{path.name}{suffix}", columns, log.turns)
+    findings += _turns_apart(f"{path.name}{suffix}", columns, log.turns, begins)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
     _check_overlap(time, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):
@@ -271,6 +272,29 @@ def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> No
             raise SettingsError(
                 f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected"
                 f" at most the {duration_s:.6g} s of the run; correct it, or remove it"
+            )
+
+
+def _turns_apart(
+    log: str, columns: Mapping[str, NDArray], turns: Mapping[str, float], begins: Begins
+) -> Iterator[Finding]:
+    """Report counters that begin more than half a turn from where those of the first log did."""
+    for name, turn in turns.items():
+        known = columns[name][np.isfinite(columns[name])]
+        if not len(known):
+            continue
+        begin = float(known[0])
+        # No log shows its own turn, so the first one is the reference of all others.
+        first, first_log = begins.setdefault(name, (begin, log))
+        # Less than half a turn may be motion between two logs.
+        away = round((begin - first) / turn)
+        if away:
+            seen = (
+                f"begins at {begin:.4g}, in {first_log} at {first:.4g},"
+                f" {counted(abs(away), 'turn')} apart"
+            )
+            yield Finding(
+                name, seen, "kept; if all logs begin at the same reading, set begins_at to it"
             )
 
 

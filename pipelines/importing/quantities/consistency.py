@@ -1,4 +1,4 @@
-"""Whether the columns of a log agree: velocity integrates to angle, torque does work."""
+"""Whether the columns of a log agree: velocity integrates to angle."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -126,35 +126,6 @@ def _travel(time_s: NDArray, velocity: NDArray) -> NDArray:
         [[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))]
     )
     return travel[SPAN:] - travel[:-SPAN]
-
-
-def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
-    """Return the mean and the mean magnitude of a drive's power.
-
-    The energy that a drive delivers between two equal states is lost to friction. The mean is thus
-    positive where the signs of angle and torque agree.
-
-    Parameters
-    ----------
-    time_s : (n,) array
-        Times, s.
-    angle, torque : (n,) array
-        Angle, rad, and torque, N·m; or position, m, and force, N.
-
-    Returns
-    -------
-    (float, float)
-        Mean and mean magnitude, W; zeros where the log is too short.
-    """
-    time_s, angle, torque = whole_rows(time_s, angle, torque)
-    if len(time_s) < 5 * SPAN:
-        return 0.0, 0.0
-    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
-    # The mean torque over the span of the velocity: a shift in time between both would change their
-    # product.
-    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
-    power = averaged * velocity
-    return float(np.mean(power)), float(np.mean(np.abs(power)))
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:

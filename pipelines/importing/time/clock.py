@@ -61,21 +61,8 @@ def usual_units(step: float) -> list[str]:
     ]
 
 
-def check_unit(raw: NDArray, column: str, unit: str) -> None:
-    """Refuse dates with the unit of numbers, and numbers with the unit of dates.
-
-    Parameters
-    ----------
-    raw : (n,) array
-        Stamps as the file has them.
-    column, unit : str
-        Name of their column, and its unit in the map.
-
-    Raises
-    ------
-    SettingsError
-        If they do not fit, with the unit to set.
-    """
+def _check_unit(raw: NDArray, column: str, unit: str) -> None:
+    """Refuse dates with the unit of numbers, and numbers with the unit of dates."""
     content = _content(raw)
     fits = {
         "dates": unit == "iso8601",
@@ -115,7 +102,7 @@ def _content(raw: NDArray) -> str:
     return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
 
 
-def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
+def stamps(raw: NDArray, column: str, settings: TimeSettings, note: Note) -> NDArray:
     """Return time stamps as numbers in the map's unit.
 
     Whole numbers stay integers, as float64 cannot represent every nanosecond since 1970.
@@ -124,6 +111,8 @@ def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
     ----------
     raw : (n,) array
         Stamps as the file has them.
+    column : str
+        Name of their column, for messages.
     settings : TimeSettings
         Unit of the stamps.
     note : callable
@@ -136,9 +125,12 @@ def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
 
     Raises
     ------
+    SettingsError
+        If they are dates and the unit is one of numbers, or the other way round.
     InputError
         If there is no date, or a stamp does not fit into int64.
     """
+    _check_unit(raw, column, settings.unit)
     dates = settings.unit == "iso8601"
     values = whole_nanoseconds(raw) if dates or raw.dtype.kind in "mM" else raw
     if dates and len(raw) and not np.isfinite(values).any():
