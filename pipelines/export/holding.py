@@ -40,11 +40,6 @@ def holding_from(
         How the format holds an encoder's shift.
     format_name : str
         For the reason of a term that is left out.
-
-    Returns
-    -------
-    callable
-        A term's holding.
     """
 
     def holding(term: Term) -> Holding:

@@ -175,15 +175,12 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
     # Solved for T: the order of gain and offset decides whether the offset is scaled, too.
     at_zero = -(offset.values[0] if offset else 0.0)
-    if gain and offset and _comes_before(exported, gain, offset):
+    first = next(term for term in exported.terms if term is gain or term is offset)
+    if offset and first is gain:
         at_zero *= per_unit
     bias = numbers(at_zero, 0.0, 0.0)
     general = {"gainprm": number(per_unit), "biastype": "affine", "biasprm": bias}
     ET.SubElement(actuators, "general", {"name": name, "joint": name} | general)
-
-
-def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
-    return next(term for term in exported.terms if term is first or term is second) is first
 
 
 MJCF = Format(

@@ -2,7 +2,8 @@
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Hashable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar, get_args
 
@@ -94,6 +95,14 @@ def _keys_at(model: type[BaseModel], path: str) -> list[str]:
             return []
         model = inner
     return list(model.model_fields)
+
+
+Item = TypeVar("Item", bound=Hashable)
+
+
+def repeated(items: Iterable[Item]) -> list[Item]:
+    """Return the items that occur more than once."""
+    return [item for item, times in Counter(items).items() if times > 1]
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -17,10 +17,6 @@ ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
-NEAR = 0.1
-"""Largest relative difference between the rates of two clocks of the same rows."""
-TYPES = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
-"""Reasons for units that are given by the type of a column."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +105,8 @@ def _guess(
     rate_hz = _rate_hz(step, unit)
     is_usual, is_named = _is_usual(rate_hz), meaning.quantity == "time"
     if known:
-        why = f"{TYPES.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+        by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
+        why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
     else:
         why = f"steps of {step:.4g} are {rate_hz:.4g} Hz in {unit}, and no rate in another"
     if not is_named:
@@ -153,8 +150,9 @@ def _finer(
         values = columns[meaning.column].astype(float)
         own = [] if meaning.quantity else _usual_rates(meaning, _step(values, False), typed)
         if any(
-            # A finer clock must not start over: a coarse one never goes back.
-            abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1]
+            # The rates of two clocks of the same rows differ by less than 10 %. A finer clock must
+            # not start over: a coarse one never goes back.
+            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, unit)[1]
             for unit, hz in own
             for rate in rates
         ):

@@ -20,8 +20,6 @@ STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
 """Least motion of a joint from which inertia can be seen, about the play of a gear or screw."""
-FAR = 20.0
-"""Distance from the median, relative to that of 99 % of the rows, that marks an outlier."""
 
 
 def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
@@ -84,13 +82,15 @@ def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator
 
 def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     """Report single readings far from nearly all others."""
+    # Distance from the median, relative to that of 99 % of the rows, that marks an outlier.
+    far_off = 20.0
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
         # Median and quantile: an outlier must not widen the range that it is judged by.
         some = _every_kth(columns[name])
         middle = float(np.median(some))
         usual = float(np.quantile(np.abs(some - middle), 0.99))
-        least, most = middle - FAR * usual, middle + FAR * usual
+        least, most = middle - far_off * usual, middle + far_off * usual
         far = np.flatnonzero((columns[name] < least) | (columns[name] > most))
         if usual > 0.0 and len(far):
             seen = (

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.errors import InputError
+from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import unit_named
 
@@ -87,8 +88,9 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     notes = [f"delimiter {table.delimiter!r}, decimal {table.decimal!r}, {encoding}"]
     if names == table.numbered:
         notes.append("no header: columns are named c1, c2, ...")
-    comment = settings.comment or _comment(lines)
-    twice = [name for name, times in Counter(names).items() if times > 1]
+    starts = Counter(line.lstrip()[:1] for line in lines)
+    comment = settings.comment or next((mark for mark in COMMENTS if starts[mark]), None)
+    twice = repeated(names)
     if twice:
         notes.append(
             f"columns with the same name are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
@@ -128,11 +130,6 @@ def _is_stray(nuls: int, start: bytes) -> bool:
     # Share of NUL bytes up to which a file may be a damaged text; UTF-16 has half.
     stray = 0.1
     return nuls < stray * len(start) and b"\0" not in start.partition(b"\n")[0]
-
-
-def _comment(lines: Sequence[str]) -> str | None:
-    starts = Counter(line.lstrip()[:1] for line in lines)
-    return next((mark for mark in COMMENTS if starts[mark]), None)
 
 
 def _no_table(lines: Sequence[str], settings: SourceSettings) -> str:

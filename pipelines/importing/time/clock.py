@@ -42,17 +42,12 @@ class Run:
 
 
 def usual_units(step: float) -> list[str]:
-    """Return the units in which a step between stamps gives a usual rate of machines.
+    """Return the units, of s, ms, us and ns, in which a step gives a usual rate of machines.
 
     Parameters
     ----------
     step : float
-        In the unknown unit.
-
-    Returns
-    -------
-    list of str
-        Of s, ms, us and ns.
+        From one stamp to the next, in the unknown unit.
     """
     return [
         unit

@@ -60,17 +60,10 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
 def check_counter(register: Register, name: str) -> None:
     """Refuse a counter whose raw value is not the count, as its wraparound is then unknown.
 
-    Parameters
-    ----------
-    register : Register
-        The counter.
-    name : str
-        Its place in the file, for the message.
-
     Raises
     ------
     ValueError
-        It has a scale, an offset or a sign.
+        It has a scale, an offset or a sign; names its place in the file.
     """
     if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
         raise ValueError(

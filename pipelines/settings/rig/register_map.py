@@ -1,11 +1,10 @@
 """``[map]`` of a rig file: which registers the drives and force sensors of a make have."""
 
-from collections import Counter
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
+from pipelines.settings.base import Settings, repeated
 from pipelines.settings.rig.block import check_block, check_counter, registers_of
 from pipelines.settings.rig.register import Register
 from pipelines.settings.rig.ring import RingSettings
@@ -157,12 +156,11 @@ class DriveMap(Settings):
 
     def _check_control_words(self) -> None:
         words = self._control_words
-        for word, times in Counter(words.values()).items():
-            if times > 1:
-                same = " and ".join(name for name, value in words.items() if value == word)
-                raise ValueError(
-                    f"{same}: both are 0x{word:04X}, expected different control words; correct one"
-                )
+        for word in repeated(words.values()):
+            same = " and ".join(name for name, value in words.items() if value == word)
+            raise ValueError(
+                f"{same}: both are 0x{word:04X}, expected different control words; correct one"
+            )
 
     def _check_word_sizes(self) -> None:
         """Refuse words and masks that do not fit into their registers."""

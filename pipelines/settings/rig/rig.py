@@ -4,7 +4,6 @@ A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage 
 reads that.
 """
 
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -13,7 +12,7 @@ from pydantic import Field, model_validator
 from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Positive, Settings, load_toml
+from pipelines.settings.base import Positive, Settings, load_toml, repeated
 from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import (
     ControllerSettings,
@@ -110,23 +109,19 @@ class RigSettings(Settings):
                 )
         # Devices take turns on each line. Two lines to one place would send requests at the same
         # time.
-        for place, times in Counter(line.place for line in self.line.values()).items():
-            if times > 1:
-                raise ValueError(
-                    f"line: two lines lead to {place}; make them one, with all its devices on it"
-                )
-        addresses = Counter((self.line_of(device).place, device.unit) for device in devices)
-        for (place, unit), times in addresses.items():
-            if times > 1:
-                raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
+        for place in repeated(line.place for line in self.line.values()):
+            raise ValueError(
+                f"line: two lines lead to {place}; make them one, with all its devices on it"
+            )
+        for place, unit in repeated((self.line_of(one).place, one.unit) for one in devices):
+            raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
 
     def _check_cuffs(self) -> None:
         """Refuse two sensors at one cuff."""
-        for cuff, times in Counter(sensor.cuff for sensor in self.sensor).items():
-            if times > 1:
-                raise ValueError(
-                    f"sensor: found two sensors at {cuff}, expected one; correct their cuffs"
-                )
+        for cuff in repeated(sensor.cuff for sensor in self.sensor):
+            raise ValueError(
+                f"sensor: found two sensors at {cuff}, expected one; correct their cuffs"
+            )
 
     def _check_virtual(self) -> None:
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
@@ -277,11 +272,8 @@ class RigSettings(Settings):
 
     def known_geometry(self) -> dict[str, float]:
         """Return the known lengths of the leg; a virtual rig's plant fills in the others."""
-        plant = (
-            {name: getattr(self.plant, name) for name in GeometrySettings.model_fields}
-            if self.plant
-            else {}
-        )
+        lengths = set(GeometrySettings.model_fields)
+        plant = self.plant.model_dump(include=lengths) if self.plant else {}
         # Measured lengths of the file count more than those of the plant.
         return plant | self.geometry.model_dump(exclude_none=True)
 
@@ -309,11 +301,6 @@ class RigSettings(Settings):
 
 def load_rig(path: Path | str) -> RigSettings:
     """Return the rig in a file; names of files in it are relative to its folder.
-
-    Parameters
-    ----------
-    path : Path or str
-        A rig file.
 
     Raises
     ------
