@@ -27,6 +27,7 @@ FEWEST = 10
 """Least number of rows of a recording."""
 
 Begins = dict[str, tuple[float, str]]
+"""The first reading of each counter, SI, and the log that had it."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +56,7 @@ class Imported:
 def recordings(
     path: Path, settings: ImportMap, map_path: Path, begins: Begins
 ) -> Iterator[Imported]:
-    """Yield the recordings that a map makes of a log.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-    settings : ImportMap
-        The map.
-    map_path : Path
-        File of the map.
-    begins : dict of str to (float, str)
-        First readings of counters, SI, and the logs that had them; this log adds its own.
+    """Yield the recordings that a map makes of a log, and add its counters to ``begins``.
 
     Raises
     ------

@@ -13,14 +13,13 @@ from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_known
 from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
+from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import SourceSettings
-from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
@@ -53,8 +52,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
                 )
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
-    run = _longest_run(columns[time.column], time.unit)
-    assert run is not None, "a clock goes forward over ten rows or more"
+    run = max(runs_of(columns[time.column], time.unit), key=len)
     rows = len(columns[time.column])
     # Columns of another length are constants, or have a clock of their own.
     of_run = {name: values[run.rows] for name, values in columns.items() if len(values) == rows}
@@ -141,13 +139,6 @@ def _dates(values: NDArray) -> NDArray | None:
     return stamps if np.isfinite(stamps).all() else None
 
 
-def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
-    """Return the longest run of a clock's stamps (n,); None where each run has one row."""
-    stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
-    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return max(clock.runs(time_s, stamps), key=len, default=None)
-
-
 def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
     proposal.table("[geometry]", "geometry")
     if all(joint.slides for joint in joints):
@@ -179,7 +170,7 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
         if values.dtype.kind not in "iuf" or len(values) != len(stamps):
             return None
     with about(path):
-        run = _longest_run(stamps, time.unit)
+        run = max(runs_of(stamps, time.unit), key=len, default=None)
     if run is None:
         return None
     of_run = {name: values[run.rows] for name, values in motion.items()}

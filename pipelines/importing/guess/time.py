@@ -103,7 +103,7 @@ def _guess(
     # Usual rates span three decades, so that mostly one unit fits.
     unit = known or fitting[0]
     rate_hz = _rate_hz(step, unit)
-    is_usual, is_named = _is_usual(rate_hz), meaning.quantity == "time"
+    is_usual, is_named = unit in clock.usual_units(step, [unit]), meaning.quantity == "time"
     if known:
         by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
         why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
@@ -164,17 +164,13 @@ def _usual_rates(
     meaning: Meaning, step: float, typed: Mapping[str, str]
 ) -> list[tuple[str, float]]:
     """Return the units of a clock of such a step that give usual rates, with the rates, Hz."""
-    unit = _unit(meaning, typed)
-    rates = [(one, _rate_hz(step, one)) for one in ([unit] if unit else clock.usual_units(step))]
-    return [(one, rate) for one, rate in rates if _is_usual(rate)]
+    known = _unit(meaning, typed)
+    units = clock.usual_units(step, [known]) if known else clock.usual_units(step)
+    return [(unit, _rate_hz(step, unit)) for unit in units]
 
 
 def _rate_hz(step: float, unit: str) -> float:
     return 1.0 / (step * UNITS[unit].factor)
-
-
-def _is_usual(rate_hz: float) -> bool:
-    return clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
 
 
 def write_time(proposal: Proposal, guess: TimeGuess) -> None:
@@ -261,14 +257,12 @@ def _step(values: NDArray, coarse: bool) -> float:
         if usual.any():
             return float(np.sum(steps[usual]) / np.sum(rows[usual]))
         return np.median(steps) / np.median(rows)
-    # Without steps back, at which the clock starts over.
-    steps = np.diff(values)
-    return float(np.median(steps[steps > 0]))
+    return clock.period(values)
 
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values)
+    runs = runs_of(values, unit)
     full = [
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)
@@ -277,3 +271,10 @@ def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     if full and full[0] and len(set(full)) == 1:
         return full[0], False
     return None, len(runs) > 1
+
+
+def runs_of(stamps: NDArray, unit: str) -> list[clock.Run]:
+    """Return the runs of a clock with these stamps (n,)."""
+    stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
+    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
+    return clock.runs(time_s, stamps)

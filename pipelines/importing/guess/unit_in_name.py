@@ -73,11 +73,8 @@ def _without(name: str, match: re.Match[str]) -> str:
 
 def _is_plain(text: str, unit: str) -> bool:
     """Return whether a word without brackets is clearly that unit, unlike ``ticks`` or ``ms``."""
-    return UNITS[unit].dimension not in ("time", "counts") and text.lower() not in (
-        "rev",
-        "turn",
-        "turns",
-    )
+    is_word = text.lower() in ("rev", "turn", "turns")
+    return not is_word and UNITS[unit].dimension not in ("time", "counts")
 
 
 def _written(text: str) -> str | None:

@@ -7,12 +7,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import in_words
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.quantities.consistency import (
-    MOST,
-    SPAN,
-    integral_agreement,
-    whole_rows,
-)
+from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
 from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 

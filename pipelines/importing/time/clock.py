@@ -41,19 +41,18 @@ class Run:
         return len(self.rows)
 
 
-def usual_units(step: float) -> list[str]:
-    """Return the units, of s, ms, us and ns, in which a step gives a usual rate of machines.
+def usual_units(step: float, units: Sequence[str] = ("s", "ms", "us", "ns")) -> list[str]:
+    """Return the units in which a step gives a usual rate of machines.
 
     Parameters
     ----------
     step : float
         From one stamp to the next, in the unknown unit.
+    units : sequence of str
+        Units that are tried.
     """
-    return [
-        unit
-        for unit in ("s", "ms", "us", "ns")
-        if SLOWEST_HZ <= 1.0 / (step * UNITS[unit].factor) <= FASTEST_HZ
-    ]
+    rates_hz = {unit: 1.0 / (step * UNITS[unit].factor) for unit in units}
+    return [unit for unit, rate_hz in rates_hz.items() if SLOWEST_HZ <= rate_hz <= FASTEST_HZ]
 
 
 def _check_unit(raw: NDArray, column: str, unit: str) -> None:
@@ -71,18 +70,11 @@ def _check_unit(raw: NDArray, column: str, unit: str) -> None:
     known = raw[~pd.isna(raw)]
     right = {"dates": ["iso8601"], "durations": ["ns"]}.get(content)
     if right is None:
-        right = _likely_units(numbers(known))
+        right = usual_units(period(numbers(known))) or ["s", "ms", "us", "ns"]
     raise SettingsError(
         f"{column!r} holds {content}, the first {str(known[0])[:LONGEST]!r}, but the map has"
         f" time.unit = {unit!r}; set it to {' or '.join(right)}"
     )
-
-
-def _likely_units(known: NDArray) -> list[str]:
-    """Return the units in which numeric stamps (n,) give a usual rate; else all units."""
-    steps = np.diff(known)
-    steps = steps[steps > 0.0]
-    return (usual_units(float(np.median(steps))) if len(steps) else []) or ["s", "ms", "us", "ns"]
 
 
 def _content(raw: NDArray) -> str:
@@ -265,15 +257,16 @@ def runs_backwards(time: NDArray) -> bool:
     return bool(len(steps)) and bool(np.mean(steps < 0.0) > backwards)
 
 
-def _period(time_s: NDArray) -> float:
-    steps = np.diff(time_s)
+def period(time: NDArray) -> float:
+    """Return the median step forward of times (n,), in their unit; infinite without one."""
+    steps = np.diff(time)
     steps = steps[steps > 0.0]
     return float(np.median(steps)) if len(steps) else np.inf
 
 
 def _far(time: NDArray) -> float:
     """Return the step, s, back by more than which a clock starts over: 1 s, or 20 periods."""
-    return max(1.0, 20 * _period(time))
+    return max(1.0, 20 * period(time))
 
 
 def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
@@ -376,7 +369,7 @@ def _lead(time: NDArray) -> int:
     """Return the number of rows at the beginning that are long before the rest."""
     # At most 5 rows: more of them are a run of their own. Long before is 0.2 s and 20 periods.
     steps = np.diff(time[:6])
-    far = np.flatnonzero(steps > max(0.2, 20 * _period(time)))
+    far = np.flatnonzero(steps > max(0.2, 20 * period(time)))
     return int(far[-1]) + 1 if len(far) else 0
 
 
