@@ -43,13 +43,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         if time is None:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
-        with about(path):
-            missing = set(source.names) - set(open_source(path, SourceSettings()).names)
-            if missing:
-                raise InputError(
-                    f"has no column {', '.join(sorted(missing))}, which {source} has;"
-                    " guess its own map"
-                )
+        _check_columns(path, source)
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.unit), key=len)
@@ -106,6 +100,15 @@ def _no_clock(names: Sequence[Meaning], columns: Mapping[str, NDArray]) -> str:
         f" for ten rows at {clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz. Write the map by hand,"
         " with time.rate_hz where rows are uniform (docs/import.md)"
     )
+
+
+def _check_columns(path: Path, first: Source) -> None:
+    with about(path):
+        missing = set(first.names) - set(open_source(path, SourceSettings()).names)
+        if missing:
+            raise InputError(
+                f"has no column {', '.join(sorted(missing))}, which {first} has; guess its own map"
+            )
 
 
 def _in_short(names: Sequence[str]) -> str:

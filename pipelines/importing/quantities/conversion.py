@@ -47,11 +47,7 @@ def quantity(
     (n,) array
         The quantity in SI, NaN where the log has none.
     """
-    if reading.column is not None:
-        raw = numbers(columns[reading.column], note)
-    else:
-        expression = Expression(str(reading.expression), f"{where}.expression")
-        raw = expression({name: numbers(columns[name], note) for name in expression.names})
+    raw = _raw(reading, columns, where, note)
     if reading.signed_bits is not None:
         raw = signed(raw, reading.signed_bits, note)
     # After the sign, as limits are of signed readings. Before unwrapping, because an impossible
@@ -79,6 +75,15 @@ def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
     counts = getattr(reading, "counts_per_turn", None) if unit.dimension == "counts" else None
     turn = 2.0 * np.pi / unit.factor if unit.dimension == "angle" else counts
     return () if turn is None else (abs(turn / reading.scale),)
+
+
+def _raw(
+    reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, note: Note
+) -> NDArray:
+    if reading.column is not None:
+        return numbers(columns[reading.column], note)
+    expression = Expression(str(reading.expression), f"{where}.expression")
+    return expression({name: numbers(columns[name], note) for name in expression.names})
 
 
 def _within(raw: NDArray, limits: tuple[float, float], note: Note) -> NDArray:

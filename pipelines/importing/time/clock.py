@@ -207,7 +207,7 @@ def _unwrapped(since: NDArray, modulus: float, note: Note) -> NDArray:
 
 
 def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
-    """Divide a log into runs whose times strictly increase.
+    """Divide a log into runs whose times strictly increase; refuse a clock that runs backwards.
 
     Parameters
     ----------
