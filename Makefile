@@ -101,11 +101,9 @@ sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion ma
 	$(BIN)/python -m tests.campaigns.learn sensitivity
 
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
-	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
-	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
-	$(BIN)/python -m pipelines.settings.rig_reference > docs/rig-keys.md
+	$(BIN)/python docs/site/setting_pages.py
 	$(BIN)/python -m pipelines.effects.reference docs/effects
-	$(BIN)/python -m pipelines.export.reference docs/export.md
+	$(BIN)/python docs/site/export_table.py
 	$(BIN)/python -m pipelines.diagnosis.reference docs/criteria.md
 	$(BIN)/python docs/site/example_verdict.py
 	$(BIN)/sphinx-build --quiet --write-all --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site

@@ -9,7 +9,7 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.experiment_folder import NAME
-from pipelines.errors import InputError
+from pipelines.errors import ContractError, InputError
 
 if TYPE_CHECKING:
     from pipelines.importing.finding import Finding
@@ -111,25 +111,27 @@ def _recordings(
     files: list[Path], settings: "ImportMap", map_: Path, output: Path
 ) -> list[dict[str, Any]]:
     """Write the recordings of all files, or none of them; describe each file."""
+    from pipelines.contracts import RECORDING
     from pipelines.contracts.atomic import all_or_none
-    from pipelines.importing.quantities.turn_offset import Beginnings
-    from pipelines.importing.recordings import recordings, refuse_to_overwrite
+    from pipelines.importing.recordings import Begins, recordings
 
     sources: dict[Path, Path] = {}
     # One for all files, because counters are compared across logs.
-    before = Beginnings()
+    begins: Begins = {}
     logs: list[dict[str, Any]] = []
     with all_or_none(output) as folder:
         for file in files:
             written: list[dict[str, Any]] = []
             with console.working(f"reading {file.name}"):
-                for recording in recordings(file, settings, map_, before):
+                for recording in recordings(file, settings, map_, begins):
                     path = output / recording.file
                     # Asked before it is written, as the second recording would replace the first.
                     if path in sources:
                         raise InputError(_same_name(path, sources[path], file))
-                    refuse_to_overwrite(path)
-                    recording.write(folder)
+                    _refuse_to_overwrite(path)
+                    RECORDING.write_pieces(
+                        folder / recording.file, recording.pieces(), recording.metadata
+                    )
                     sources[path] = file
                     written.append(_as_json(path, recording))
             logs.append({"file": file, "recordings": written})
@@ -149,6 +151,17 @@ def _same_name(path: Path, first: Path, second: Path) -> str:
     else:
         remedy = "give [[recording]] in the map names that differ, with {file} in them"
     return f"{second}: its recording {path} would replace that of {first}; {remedy}"
+
+
+def _refuse_to_overwrite(path: Path) -> None:
+    """Refuse to overwrite another file, or a recording that was not imported."""
+    from pipelines.contracts import RECORDING
+    from pipelines.contracts.provenance import metadata_of
+
+    RECORDING.refuse_place(path)
+    metadata = metadata_of(path)
+    if metadata.get("contract") == RECORDING.label and "imported" not in metadata:
+        raise ContractError(f"{path}: holds a recording that was not imported, not overwritten")
 
 
 def _say_next_step(output: Path, names: list[str], map_: Path) -> None:
@@ -221,7 +234,7 @@ def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:
     return {
         "path": path,
         "samples": len(recording),
-        "sample_rate_hz": recording.sampling.rate_hz,
+        "sample_rate_hz": recording.metadata["sample_rate_hz"],
         "purpose": recording.metadata["purpose"],
         "span_s": [float(time[0]), float(time[-1])],
         "gaps": recording.metadata["gaps"],

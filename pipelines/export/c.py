@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
-from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
+from pipelines.export.equations import GROUPS, Equation, equations, holding
 from pipelines.export.exported import Exported
 from pipelines.export.format import Format
 from pipelines.export.language import Language, function_name, indented, one_line
@@ -162,9 +162,10 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return header and source; their functions start with the file's name."""
     model, name = equations(exported), function_name(stem, ".c")
     joints = len(model.joints)
+    order = [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
     of_memory = ", ".join(dict.fromkeys(model.memory_of))
     places = {
-        "comment": _comment([*exported.heading(C), "", *_order_of(model)]),
+        "comment": _comment([*exported.heading(C), "", *order]),
         "name": name,
         "NAME": name.upper(),
         "GUARD": f"{name.upper()}_H",
@@ -175,7 +176,8 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
             [f"memory of {of_memory}" if of_memory else "no effect has memory; pass any number"]
         ),
         "constants": "\n".join(
-            _constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in model.used
+            f"static const double {c.name} = {c.value!r}; {_comment([f'{c.unit}, {c.meaning}'])}"
+            for c in model.used
         ),
         "sensor_shift": _array(model.sensor_shift),
         "link_shift": _array(model.link_shift),
@@ -186,19 +188,10 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
 
 
-def _order_of(model: Equations) -> list[str]:
-    """Return the index, name and kind of each joint."""
-    return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints)]
-
-
 def _comment(lines: Iterable[str]) -> str:
     """Return a comment that no text in it can end."""
     safe = [one_line(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "/* " + "\n".join(safe).replace("\n", "\n * ").replace(" \n", "\n") + " */"
-
-
-def _constant(name: str, value: float, meaning: str) -> str:
-    return f"static const double {name} = {value!r}; {_comment([meaning])}"
 
 
 def _array(values: Iterable[float]) -> str:

@@ -5,13 +5,11 @@ and inertial, on drives. The torque of the links is the ``load`` of the drives.
 """
 
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from itertools import chain
 from typing import Any
 
-import numpy as np
-
 from pipelines.contracts import Joint
-from pipelines.effects import Effect, Parameter, Side
+from pipelines.effects import Side
 from pipelines.effects.kernel import Instant
 from pipelines.export.exported import Exported, column_of, shift_of
 from pipelines.export.format import Degree, Holding, exact, left_out
@@ -72,7 +70,7 @@ class Equations:
     """The equations of a whole model."""
 
     joints: tuple[Joint, ...]
-    constants: tuple[Constant, ...]
+    constants: list[Constant]
     sensor_shift: tuple[float, ...]
     """Encoders' angles less the motors', rad."""
     link_shift: tuple[float, ...]
@@ -137,38 +135,33 @@ def equations(exported: Exported) -> Equations:
         Constants in SI units; shifts of J angles, rad.
     """
     terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
-    named = [(term, parameter) for term in terms for parameter in term.effect.fitted]
+    named = ((term.effect, parameter) for term in terms for parameter in term.effect.fitted)
+    full = (filter(None, (effect.joint, effect.name, p.name)) for effect, p in named)
     # Two effects can have parameters of one name at a joint; the file's own names are taken, too.
-    names = unique((_constant_name(term.effect, parameter) for term, parameter in named), RESERVED)
-    constants = [
-        Constant(name, float(value), parameter.unit, f"{term.effect.label}: {parameter.meaning}")
-        for name, (term, parameter), value in zip(
-            names, named, np.concatenate([term.values for term in terms]), strict=True
-        )
-    ]
+    names = iter(unique((identifier("_".join(parts)) for parts in full), RESERVED))
     length, gravity = exported.geometry.array().tolist()
-    fixed = (
-        Constant(GEOMETRY[0], length, "m", "first to second joint axis"),
-        Constant(GEOMETRY[1], gravity, "m/s²", "acceleration of gravity"),
-    )
     # An encoder's error is in the angles of motor and link alike, a tilt only in the link's.
     sensor = exported.shift(Side.SENSOR)
     model = Equations(
         exported.joints,
-        (*fixed, *constants),
+        [
+            Constant(GEOMETRY[0], length, "m", "first to second joint axis"),
+            Constant(GEOMETRY[1], gravity, "m/s²", "acceleration of gravity"),
+        ],
         sensor_shift=tuple(sensor.tolist()),
         link_shift=tuple((exported.shift() - sensor).tolist()),
     )
-    remaining = iter(constants)
     for term in terms:
-        values = [constant(c.name, c.value) for c in islice(remaining, len(term.effect.fitted))]
+        label = term.effect.label
+        own = [
+            Constant(next(names), float(value), p.unit, f"{label}: {p.meaning}")
+            for p, value in zip(term.effect.fitted, term.values, strict=True)
+        ]
+        model.constants.extend(own)
+        values = [constant(c.name, c.value) for c in own]
         _add_equations(model, term, values, model.memories)
-        model.memory_of.extend([term.effect.label] * term.effect.states)
+        model.memory_of.extend([label] * term.effect.states)
     return model
-
-
-def _constant_name(effect: Effect, parameter: Parameter) -> str:
-    return identifier("_".join(filter(None, (effect.joint, effect.name, parameter.name))))
 
 
 def _add_equations(model: Equations, term: Term, values: list[Formula], first: int) -> None:

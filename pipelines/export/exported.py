@@ -187,15 +187,12 @@ def exported(
         # Effects of the wearer act only in runs with one.
         kind = "with_human" if run == HUMAN else run
         acting = Model(tuple(present)).for_run(kind)
+        # Rigid, as each format lists springs at a joint or leaves them out. Cuffs stay, because the
+        # limb behind them has its own body.
+        rigid = [term for term in acting if term.effect.spring is None or term.effect.at_cuff]
         # Refuses models that no real machine has.
-        make_plant(_rigid(acting), geometry, machine.joints, kind)
+        make_plant(Model(tuple(rigid)), geometry, machine.joints, kind)
     return Exported(acting, tuple(absent), run, geometry, machine, table)
-
-
-def _rigid(model: Model) -> Model:
-    """Return the model with rigid joints, whose springs each format lists or leaves out."""
-    # Cuffs stay, because the limb behind them has its own body.
-    return Model(tuple(term for term in model if term.effect.spring is None or term.effect.at_cuff))
 
 
 def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:

@@ -8,7 +8,6 @@ equations as every stage, without a second copy of them.
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from types import FunctionType, SimpleNamespace
@@ -17,13 +16,13 @@ from typing import Any
 from pipelines.errors import ExoidError
 
 OF_MATH = ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2")
-OTHERS: dict[str, Callable[..., Any]] = {
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in OF_MATH},
     "abs": abs,
     "max": max,
     "min": min,
     "sign": lambda x: (x > 0) - (x < 0),
 }
-FUNCTIONS = {name: getattr(math, name) for name in OF_MATH} | OTHERS
 """Functions that an equation may call, and that every format can write."""
 
 
@@ -186,15 +185,6 @@ _CHOICES: ContextVar[Mapping[str, bool]] = ContextVar("choices")
 """Values of the conditions on the current path, by condition."""
 
 
-@contextmanager
-def _choosing(choices: Mapping[str, bool]) -> Iterator[None]:
-    token = _CHOICES.set(choices)
-    try:
-        yield
-    finally:
-        _CHOICES.reset(token)
-
-
 def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
     """Return the outcome of a compiled kernel as formulae.
 
@@ -230,8 +220,8 @@ def outcome_of(kernel, arguments: Callable[[], tuple[tuple, list]]) -> Any:
             raise NotWritable(f"it has more than {most_branches} paths")
         inputs, out = arguments()
         try:
-            with _choosing(choices):
-                function(*inputs)
+            _CHOICES.set(choices)
+            function(*inputs)
         except _Fork as fork:
             yes, no = (walk(choices | {fork.key: choice}) for choice in (True, False))
             return Branch(fork.condition, yes, no)

@@ -8,24 +8,6 @@ from pipelines.export.format import Holding, approximate, exact, left_out
 from pipelines.model import Term
 
 
-def sound_friction(term: Term) -> tuple[float, float]:
-    """Return Coulomb and viscous friction, at least 0: simulators refuse negative values.
-
-    Parameters
-    ----------
-    term : Term
-        Friction with two values.
-
-    Returns
-    -------
-    tuple of float
-        N·m and N·m·s/rad.
-    """
-    # `held_friction` states the loss, so nothing is dropped in silence.
-    coulomb, viscous = (max(float(value), 0.0) for value in term.values)
-    return coulomb, viscous
-
-
 def held_friction(term: Term, whole: Holding) -> Holding:
     """Return ``whole`` if no coefficient is negative, else a holding that names the others."""
     negative = [
@@ -58,11 +40,6 @@ def holding_from(
         How the format holds an encoder's shift.
     format_name : str
         For the reason of a term that is left out.
-
-    Returns
-    -------
-    callable
-        A term's holding.
     """
 
     def holding(term: Term) -> Holding:

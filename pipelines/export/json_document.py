@@ -10,7 +10,7 @@ from pipelines.contracts import Joint
 from pipelines.contracts.provenance import describe
 from pipelines.effects.reference import facts
 from pipelines.export.exported import Exported
-from pipelines.export.format import Format, Holding, exact
+from pipelines.export.format import Format, exact
 from pipelines.model import Term
 
 CONVENTIONS = {
@@ -30,17 +30,11 @@ CONVENTIONS = {
 }
 
 
-def holding(term: Term) -> Holding:
-    """Return how JSON holds a term."""
-    return exact("parameters, with intervals and covariance")
-
-
 def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the document's text."""
-    contract = "model/1"
     table, mechanism = exported.table, exported.machine.mechanism
     document = {
-        "contract": contract,
+        "contract": "model/1",
         "name": stem,
         "provenance": describe([table.path] if table.path else []),
         "run": exported.run,
@@ -49,17 +43,16 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
         "joints": [_joint(joint) for joint in exported.joints],
         "geometry": exported.machine.metadata(exported.geometry),
         "conventions": CONVENTIONS,
-        "parameters": [_plain(row) for row in table.frame.to_dict("records")],
+        # JSON has no NaN.
+        "parameters": [
+            {str(key): None if pd.isna(value) else value for key, value in row.items()}
+            for row in table.frame.to_dict("records")
+        ],
         "covariance": table.metadata.get("covariance"),
         "effects": [_effect(term) for term in exported.terms],
         "not_in_this_run": [_effect(term) | {"why": why.how} for term, why in exported.absent],
     }
     return {".json": json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False) + "\n"}
-
-
-def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
-    # JSON has no NaN.
-    return {str(key): None if pd.isna(value) else value for key, value in row.items()}
 
 
 def _joint(joint: Joint) -> dict[str, str]:
@@ -89,4 +82,10 @@ def _effect(term: Term) -> dict[str, Any]:
     }
 
 
-JSON = Format("json", "JSON document", ".json", holding, _write)
+JSON = Format(
+    "json",
+    "JSON document",
+    ".json",
+    lambda term: exact("parameters, with intervals and covariance"),
+    _write,
+)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipelines.errors import InputError
-from pipelines.export.formula import Branch, Condition, Formula
+from pipelines.export.formula import Branch, Formula
 
 SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
 """Precedence, lowest first."""
-
 BINARY = {"+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT}
 
 
@@ -74,9 +73,14 @@ class Language:
         to : str
             Name of the array.
         """
-        return self._statements(
-            outcome, lambda i, value: self._addition(self.element(to, i), value)
-        )
+
+        def addition(i: int, value: Any) -> list[str]:
+            if not isinstance(value, Formula) and value == 0:
+                return []
+            target = self.element(to, i)
+            return [f"{target} = {target} + {self.text(value)};"]
+
+        return self._statements(outcome, addition)
 
     def assigned(self, outcome: list | Branch, to: str, first: int = 0) -> list[str]:
         """Return the statements that assign a kernel's outcome to an array.
@@ -90,9 +94,13 @@ class Language:
         first : int, optional
             Index of its first element.
         """
-        return self._statements(
-            outcome, lambda i, value: self._assignment(self.element(to, first + i), value)
-        )
+
+        def assignment(i: int, value: Any) -> list[str]:
+            target, text = self.element(to, first + i), self.text(value)
+            # A sensor leaves most torques unchanged.
+            return [] if text == target else [f"{target} = {text};"]
+
+        return self._statements(outcome, assignment)
 
     def _statements(
         self, outcome: list | Branch, statement: Callable[[int, Any], list[str]]
@@ -100,21 +108,11 @@ class Language:
         if isinstance(outcome, Branch):
             yes = self._statements(outcome.yes, statement)
             no = self._statements(outcome.no, statement)
-            return self.branch(self._condition(outcome.condition), yes, no) if yes or no else []
+            condition = outcome.condition
+            sign = self.unequal if condition.operator == "!=" else condition.operator
+            compared = f"{self.text(condition.left)} {sign} {self.text(condition.right)}"
+            return self.branch(compared, yes, no) if yes or no else []
         return [line for i, value in enumerate(outcome) for line in statement(i, value)]
-
-    def _addition(self, target: str, value: Any) -> list[str]:
-        if not isinstance(value, Formula) and value == 0:
-            return []
-        return [f"{target} = {target} + {self.text(value)};"]
-
-    def _assignment(self, target: str, value: Any) -> list[str]:
-        # A sensor leaves most torques unchanged.
-        return [] if self.text(value) == target else [f"{target} = {self.text(value)};"]
-
-    def _condition(self, condition: Condition) -> str:
-        operator = self.unequal if condition.operator == "!=" else condition.operator
-        return f"{self.text(condition.left)} {operator} {self.text(condition.right)}"
 
 
 def indented(lines: Iterable[str]) -> list[str]:

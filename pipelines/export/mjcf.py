@@ -16,7 +16,7 @@ from pipelines.effects import Element
 from pipelines.export.bodies import NOMINAL, Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, approximate
-from pipelines.export.holding import held_friction, holding_from, sound_friction
+from pipelines.export.holding import held_friction, holding_from
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -70,8 +70,6 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 
 def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
-    # Shift of the centre of mass of a body on two slides.
-    off_centre_m = 0.01
     element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
     kind = "hinge" if body.joint.kind == "revolute" else "slide"
     hinge = {"type": kind, "axis": numbers(*body.axis)}
@@ -81,13 +79,14 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     if soft:
         ET.SubElement(element, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
-    # MuJoCo treats two slides of a body centred at their frame as independent. The shift has no
-    # effect on the motion of a slide.
-    offset = (
-        off_centre_m * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
+    centre = body.centre
+    if soft and kind == "slide":
+        # MuJoCo treats two slides of a body centred at their frame as independent. A shift by 1 cm
+        # has no effect on the motion of a slide.
+        centre = centre + np.array([0.01, 0.0, 0.0])
+    ET.SubElement(
+        element, "inertial", pos=numbers(*centre), mass=number(body.mass), diaginertia=inertia
     )
-    centre = numbers(*(body.centre + offset))
-    ET.SubElement(element, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
     # No contacts: the shapes are nominal, and links that touch would add forces.
     ET.SubElement(
@@ -114,7 +113,8 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     friction = exported.of(Element.FRICTION, name)
     drag = exported.of(Element.QUADRATIC_DAMPING, name)
     if friction and _friction(friction).degree is not Degree.NOT:
-        coulomb, damping[0] = sound_friction(friction)
+        # MuJoCo refuses negative values; `held_friction` states the loss.
+        coulomb, damping[0] = np.maximum(friction.values, 0.0)
         attributes["frictionloss"] = number(coulomb)
         # Two steps are the shortest time constant that MuJoCo allows.
         attributes["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)
@@ -175,15 +175,12 @@ def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported
     per_unit = 1.0 / (gain.values[0] if gain else 1.0)
     # Solved for T: the order of gain and offset decides whether the offset is scaled, too.
     at_zero = -(offset.values[0] if offset else 0.0)
-    if gain and offset and _comes_before(exported, gain, offset):
+    first = next(term for term in exported.terms if term is gain or term is offset)
+    if offset and first is gain:
         at_zero *= per_unit
     bias = numbers(at_zero, 0.0, 0.0)
     general = {"gainprm": number(per_unit), "biastype": "affine", "biasprm": bias}
     ET.SubElement(actuators, "general", {"name": name, "joint": name} | general)
-
-
-def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
-    return next(term for term in exported.terms if term is first or term is second) is first
 
 
 MJCF = Format(

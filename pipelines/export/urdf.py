@@ -14,7 +14,7 @@ from pipelines.effects import Element
 from pipelines.export.bodies import NOMINAL, Body, bodies
 from pipelines.export.exported import Exported
 from pipelines.export.format import Degree, Format, Holding, exact
-from pipelines.export.holding import held_friction, holding_from, sound_friction
+from pipelines.export.holding import held_friction, holding_from
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -77,7 +77,8 @@ def _joint(
     ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
     friction = exported.of(Element.FRICTION, body.joint.name)
     if friction and _friction(friction).degree is not Degree.NOT:
-        coulomb, viscous = sound_friction(friction)
+        # Negative values are refused by readers; `held_friction` states the loss.
+        coulomb, viscous = np.maximum(friction.values, 0.0)
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting
-from pipelines.importing.quantities.conversion import columns_of, counter_turn, quantity
+from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
@@ -55,8 +55,12 @@ class Log:
     @property
     def turns(self) -> dict[str, float]:
         """A turn of the counter in SI, for each of the recording's columns that has a counter."""
-        turns = {one.target: counter_turn(one.reading, one.gain) for one in self.channels}
-        return {target: turn for target, turn in turns.items() if turn is not None}
+        turns = {}
+        for one in self.channels:
+            if one.reading.wraps_at is not None:
+                gain = one.gain * one.reading.known_unit.factor * one.reading.scale
+                turns[one.target] = abs(gain * one.reading.wraps_at)
+        return turns
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
         """Return every channel at the instants of a run.
@@ -131,7 +135,8 @@ class Log:
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
         reading, of_time = channel.reading, noting("time", findings)
-        stamps = clock.stamps(self.columns[str(reading.time)], self.settings, of_time)
+        column = str(reading.time)
+        stamps = clock.stamps(self.columns[column], column, self.settings, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {reading.time!r} differ in length")
@@ -188,15 +193,15 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
-        rows = max(map(len, columns.values()))
-        run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), note)
+        rows, rate_hz = max(map(len, columns.values())), float(settings.time.rate_hz or 0.0)
+        note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
+        run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}
-    for stamped in clocks - {None}:
-        clock.check_unit(columns[str(stamped)], str(stamped), settings.time.unit)
     columns = _as_numbers(columns, clocks, findings)
-    stamps = clock.stamps(columns[settings.time.column], settings.time, note)
+    column = settings.time.column
+    stamps = clock.stamps(columns[column], column, settings.time, note)
     origin = clock.first_stamp(stamps)
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, note))

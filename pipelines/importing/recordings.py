@@ -10,14 +10,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipelines.contracts import RECORDING, describe, parquet
+from pipelines.contracts import describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.provenance import metadata_of, sha256
-from pipelines.errors import ContractError, InputError, SettingsError, about
+from pipelines.contracts.provenance import sha256
+from pipelines.errors import InputError, SettingsError, about
 from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
-from pipelines.importing.quantities.turn_offset import Beginnings
 from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
@@ -27,6 +26,9 @@ from pipelines.settings.import_map import ImportMap, RecordingSettings
 FEWEST = 10
 """Least number of rows of a recording."""
 
+Begins = dict[str, tuple[float, str]]
+"""The first reading of each counter, SI, and the log that had it."""
+
 
 @dataclass(frozen=True)
 class Imported:
@@ -35,8 +37,6 @@ class Imported:
     name: str
     columns: dict[str, NDArray]
     metadata: dict[str, Any]
-    sampling: Sampling
-    findings: tuple[Finding, ...]
 
     def __len__(self) -> int:
         return len(self.columns["time_s"])
@@ -47,21 +47,6 @@ class Imported:
         for first in range(0, len(self), parquet.ROWS):
             yield table.slice(first, parquet.ROWS)
 
-    def write(self, folder: Path) -> None:
-        """Write the recording into a folder.
-
-        Parameters
-        ----------
-        folder : Path
-            It is created if need be.
-
-        Raises
-        ------
-        ContractError
-            The recording breaks its contract.
-        """
-        RECORDING.write_pieces(folder / self.file, self.pieces(), self.metadata)
-
     @property
     def file(self) -> str:
         """Name of its file."""
@@ -69,20 +54,9 @@ class Imported:
 
 
 def recordings(
-    path: Path, settings: ImportMap, map_path: Path, before: Beginnings
+    path: Path, settings: ImportMap, map_path: Path, begins: Begins
 ) -> Iterator[Imported]:
-    """Yield the recordings that a map makes of a log.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-    settings : ImportMap
-        The map.
-    map_path : Path
-        File of the map.
-    before : Beginnings
-        First readings of the counters in logs before this one.
+    """Yield the recordings that a map makes of a log, and add its counters to ``begins``.
 
     Raises
     ------
@@ -99,24 +73,31 @@ def recordings(
         )
     with about(path):
         log = read_log(open_source(path, settings.source), settings, map_path)
+        # A bag is a folder; the order makes its list of hashes the same on every system.
+        of_bag = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else []
+        files = of_bag or [path]
         provenance = describe(
-            inputs=[*_files(path), map_path],
+            inputs=[*files, map_path],
             config=settings.model_dump(mode="json", exclude_none=True),
         )
-        # The paths as they were given, from which a report writes the command that repeats this.
-        given = {"source": path.as_posix(), "map": map_path.as_posix()}
+        of_log = {
+            "source": path.name,
+            "sha256": [sha256(file) for file in files],
+            "format": log.source.format,
+            "notes": list(log.source.notes),
+            "rows_in_source": log.rows,
+            # The paths as they were given, from which a report writes the command that repeats
+            # this.
+            "given": {"source": path.as_posix(), "map": map_path.as_posix()},
+        }
         _check_length(log)
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
-            yield from _recordings_of(
-                run, log, settings, wanted, before, (path, suffix, provenance, given)
-            )
-
-
-def _files(path: Path) -> list[Path]:
-    # A bag is a folder; the order makes its list of hashes the same on every system.
-    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+            for recording in _recordings_of(run, suffix, log, settings, wanted, begins):
+                recording.metadata["imported"] |= of_log
+                recording.metadata.update(provenance)
+                yield recording
 
 
 def _check_length(log: Log) -> None:
@@ -148,14 +129,13 @@ def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list
 
 def _recordings_of(
     run: Run,
+    suffix: str,
     log: Log,
     settings: ImportMap,
     wanted: Sequence[RecordingSettings],
-    before: Beginnings,
-    origin: tuple[Path, str, dict, dict],
+    begins: Begins,
 ) -> Iterator[Imported]:
-    path, suffix, provenance, given = origin
-    findings = [*log.findings, *run.findings]
+    path, findings = log.source.path, [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
     whole = _whole_rows(columns, log.required, findings)
     time = run.time_s[whole]
@@ -168,7 +148,7 @@ def _recordings_of(
     _note_period(columns, settings, wanted, note)
     # On the whole run: short spans show less, and each would repeat the remarks.
     findings += plausibility.check(columns, settings)
-    findings += before.check(f"{path.name}{suffix}", columns, log.turns)
+    findings += _turns_apart(f"{path.name}{suffix}", columns, log.turns, begins)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
     _check_overlap(time, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):
@@ -176,30 +156,16 @@ def _recordings_of(
         begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
         # Rate and gaps of the span itself, as a logger's rate may change during a run.
         cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
-        metadata = _metadata(settings, recording, cut) | provenance
         in_source = run.rows[whole][rows]
-        metadata["imported"] = _import_metadata(path, log, run, sampling, findings) | {
-            "given": given,
+        imported = {
+            "began_s": run.began_s,
+            "steps_s": dict(zip(("shortest", "median", "longest"), sampling.steps_s, strict=True)),
+            "irregular_share": sampling.irregular,
+            "findings": [finding.as_json() for finding in findings],
             "rows": [int(in_source[0]), int(in_source[-1])],
         }
-        yield Imported(recording.name_of(path) + suffix, own, metadata, cut, tuple(findings))
-
-
-def _import_metadata(
-    path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]
-) -> dict[str, Any]:
-    """Return the metadata of the import: source, rows, sampling and findings."""
-    return {
-        "source": path.name,
-        "sha256": [sha256(file) for file in _files(path)],
-        "format": log.source.format,
-        "notes": list(log.source.notes),
-        "rows_in_source": log.rows,
-        "began_s": run.began_s,
-        "steps_s": dict(zip(("shortest", "median", "longest"), sampling.steps_s, strict=True)),
-        "irregular_share": sampling.irregular,
-        "findings": [finding.as_json() for finding in findings],
-    }
+        metadata = _metadata(settings, recording, cut) | {"imported": imported}
+        yield Imported(recording.name_of(path) + suffix, own, metadata)
 
 
 def _whole_rows(
@@ -272,38 +238,20 @@ def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     # N·m or N; far more than any drive delivers at a joint.
     largest_torque = 1e6
     for i, joint in enumerate(settings.joint):
-        if joint.kind == "revolute":
-            _check_most(
-                columns,
-                f"joint[{i}].angle",
-                joint.joint.column("angle"),
-                LARGEST_ANGLE_RAD,
-                "rad",
-                "zero, counts_per_turn or wraps_at",
-            )
-        unit = "N·m" if joint.kind == "revolute" else "N"
-        _check_most(
-            columns,
-            f"joint[{i}].torque",
-            joint.joint.column("torque"),
-            largest_torque,
-            unit,
-            "scale or gains",
-        )
-
-
-def _check_most(
-    columns: Mapping[str, NDArray], key: str, name: str, most: float, unit: str, also: str
-) -> None:
-    values = columns[name]
-    beyond = np.flatnonzero(np.abs(values) > most)
-    if len(beyond):
-        raise SettingsError(
-            f"{key}: reaches {np.min(values):.4g} to {np.max(values):.4g} {unit}, expected at most"
-            f" {most:.3g} {unit} either way ({counted(len(beyond), 'row')} of {len(values)} beyond,"
-            f" the first {values[beyond[0]]:.4g} at {columns['time_s'][beyond[0]]:.6g} s). Exclude"
-            f" outliers with range, or correct unit, {also}"
-        )
+        turns = joint.kind == "revolute"
+        angle = ("angle", LARGEST_ANGLE_RAD, "rad", "zero, counts_per_turn or wraps_at")
+        torque = ("torque", largest_torque, "N·m" if turns else "N", "scale or gains")
+        for quantity, most, unit, also in (angle, torque) if turns else (torque,):
+            values = columns[joint.joint.column(quantity)]
+            beyond = np.flatnonzero(np.abs(values) > most)
+            if len(beyond):
+                raise SettingsError(
+                    f"joint[{i}].{quantity}: reaches {np.min(values):.4g} to {np.max(values):.4g}"
+                    f" {unit}, expected at most {most:.3g} {unit} either way"
+                    f" ({counted(len(beyond), 'row')} of {len(values)} beyond, the first"
+                    f" {values[beyond[0]]:.4g} at {columns['time_s'][beyond[0]]:.6g} s). Exclude"
+                    f" outliers with range, or correct unit, {also}"
+                )
 
 
 def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:
@@ -314,6 +262,29 @@ def _check_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> No
             raise SettingsError(
                 f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected"
                 f" at most the {duration_s:.6g} s of the run; correct it, or remove it"
+            )
+
+
+def _turns_apart(
+    log: str, columns: Mapping[str, NDArray], turns: Mapping[str, float], begins: Begins
+) -> Iterator[Finding]:
+    """Report counters that begin more than half a turn from where those of the first log did."""
+    for name, turn in turns.items():
+        known = columns[name][np.isfinite(columns[name])]
+        if not len(known):
+            continue
+        begin = float(known[0])
+        # No log shows its own turn, so the first one is the reference of all others.
+        first, first_log = begins.setdefault(name, (begin, log))
+        # Less than half a turn may be motion between two logs.
+        away = round((begin - first) / turn)
+        if away:
+            seen = (
+                f"begins at {begin:.4g}, in {first_log} at {first:.4g},"
+                f" {counted(abs(away), 'turn')} apart"
+            )
+            yield Finding(
+                name, seen, "kept; if all logs begin at the same reading, set begins_at to it"
             )
 
 
@@ -368,22 +339,3 @@ def _metadata(
         "sample_rate_hz": sampling.rate_hz,
         "gaps": [list(gap) for gap in sampling.gaps],
     } | {key: value for key, value in known.items() if value is not None}
-
-
-def refuse_to_overwrite(path: Path) -> None:
-    """Refuse to overwrite another file, or a recording that was not imported.
-
-    Parameters
-    ----------
-    path : Path
-        The file to write.
-
-    Raises
-    ------
-    ContractError
-        Names the path and its content.
-    """
-    RECORDING.refuse_place(path)
-    metadata = metadata_of(path)
-    if metadata.get("contract") == RECORDING.label and "imported" not in metadata:
-        raise ContractError(f"{path}: holds a recording that was not imported, not overwritten")

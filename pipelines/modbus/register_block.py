@@ -74,7 +74,7 @@ class Block:
             # not rounded.
             value = (values[name] - offset) / scale
             raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
-        # Registers without a name are written as 0; the block of a drive has none (`check_no_gap`).
+        # Registers without a name are written as 0; a drive's block has none (`DriveMap`).
         packed = bytearray(2 * self.count)
         for place, byte in zip(self._places, self._values_format.pack(*raw), strict=True):
             packed[place] = byte

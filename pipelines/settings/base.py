@@ -2,7 +2,8 @@
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Hashable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar, get_args
 
@@ -15,6 +16,11 @@ from pipelines.validation.toml import read_toml
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+
+Gravity = Annotated[float, Field(ge=0.0, le=30.0)]
+"""In m/s², up to more than on any planet; 9.81 m/s² in cm/s² is beyond it."""
+Length = Annotated[float, Field(gt=0.0, le=5.0)]
+"""In m, up to more than any limb or machine for one; 389.52 mm and 38.952 cm are beyond it."""
 
 
 class Settings(BaseModel):
@@ -89,6 +95,14 @@ def _keys_at(model: type[BaseModel], path: str) -> list[str]:
             return []
         model = inner
     return list(model.model_fields)
+
+
+Item = TypeVar("Item", bound=Hashable)
+
+
+def repeated(items: Iterable[Item]) -> list[Item]:
+    """Return the items that occur more than once."""
+    return [item for item, times in Counter(items).items() if times > 1]
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:

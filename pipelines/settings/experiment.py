@@ -7,7 +7,7 @@ from pydantic import Field, PrivateAttr, field_validator
 
 from pipelines.errors import SettingsError
 from pipelines.settings.acquire import AcquireSettings, RunSettings
-from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.base import Settings, load_toml, repeated
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.diagnose import DiagnoseSettings
 from pipelines.settings.filter import FilterSettings
@@ -17,25 +17,23 @@ from pipelines.settings.simulate import SimulateSettings
 from pipelines.validation.suggestion import similar_file, suggestion
 
 
-def _four_runs() -> tuple[RunSettings, ...]:
-    """Return both kinds of run, each once to train and once to validate."""
-    return (
-        # Seeds differ, or a virtual rig's validation runs would have the noise of the training
-        # runs.
-        RunSettings(name="exo_alone_train", run="exo_alone", purpose="train", seed=1),
-        RunSettings(name="exo_alone_validate", run="exo_alone", purpose="validate", seed=2),
-        RunSettings(name="with_human_train", run="with_human", purpose="train", seed=3),
-        RunSettings(name="with_human_validate", run="with_human", purpose="validate", seed=4),
-    )
-
-
 class Experiment(Settings):
     """All settings of one experiment; every key has a default."""
 
     mechanism: MechanismSettings = Field(MechanismSettings(), description="Joints and geometry.")
     design: DesignSettings = Field(DesignSettings(), description="The excitation.")
     acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
-    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="Runs, in order.")
+    run: tuple[RunSettings, ...] = Field(
+        # Both kinds of run, each once to train and once to validate. Seeds differ, or a virtual
+        # rig's validation runs would have the noise of the training runs.
+        (
+            RunSettings(name="exo_alone_train", run="exo_alone", purpose="train", seed=1),
+            RunSettings(name="exo_alone_validate", run="exo_alone", purpose="validate", seed=2),
+            RunSettings(name="with_human_train", run="with_human", purpose="train", seed=3),
+            RunSettings(name="with_human_validate", run="with_human", purpose="validate", seed=4),
+        ),
+        description="Runs, in order.",
+    )
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")
@@ -47,22 +45,15 @@ class Experiment(Settings):
     @field_validator("run")
     @classmethod
     def _names_differ(cls, runs: tuple[RunSettings, ...]) -> tuple[RunSettings, ...]:
-        names = [run.name for run in runs]
-        if not names:
+        if not runs:
             raise ValueError("found no run, expected at least one; add a [[run]]")
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"found the name {name} twice, expected each once; rename one run")
+        for name in repeated(run.name for run in runs):
+            raise ValueError(f"found the name {name} twice, expected each once; rename one run")
         return runs
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
         """Return the experiment in a file; names of files in it are relative to its folder.
-
-        Parameters
-        ----------
-        path : Path or str
-            exoid.toml.
 
         Raises
         ------

@@ -1,7 +1,6 @@
 """A map: the meaning of a log's columns, from which ``exoid import`` makes recordings."""
 
 import re
-from collections import Counter
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -13,9 +12,9 @@ from pipelines.contracts.joint_units import Kind
 from pipelines.contracts.joints import Joint
 from pipelines.errors import SettingsError
 from pipelines.settings import transmission
-from pipelines.settings.base import Positive, Settings, load_toml
+from pipelines.settings.base import Positive, Settings, load_toml, repeated
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.units import unit_named, units_of
+from pipelines.settings.units import ALIASES, UNITS, Unit, unit_named, units_of
 from pipelines.validation.suggestion import closest, similar_file
 
 LARGEST = 1e12
@@ -115,6 +114,11 @@ class ReadingSettings(Settings):
             raise ValueError("begins_at: needs wraps_at; set wraps_at, or remove it")
         return self
 
+    @property
+    def known_unit(self) -> Unit:
+        """Its unit, which the map has checked."""
+        return UNITS[ALIASES.get(self.unit, self.unit)]
+
 
 class ForceSettings(ReadingSettings):
     """One axis of a cuff force sensor."""
@@ -158,11 +162,9 @@ class JointReadingSettings(ReadingSettings):
         target : str
             Dimension of the quantity.
         """
-        unit = unit_named(self.unit)
-        assert unit is not None, "the joint checks its units"
         numbers = {key: getattr(self, key) for key in transmission.KEYS}
         given = {key: value for key, value in numbers.items() if value is not None}
-        return transmission.gain(unit.dimension, target, given, self.gear_ratio)
+        return transmission.gain(self.known_unit.dimension, target, given, self.gear_ratio)
 
 
 class JointSettings(Settings):
@@ -264,15 +266,6 @@ class RecordingSettings(Settings):
         return re.sub(r"\{(.*?)\}", lambda match: words[match[1]], self.name)
 
 
-def _two_parts() -> tuple[RecordingSettings, ...]:
-    return (
-        # Two stretches, not a random split: samples are correlated with their neighbours. A random
-        # split would validate on what was fitted.
-        RecordingSettings(purpose="train", span=(0.0, 0.7)),
-        RecordingSettings(purpose="validate", span=(0.7, 1.0)),
-    )
-
-
 class ImportMap(Settings):
     """The meaning of a log: clock, joints, forces, geometry and recordings."""
 
@@ -283,19 +276,24 @@ class ImportMap(Settings):
     force: tuple[ForceSettings, ...] = Field((), description="Cuff force sensors.")
     geometry: GeometrySettings = Field(GeometrySettings(), description="Lengths and gravity.")
     recording: tuple[RecordingSettings, ...] = Field(
-        default_factory=_two_parts, min_length=1, description="Recordings of each log."
+        # Two stretches, not a random split: samples are correlated with their neighbours. A random
+        # split would validate on what was fitted.
+        (
+            RecordingSettings(purpose="train", span=(0.0, 0.7)),
+            RecordingSettings(purpose="validate", span=(0.7, 1.0)),
+        ),
+        min_length=1,
+        description="Recordings of each log.",
     )
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for name, times in Counter(joint.name for joint in self.joint).items():
-            if times > 1:
-                raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
-        for target, times in Counter(force.target for force in self.force).items():
-            if times > 1:
-                raise ValueError(
-                    f"force: found {target} twice, expected each axis of a cuff once; remove one"
-                )
+        for name in repeated(joint.name for joint in self.joint):
+            raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
+        for target in repeated(force.target for force in self.force):
+            raise ValueError(
+                f"force: found {target} twice, expected each axis of a cuff once; remove one"
+            )
         owners: dict[str, str] = {}
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:

@@ -7,8 +7,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joint_units import Kind
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Settings
-from pipelines.settings.physical_bounds import Gravity, Length
+from pipelines.settings.base import Gravity, Length, Settings, repeated
 from pipelines.validation.suggestion import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
@@ -47,24 +46,17 @@ class MechanismSettings(Settings):
                 f" {' and '.join(USUAL_JOINTS)}; add [[mechanism.joints]], or correct the name:"
                 f" {suggestion(self.name, list(USUAL_JOINTS))}"
             )
-        names = [joint.name for joint in self.joints]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"joints: found {name} twice, expected each name once; rename one")
+        for name in repeated(joint.name for joint in self.joints):
+            raise ValueError(f"joints: found {name} twice, expected each name once; rename one")
         return self
 
     def refuse_all_but_the_leg(self, command: str) -> None:
         """Refuse other machines in a command for hip and knee alone.
 
-        Parameters
-        ----------
-        command : str
-            Name of the command, for the message.
-
         Raises
         ------
         SettingsError
-            Names the mechanism and its joints.
+            Names the mechanism, its joints and the command.
         """
         # Names count too: columns, limits and drives are those of hip and knee.
         if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):

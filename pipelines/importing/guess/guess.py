@@ -11,16 +11,15 @@ from pipelines.errors import InputError, about
 from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_known
-from pipelines.importing.guess.names import Meaning, meanings
+from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
+from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import SourceSettings
-from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
@@ -39,7 +38,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
         columns, typed = _typed_columns(source)
-        names = meanings(source.names)
+        names = [meaning(name) for name in source.names]
         time = guess_time(names, columns, typed)
         if time is None:
             raise InputError(_no_clock(names, columns))
@@ -47,8 +46,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         _check_columns(path, source)
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
-    run = _longest_run(columns[time.column], time.unit)
-    assert run is not None, "a clock goes forward over ten rows or more"
+    run = max(runs_of(columns[time.column], time.unit), key=len)
     rows = len(columns[time.column])
     # Columns of another length are constants, or have a clock of their own.
     of_run = {name: values[run.rows] for name, values in columns.items() if len(values) == rows}
@@ -92,9 +90,11 @@ def _typed_columns(source: Source) -> tuple[Columns, dict[str, str]]:
 
 
 def _no_clock(names: Sequence[Meaning], columns: Mapping[str, NDArray]) -> str:
-    back = [m.column for m in names if m.quantity == "time" and _goes_back(columns[m.column])]
-    if back:
-        return f"its clock, {back[0]!r}, runs backwards; reverse the order of its rows"
+    for m in names:
+        values = columns[m.column]
+        is_clock = m.quantity == "time" and values.dtype.kind in "iuf"
+        if is_clock and clock.runs_backwards(values.astype(float)):
+            return f"its clock, {m.column!r}, runs backwards; reverse the order of its rows"
     return (
         f"no time column found: none of {_in_short([m.column for m in names])} increases steadily"
         f" for ten rows at {clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz. Write the map by hand,"
@@ -116,10 +116,6 @@ def _in_short(names: Sequence[str]) -> str:
     most_names = 20
     more = f" and {len(names) - most_names} more" if len(names) > most_names else ""
     return ", ".join(names[:most_names]) + more
-
-
-def _goes_back(values: NDArray) -> bool:
-    return values.dtype.kind in "iuf" and clock.runs_backwards(values.astype(float))
 
 
 def _numeric(values: NDArray) -> NDArray:
@@ -144,13 +140,6 @@ def _dates(values: NDArray) -> NDArray | None:
         return None
     stamps = whole_nanoseconds(values)
     return stamps if np.isfinite(stamps).all() else None
-
-
-def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
-    """Return the longest run of a clock's stamps (n,); None where each run has one row."""
-    stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
-    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return max(clock.runs(time_s, stamps), key=len, default=None)
 
 
 def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
@@ -184,7 +173,7 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
         if values.dtype.kind not in "iuf" or len(values) != len(stamps):
             return None
     with about(path):
-        run = _longest_run(stamps, time.unit)
+        run = max(runs_of(stamps, time.unit), key=len, default=None)
     if run is None:
         return None
     of_run = {name: values[run.rows] for name, values in motion.items()}

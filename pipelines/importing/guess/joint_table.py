@@ -10,7 +10,7 @@ from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joint_units import Kind
 from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
-from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, counts_in_a_turn, guess_units
+from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, guess_units
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
 from pipelines.importing.quantities.numbers import are_whole
@@ -65,7 +65,7 @@ def write_joint(
         fit = fit_torque(time_s, logged["angle"] * UNITS[units.angle].factor, logged[joint.drive])
     writer = _JointWriter(proposal, f"joint[{number}]", joint, counters, logged, units, kind)
     writer.write_head(columns)
-    writer.write_angle(time_s, fit)
+    writer.write_angle(fit)
     if "velocity" in joint.columns:
         writer.write_velocity()
     writer.write_torque(fit)
@@ -127,16 +127,8 @@ class _JointWriter:
             self.used.append(self.joint.enabled)
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
 
-    def write_angle(self, time_s: NDArray, fit: TorqueFit | None) -> None:
-        """Write the table of the angle.
-
-        Parameters
-        ----------
-        time_s : (n,) array
-            s.
-        fit : TorqueFit or None
-            Fit of the torque, which shows the zero; None without a torque.
-        """
+    def write_angle(self, fit: TorqueFit | None) -> None:
+        """Write the table of the angle; a fit of the torque shows its zero."""
         self._write_column("angle")
         why, sure = self.units.why, self.units.sure
         if self.too_far:
@@ -144,13 +136,8 @@ class _JointWriter:
             sure = False
         self.proposal.key("unit", self.units.angle, why, sure)
         if self.units.angle == "counts":
-            hint = ""
-            if self.units.velocity:
-                counts = counts_in_a_turn(
-                    time_s, self.logged["angle"], self.logged["velocity"], self.units.velocity
-                )
-                hint = f"; by the velocity {counts:.4g} in its turn" if counts else ""
-            self._write_counts(hint)
+            counts = self.units.counts_in_turn
+            self._write_counts(f"; by the velocity {counts:.4g} in its turn" if counts else "")
         if self.may_be_motor:
             self._write_gear("if the encoder sits on the motor")
         self._write_counting("angle")

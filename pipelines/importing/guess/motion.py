@@ -1,6 +1,6 @@
 """Units of angle and velocity: from names, integrals, the encoder's steps, and ranges."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,8 @@ class Units:
     velocity_sign: int = 1
     gear: float = 1.0
     """Turns of the velocity's shaft for one turn of the angle's."""
+    counts_in_turn: float | None = None
+    """Counts of the angle in a turn of the velocity's shaft, if its unit shows them."""
 
 
 def guess_units(
@@ -83,7 +85,12 @@ def guess_units(
         doubt = f"does not integrate to the angle ({share:.0%} of its variance)"
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
     if unit == "counts":
-        return Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
+        units = Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
+        of_velocity = UNITS[units.velocity]
+        if of_velocity.dimension != "angular velocity":
+            return units
+        counts = 2.0 * np.pi / abs(agreement.slope * of_velocity.factor)
+        return replace(units, counts_in_turn=counts)
     return _from_slope(agreement, unit, why, sure, velocity_named)
 
 
@@ -145,30 +152,6 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
     ratio = _turns(slope, unit, velocity)
     near = round(ratio) if abs(ratio - round(ratio)) < whole * ratio else float(f"{ratio:.3g}")
     return float(near) if least_gear < ratio < most_gear else None
-
-
-def counts_in_a_turn(
-    time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str
-) -> float | None:
-    """Return the counts in a turn of the velocity's shaft; None where it does not integrate.
-
-    Parameters
-    ----------
-    time_s : (n,) array
-        Times, s.
-    angle : (n,) array
-        Angle in counts.
-    velocity : (n,) array
-        Velocity as logged.
-    velocity_unit : str
-        Its unit.
-    """
-    if UNITS[velocity_unit].dimension != "angular velocity":
-        return None
-    agreement = integral_agreement(time_s, angle, velocity)
-    if agreement is None or agreement.explained < CLEAR:
-        return None
-    return 2.0 * np.pi / abs(agreement.slope * UNITS[velocity_unit].factor)
 
 
 def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:

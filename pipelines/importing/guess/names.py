@@ -51,8 +51,6 @@ SOMETHING_ELSE = _words(
     " nummer zustand modus zwischenkreis batterie versorgung ecart erreur etat"
 )
 """Words that change the meaning of a torque or a position."""
-CONTAINERS = _words("state status")
-"""Those of them that are only the container in a nested name, as in ``state.q``."""
 TALLIES = _words(
     "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu"
     " index fifo buffer queue missed lost dropped crc zyklus takt"
@@ -75,7 +73,6 @@ UMLAUTS = str.maketrans(
 )
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
-AXES = _words("x y z")
 SIGNS = _words("n v w s f")
 """Symbols that are no joint's name where a unit follows, as in ``n (1/min)``."""
 DIMENSIONS = {
@@ -110,11 +107,6 @@ class Meaning:
         """Order of preference: measured, perhaps measured, filtered, commanded."""
         # A filter delays a signal, and a command is no measurement at all.
         return 3 * self.commanded + 2 * self.filtered + (not self.measured)
-
-
-def meanings(names: Iterable[str]) -> list[Meaning]:
-    """Return the meaning of each name."""
-    return [meaning(name) for name in names]
 
 
 def meaning(name: str) -> Meaning:
@@ -160,9 +152,9 @@ def meaning(name: str) -> Meaning:
 
 
 def _containers(name: str) -> set[str]:
-    """Return the words of a nested name that are only its container."""
+    """Return the words of a nested name that are only its container, as in ``state.q``."""
     outer, _, inner = name.replace("/", ".").rpartition(".")
-    return set(_split(outer)) & CONTAINERS - set(_split(inner))
+    return set(_split(outer)) & {"state", "status"} - set(_split(inner))
 
 
 def in_counts(column: Meaning) -> Meaning | None:
@@ -232,7 +224,7 @@ def _words_in(bracket: re.Match[str]) -> str:
 
 def _apart(word: str) -> list[str]:
     """Return the parts of a compound whose last part is known, and long or after a known one."""
-    if word not in KNOWN and word[:-3] in SYMBOLS | AXES and word[-3:] in COMMANDED:
+    if word not in KNOWN and word[:-3] in SYMBOLS | {"x", "y", "z"} and word[-3:] in COMMANDED:
         return [word[:-3], word[-3:]]  # xref
     if word in KNOWN or len(word) < 6:
         return [word]

@@ -17,10 +17,6 @@ ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
-NEAR = 0.1
-"""Largest relative difference between the rates of two clocks of the same rows."""
-TYPES = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
-"""Reasons for units that are given by the type of a column."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +103,10 @@ def _guess(
     # Usual rates span three decades, so that mostly one unit fits.
     unit = known or fitting[0]
     rate_hz = _rate_hz(step, unit)
-    is_usual, is_named = _is_usual(rate_hz), meaning.quantity == "time"
+    is_usual, is_named = unit in clock.usual_units(step, [unit]), meaning.quantity == "time"
     if known:
-        why = f"{TYPES.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+        by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
+        why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
     else:
         why = f"steps of {step:.4g} are {rate_hz:.4g} Hz in {unit}, and no rate in another"
     if not is_named:
@@ -153,8 +150,9 @@ def _finer(
         values = columns[meaning.column].astype(float)
         own = [] if meaning.quantity else _usual_rates(meaning, _step(values, False), typed)
         if any(
-            # A finer clock must not start over: a coarse one never goes back.
-            abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1]
+            # The rates of two clocks of the same rows differ by less than 10 %. A finer clock must
+            # not start over: a coarse one never goes back.
+            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, unit)[1]
             for unit, hz in own
             for rate in rates
         ):
@@ -166,17 +164,13 @@ def _usual_rates(
     meaning: Meaning, step: float, typed: Mapping[str, str]
 ) -> list[tuple[str, float]]:
     """Return the units of a clock of such a step that give usual rates, with the rates, Hz."""
-    unit = _unit(meaning, typed)
-    rates = [(one, _rate_hz(step, one)) for one in ([unit] if unit else clock.usual_units(step))]
-    return [(one, rate) for one, rate in rates if _is_usual(rate)]
+    known = _unit(meaning, typed)
+    units = clock.usual_units(step, [known]) if known else clock.usual_units(step)
+    return [(unit, _rate_hz(step, unit)) for unit in units]
 
 
 def _rate_hz(step: float, unit: str) -> float:
     return 1.0 / (step * UNITS[unit].factor)
-
-
-def _is_usual(rate_hz: float) -> bool:
-    return clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
 
 
 def write_time(proposal: Proposal, guess: TimeGuess) -> None:
@@ -223,17 +217,7 @@ def _stands_still(values: NDArray) -> bool:
 def _stamps(values: NDArray) -> tuple[NDArray, NDArray]:
     """Return the rows of each stamp of a coarse clock, and its distance from the next.
 
-    The first and the last stamp are left out, as their rows may not be complete.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Stamps.
-
-    Returns
-    -------
-    (k,) array, (k,) array
-        Numbers of rows, and steps in the clock's unit.
+    The first and the last of the stamps (n,) are left out, as their rows may not be complete.
     """
     begins = np.flatnonzero(np.diff(values)) + 1
     return np.diff(begins), np.diff(values[begins])
@@ -273,14 +257,12 @@ def _step(values: NDArray, coarse: bool) -> float:
         if usual.any():
             return float(np.sum(steps[usual]) / np.sum(rows[usual]))
         return np.median(steps) / np.median(rows)
-    # Without steps back, at which the clock starts over.
-    steps = np.diff(values)
-    return float(np.median(steps[steps > 0]))
+    return clock.period(values)
 
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values)
+    runs = runs_of(values, unit)
     full = [
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)
@@ -289,3 +271,10 @@ def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     if full and full[0] and len(set(full)) == 1:
         return full[0], False
     return None, len(runs) > 1
+
+
+def runs_of(stamps: NDArray, unit: str) -> list[clock.Run]:
+    """Return the runs of a clock with these stamps (n,)."""
+    stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
+    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
+    return clock.runs(time_s, stamps)

@@ -7,9 +7,6 @@ from numpy.typing import NDArray
 
 from pipelines.importing.quantities.consistency import whole_rows
 
-WINDOW_S = 0.1
-"""Length of the parabola for the acceleration, s: short against a swing, long against a step."""
-
 FEWEST = 50
 """Least number of rows for a fit of five parameters."""
 
@@ -56,7 +53,9 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
     time_s, angle_rad, torque = whole_rows(time_s, angle_rad, torque)
     if len(time_s) <= FEWEST or np.ptp(angle_rad) == 0.0 or np.ptp(torque) == 0.0:
         return None
-    half = max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s)))))
+    # Length of the parabola for the acceleration, s: short against a swing, long against a step.
+    window_s = 0.1
+    half = max(2, round(0.5 * window_s / float(np.median(np.diff(time_s)))))
     if len(time_s) < FEWEST + 2 * half:
         return None
     # Derivatives of the parabola through three angles, a window apart. A difference of neighbouring

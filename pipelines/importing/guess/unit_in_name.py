@@ -26,24 +26,8 @@ OTHERS = (
         for angle in ("rad", "deg", "°", "m", "mm", "rev")
         for square in ("²", "2", "^2")
     ),
-    *(
-        "Nm/s",
-        "Nm/rad",
-        "Nm/deg",
-        "Nm/A",
-        "Nms",
-        "A/s",
-        "V/s",
-        "W",
-        "kW",
-        "Hz",
-        "kHz",
-        "J",
-        "bar",
-        "Pa",
-        "kg",
-        "Ohm",
-    ),
+    *("Nm/s", "Nm/rad", "Nm/deg", "Nm/A", "Nms", "A/s", "V/s"),
+    *("W", "kW", "Hz", "kHz", "J", "bar", "Pa", "kg", "Ohm"),
 )
 """Units of quantities that no map has."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
@@ -89,11 +73,8 @@ def _without(name: str, match: re.Match[str]) -> str:
 
 def _is_plain(text: str, unit: str) -> bool:
     """Return whether a word without brackets is clearly that unit, unlike ``ticks`` or ``ms``."""
-    return UNITS[unit].dimension not in ("time", "counts") and text.lower() not in (
-        "rev",
-        "turn",
-        "turns",
-    )
+    is_word = text.lower() in ("rev", "turn", "turns")
+    return not is_word and UNITS[unit].dimension not in ("time", "counts")
 
 
 def _written(text: str) -> str | None:

@@ -1,4 +1,4 @@
-"""Whether the columns of a log agree: velocity integrates to angle, torque does work."""
+"""Whether the columns of a log agree: velocity integrates to angle."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,6 @@ SPAN = 20
 """Samples over which a velocity is integrated: long against noise, short against drift."""
 MOST = 200_000
 """Greatest number of rows that are compared, from the middle of the log."""
-BLOCK = 256
-"""Columns that are compared with all others at a time."""
-LIKELY = 0.5
-"""Share of the variance above which a pair of columns is a candidate."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,13 @@ def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Ag
         return None
     # Steps over a span need no constant of integration. A bias of the velocity cannot add up over
     # the whole log, either.
-    return _through_origin(angle[SPAN:] - angle[:-SPAN], _travel(time_s, velocity))
+    x, y = angle[SPAN:] - angle[:-SPAN], _travel(time_s, velocity)
+    xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
+    if xx == 0.0 or yy == 0.0 or xy == 0.0:
+        return None
+    # The geometric mean of both regressions, as both columns have noise: a regression of y on x
+    # alone would understate the slope.
+    return Agreement(float(np.sign(xy)) * np.sqrt(yy / xx), xy**2 / (xx * yy))
 
 
 def likeliest_integrals(
@@ -85,11 +87,14 @@ def likeliest_integrals(
     steps = _unit_rows([(angle[SPAN:] - angle[:-SPAN])[some] for angle in whole[: len(angles)]])
     travels = _unit_rows([_travel(time_s, velocity)[some] for velocity in whole[len(angles) :]])
     likely: list[tuple[float, int, int]] = []
-    for first in range(0, len(steps), BLOCK):  # thousands of columns have millions of pairs
+    # A block of the angles at a time: thousands of columns have millions of pairs.
+    block = 256
+    for first in range(0, len(steps), block):
         # A velocity cannot integrate to the negative angle.
-        shares = np.square(np.maximum(steps[first : first + BLOCK] @ travels.T, 0.0))
+        shares = np.square(np.maximum(steps[first : first + block] @ travels.T, 0.0))
         best = np.argsort(shares, axis=None)[-most_likely:]
-        rows, others = np.unravel_index(best[shares.flat[best] > LIKELY], shares.shape)
+        # Candidates explain more than half of the variance.
+        rows, others = np.unravel_index(best[shares.flat[best] > 0.5], shares.shape)
         candidates = (
             (float(shares[i, j]), first + int(i), int(j)) for i, j in zip(rows, others, strict=True)
         )
@@ -121,44 +126,6 @@ def _travel(time_s: NDArray, velocity: NDArray) -> NDArray:
         [[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))]
     )
     return travel[SPAN:] - travel[:-SPAN]
-
-
-def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
-    """Fit y = slope x by the geometric mean of both regressions, as both columns have noise."""
-    xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-    if xx == 0.0 or yy == 0.0 or xy == 0.0:
-        return None
-    # A regression of y on x alone would understate the slope, because x has noise, too.
-    return Agreement(float(np.sign(xy)) * np.sqrt(yy / xx), xy**2 / (xx * yy))
-
-
-def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
-    """Return the mean and the mean magnitude of a drive's power.
-
-    The energy that a drive delivers between two equal states is lost to friction. The mean is thus
-    positive where the signs of angle and torque agree.
-
-    Parameters
-    ----------
-    time_s : (n,) array
-        Times, s.
-    angle, torque : (n,) array
-        Angle, rad, and torque, N·m; or position, m, and force, N.
-
-    Returns
-    -------
-    (float, float)
-        Mean and mean magnitude, W; zeros where the log is too short.
-    """
-    time_s, angle, torque = whole_rows(time_s, angle, torque)
-    if len(time_s) < 5 * SPAN:
-        return 0.0, 0.0
-    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
-    # The mean torque over the span of the velocity: a shift in time between both would change their
-    # product.
-    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
-    power = averaged * velocity
-    return float(np.mean(power)), float(np.mean(np.abs(power)))
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:

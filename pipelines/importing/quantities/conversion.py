@@ -10,7 +10,7 @@ from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
 from pipelines.settings.import_map import ReadingSettings
-from pipelines.settings.units import Unit, unit_named
+from pipelines.settings.units import Unit
 
 
 def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
@@ -60,8 +60,7 @@ def quantity(
         # The joint's zero as a raw reading: most joints begin less than half a turn from it.
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
         raw = unwrapped(raw, reading.wraps_at, note, near)
-    unit = unit_named(reading.unit)
-    assert unit is not None, "the map checks its units"
+    unit = reading.known_unit
     if reading.wraps_at is None:
         # Only reported: a step by a turn may be meant, as in a set-point.
         full = full_at(raw, _turns(reading, unit))
@@ -69,28 +68,6 @@ def quantity(
             seen = f"steps by {full:.6g} from one row to the next, as a full counter does"
             note(seen, f"kept; set wraps_at = {full:.10g} at it")
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
-
-
-def counter_turn(reading: ReadingSettings, gain: float) -> float | None:
-    """Return the change of a quantity in a turn of its counter.
-
-    Parameters
-    ----------
-    reading : ReadingSettings
-        Unit, scale and modulus.
-    gain : float
-        Quantity at the joint per SI unit of the reading.
-
-    Returns
-    -------
-    float or None
-        SI units; None without a counter.
-    """
-    if reading.wraps_at is None:
-        return None
-    unit = unit_named(reading.unit)
-    assert unit is not None, "the map checks its units"
-    return abs(gain * unit.factor * reading.scale * reading.wraps_at)
 
 
 def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:

@@ -21,8 +21,6 @@ OPERATORS: dict[type, Callable] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
-LARGEST = sys.float_info.max
-QUOTED = re.compile(r"`([^`]*)`")
 
 
 class Expression:
@@ -33,7 +31,8 @@ class Expression:
         self._quoted: list[str] = []
         try:
             # Names in backquotes become identifiers first: the parser refuses blanks in names.
-            self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
+            plain = re.sub(r"`([^`]*)`", self._placeholder, text).strip()
+            self._tree = ast.parse(plain, mode="eval").body
         # The parser raises each of these, depending on the text.
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise self._refusal() from error
@@ -93,14 +92,12 @@ class Expression:
 
     def _refusal(self, more: str = "") -> SettingsError:
         text = self._text if len(self._text) <= 60 else f"{self._text[:57]}..."
-        return SettingsError(f"{self._where}: found {text!r}, {_EXPECTED}{more}")
-
-
-_EXPECTED = (
-    "expected numbers and columns with + - * / ( ), names with blanks or signs in `backquotes`"
-)
+        return SettingsError(
+            f"{self._where}: found {text!r}, expected numbers and columns with + - * / ( ), names"
+            f" with blanks or signs in `backquotes`{more}"
+        )
 
 
 def _is_number(value: Any) -> bool:
-    # By type, as True is an int, too. Above LARGEST are infinity and integers that overflow.
-    return type(value) in (int, float) and value <= LARGEST
+    # By type, as True is an int, too. Above the largest are infinity and integers that overflow.
+    return type(value) in (int, float) and value <= sys.float_info.max

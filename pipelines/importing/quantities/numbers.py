@@ -1,16 +1,11 @@
 """A file's values as numbers; text that is no number is reported, and counts as missing."""
 
-import re
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Note, counted, unnoted
 
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
-"""A number with marks between its thousands."""
-DAYS_FIRST = re.compile(r"^\s*(\d\d)\.(\d\d)\.(\d{4})")
 TAKEN_FOR_MISSING = "taken for missing"
 """Treatment of a text where a number should be."""
 
@@ -61,9 +56,10 @@ def _have_thousands(text: pd.Series) -> bool:
     written = text.dropna()
     if not pd.api.types.is_string_dtype(written):
         return False
+    thousands = r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?"
     marked = written[written.str.contains(",", regex=False)]
     return bool(marked.str.contains(".", regex=False).any()) and bool(
-        marked.str.fullmatch(THOUSANDS).all()
+        marked.str.fullmatch(thousands).all()
     )
 
 
@@ -91,7 +87,8 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
         return np.where(missing, np.nan, whole) if missing.any() else whole
     text = pd.Series(values).astype("string")
     # ISO 8601 has the year first. It allows a comma before the fraction, which becomes a point.
-    text = text.str.replace(DAYS_FIRST, r"\3-\2-\1", regex=True).str.replace(",", ".", regex=False)
+    text = text.str.replace(r"^\s*(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1", regex=True)
+    text = text.str.replace(",", ".", regex=False)
     # In UTC, so that stamps with different offsets can be compared, as across a change to summer
     # time.
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)

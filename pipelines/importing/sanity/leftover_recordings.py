@@ -8,9 +8,6 @@ from pipelines.contracts.joints import in_words, joints_of
 from pipelines.mechanics.machine import mechanisms_of
 from pipelines.settings.import_map import ImportMap
 
-NEEDED = {"train": "to fit to", "validate": "to judge on"}
-"""Purposes of recordings without which there is no verdict."""
-
 Metadata = Mapping[str, Mapping[str, Any]]
 """Metadata of the imported recordings in a folder, by name (``imported_in``)."""
 
@@ -42,21 +39,15 @@ def missing_for_verdict(
     """Yield a message for each reason why the recordings in a folder give no verdict."""
     # Of all recordings in the folder: training may come from one import, validation from another.
     purposes = {metadata["purpose"] for metadata in imported.values()}
-    for purpose, use in NEEDED.items():
+    for purpose, use in (("train", "to fit to"), ("validate", "to judge on")):
         if purpose not in purposes:
             yield (
                 f"`exoid run` lacks a recording {use}: add a [[recording]] to {map_path} with "
                 f'purpose = "{purpose}", and a span or files of its own'
             )
-    messages = (_unknown_mechanism(imported[name]) for name in current)
-    yield from dict.fromkeys(filter(None, messages))
-
-
-def _unknown_mechanism(metadata: Mapping[str, Any]) -> str:
-    joints = joints_of(metadata)
-    if mechanisms_of(joints):
-        return ""
-    return (
-        f"`exoid run` stops after filtering: {in_words(joints)} make no mechanism that exoid can"
-        " fit; leave some out"
-    )
+    machines = [joints_of(imported[name]) for name in current]
+    for joints in dict.fromkeys(in_words(one) for one in machines if not mechanisms_of(one)):
+        yield (
+            f"`exoid run` stops after filtering: {joints} make no mechanism that exoid can"
+            " fit; leave some out"
+        )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import in_words
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.quantities.consistency import MOST, integral_agreement, mean_power
+from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
 from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
@@ -15,8 +15,6 @@ STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
 """Least motion of a joint from which inertia can be seen, about the play of a gear or screw."""
-FAR = 20.0
-"""Distance from the median, relative to that of 99 % of the rows, that marks an outlier."""
 
 
 def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
@@ -79,13 +77,15 @@ def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator
 
 def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     """Report single readings far from nearly all others."""
+    # Distance from the median, relative to that of 99 % of the rows, that marks an outlier.
+    far_off = 20.0
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
         # Median and quantile: an outlier must not widen the range that it is judged by.
         some = _every_kth(columns[name])
         middle = float(np.median(some))
         usual = float(np.quantile(np.abs(some - middle), 0.99))
-        least, most = middle - FAR * usual, middle + FAR * usual
+        least, most = middle - far_off * usual, middle + far_off * usual
         far = np.flatnonzero((columns[name] < least) | (columns[name] > most))
         if usual > 0.0 and len(far):
             seen = (
@@ -139,16 +139,25 @@ def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> I
     """Report drives that brake on average; a single one may, where another one moves it."""
     # Share of the mean magnitude of power that the drives may absorb on average.
     gives_back = 0.2
-    powers = [
-        mean_power(
-            columns["time_s"],
-            columns[joint.joint.column("angle")],
-            columns[joint.joint.column("torque")],
-        )
-        for joint in joints
-    ]
+    powers = [_mean_power(columns, joint) for joint in joints]
     # Over all joints, because one joint's motion can drive another one's motor.
     mean, size = (sum(values) for values in zip(*powers, strict=True))
     if mean < -gives_back * size:
         seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")
+
+
+def _mean_power(columns: Mapping[str, NDArray], joint: JointSettings) -> tuple[float, float]:
+    """Return the mean and the mean magnitude of a drive's power, W; zeros for a short log."""
+    # The energy that a drive delivers between two equal states is lost to friction. The mean is
+    # thus positive where the signs of angle and torque agree.
+    names = [joint.joint.column(quantity) for quantity in ("angle", "torque")]
+    time_s, angle, torque = whole_rows(columns["time_s"], *(columns[name] for name in names))
+    if len(time_s) < 5 * SPAN:
+        return 0.0, 0.0
+    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
+    # The mean torque over the span of the velocity: a shift in time between both would change their
+    # product.
+    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
+    power = averaged * velocity
+    return float(np.mean(power)), float(np.mean(np.abs(power)))

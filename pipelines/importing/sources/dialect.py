@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.errors import InputError
+from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import unit_named
 
-DELIMITERS = (",", ";", "\t", "|", " ")
+DELIMITERS = ",;\t| "
 RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|\0]")
 """Other delimiters, tried where none of ``DELIMITERS`` gives a table."""
 COMMENTS = ("#", "%")
@@ -71,18 +72,15 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     # The limit of bytes may have cut the last line in two.
     lines = lines if whole else lines[:-1]
     skipped = settings.skip_rows or 0
-    guesses = _tables(
-        lines[skipped:], [settings.delimiter] if settings.delimiter else DELIMITERS, settings
-    )
-    if not guesses and not settings.delimiter:
-        guesses = _tables(
-            lines[skipped:], sorted(set(RARE.findall("".join(lines[skipped:])))), settings
-        )
-    if not guesses:
+    below = lines[skipped:]
+    tables = _tables(below, settings.delimiter or DELIMITERS, settings)
+    if not tables and not settings.delimiter:
+        tables = _tables(below, sorted(set(RARE.findall("".join(below)))), settings)
+    if not tables:
         raise InputError(_no_table(lines, settings))
     # A wrong delimiter leaves several numbers in one field, which is then none.
-    table = max(guesses, key=lambda guess: guess.fields_of_numbers)
-    names = settings.columns or table.header(lines[skipped:])
+    table = max(tables, key=lambda table: table.fields_of_numbers)
+    names = settings.columns or table.header(below)
     if len(names) != table.width:
         raise InputError(
             f"has {table.width} columns, but source.columns names {len(names)}; name each of them"
@@ -90,8 +88,9 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     notes = [f"delimiter {table.delimiter!r}, decimal {table.decimal!r}, {encoding}"]
     if names == table.numbered:
         notes.append("no header: columns are named c1, c2, ...")
-    comment = settings.comment or _comment(lines)
-    twice = [name for name, times in Counter(names).items() if times > 1]
+    starts = Counter(line.lstrip()[:1] for line in lines)
+    comment = settings.comment or next((mark for mark in COMMENTS if starts[mark]), None)
+    twice = repeated(names)
     if twice:
         notes.append(
             f"columns with the same name are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
@@ -105,13 +104,6 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         _numbered_twins(names),
         tuple(notes),
     )
-
-
-def _tables(
-    lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings
-) -> list["_Table"]:
-    tables = [_Table.of(lines, delimiter, settings) for delimiter in delimiters]
-    return [table for table in tables if table is not None]
 
 
 def _encoding(start: bytes) -> str:
@@ -140,11 +132,6 @@ def _is_stray(nuls: int, start: bytes) -> bool:
     return nuls < stray * len(start) and b"\0" not in start.partition(b"\n")[0]
 
 
-def _comment(lines: Sequence[str]) -> str | None:
-    starts = Counter(line.lstrip()[:1] for line in lines)
-    return next((mark for mark in COMMENTS if starts[mark]), None)
-
-
 def _no_table(lines: Sequence[str], settings: SourceSettings) -> str:
     if not any(line.strip() for line in lines):
         return "is empty, expected a table of numbers; record it again"
@@ -160,7 +147,7 @@ def _no_table(lines: Sequence[str], settings: SourceSettings) -> str:
 
 @dataclass(frozen=True)
 class _Table:
-    """The rows of numbers that a delimiter gives."""
+    """The rows of numbers that a delimiter and a decimal point give."""
 
     delimiter: str
     decimal: str
@@ -169,37 +156,6 @@ class _Table:
     """Line of the first row."""
     width: int
     fields_of_numbers: int
-
-    @classmethod
-    def of(cls, lines: Sequence[str], delimiter: str, settings: SourceSettings) -> "_Table | None":
-        """Return the table that a delimiter gives; None where there is none."""
-        if settings.decimal:
-            decimals = [settings.decimal]
-        else:
-            # A comma cannot separate fields and be the decimal point, too.
-            decimals = ["."] if delimiter == "," else [".", ","]
-        # A line that begins with the map's own mark is no row, and may hold the header.
-        marks = (settings.comment,) if settings.comment else COMMENTS
-        tables = [cls._with(lines, delimiter, decimal, marks) for decimal in decimals]
-        return max(filter(None, tables), key=lambda table: table.fields_of_numbers, default=None)
-
-    @classmethod
-    def _with(
-        cls, lines: Sequence[str], delimiter: str, decimal: str, marks: tuple[str, ...]
-    ) -> "_Table | None":
-        rows = [
-            (k, _fields(line, delimiter))
-            for k, line in enumerate(lines)
-            if not line.lstrip().startswith(marks)
-        ]
-        data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
-        if not data:
-            return None
-        width = Counter(len(fields) for _, fields in data).most_common(1)[0][0]
-        data = [(k, fields) for k, fields in data if len(fields) == width]
-        numbers = sum(_is_number(field, decimal) for _, fields in data for field in fields)
-        table = cls(delimiter, decimal, marks, data[0][0], width, numbers)
-        return table if width > 1 else None
 
     @property
     def numbered(self) -> tuple[str, ...]:
@@ -227,6 +183,38 @@ class _Table:
                 for name, unit in zip(before[0], names, strict=True)
             ]
         return tuple(names)
+
+
+def _tables(
+    lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings
+) -> list[_Table]:
+    """Return the table of each delimiter and decimal point that give one."""
+    # A line that begins with the map's own mark is no row, and may hold the header.
+    marks = (settings.comment,) if settings.comment else COMMENTS
+    tables = [
+        _table(lines, delimiter, decimal, marks)
+        for delimiter in delimiters
+        # A comma cannot separate fields and be the decimal point, too.
+        for decimal in settings.decimal or ("." if delimiter == "," else ".,")
+    ]
+    return [table for table in tables if table is not None]
+
+
+def _table(
+    lines: Sequence[str], delimiter: str, decimal: str, marks: tuple[str, ...]
+) -> _Table | None:
+    rows = [
+        (k, _fields(line, delimiter))
+        for k, line in enumerate(lines)
+        if not line.lstrip().startswith(marks)
+    ]
+    data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
+    if not data:
+        return None
+    width = Counter(len(fields) for _, fields in data).most_common(1)[0][0]
+    data = [(k, fields) for k, fields in data if len(fields) == width]
+    numbers = sum(_is_number(field, decimal) for _, fields in data for field in fields)
+    return _Table(delimiter, decimal, marks, data[0][0], width, numbers) if width > 1 else None
 
 
 def _fields(line: str, delimiter: str) -> list[str]:

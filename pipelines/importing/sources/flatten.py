@@ -18,14 +18,15 @@ def _columns(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
     if isinstance(content, Mapping):
         for key, value in content.items():
             yield from _columns(value, f"{name}.{key}" if name else str(key))
-    elif _is_list_of_records(content):
+    elif is_list_of_records(content):
         for key, values in _transposed(content).items():
             yield from _columns(values, f"{name}.{key}" if name else str(key))
     elif isinstance(content, Sequence | np.ndarray | int | float | str) or content is None:
         yield from _numbered(_array(content), name)
 
 
-def _is_list_of_records(content: Any) -> bool:
+def is_list_of_records(content: Any) -> bool:
+    """Return whether content is a list of records, one at least."""
     return (
         isinstance(content, list)
         and bool(content)

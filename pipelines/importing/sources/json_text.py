@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.flatten import flattened, is_list_of_records
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 from pipelines.validation.suggestion import suggestion
@@ -64,10 +64,5 @@ def _flattened(content: Any, table: str | None) -> Columns:
         below = below[key]
     # Constants next to the table stay available to expressions, such as a gain.
     constants = {name: values for name, values in flattened(content).items() if len(values) == 1}
-    return flattened(below, "" if _has_keys(below) else table) | constants
-
-
-def _has_keys(below: Any) -> bool:
-    return isinstance(below, Mapping) or (
-        isinstance(below, list) and bool(below) and isinstance(below[0], Mapping)
-    )
+    has_keys = isinstance(below, Mapping) or is_list_of_records(below)
+    return flattened(below, "" if has_keys else table) | constants

@@ -1,5 +1,6 @@
 """Choose the reader of a file by its content, not its name."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from pipelines.errors import InputError
@@ -13,7 +14,7 @@ from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
 from pipelines.validation.suggestion import similar_file
 
-BEGINNINGS = {
+BEGINNINGS: dict[bytes, Callable[[Path, SourceSettings], Source]] = {
     b"PAR1": open_parquet,
     b"\x89HDF\r\n\x1a\n": open_hdf5,
     b"MATLAB": open_matlab,
@@ -31,6 +32,17 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
     InputError
         If there is no such file, or it is damaged or of an unknown format.
     """
+    source = _reader(path)(path, settings)
+    if not source.names:
+        raise InputError(
+            f"holds no column of numbers, read as {source.format}; "
+            "export it with plain arrays (of a MATLAB table, table2struct or writetable)"
+        )
+    return source
+
+
+def _reader(path: Path) -> Callable[[Path, SourceSettings], Source]:
+    """Return the function that opens a file of its format."""
     if not path.exists():
         raise InputError(f"no such file; {similar_file(path) or 'check the name'}")
     if path.is_dir():
@@ -38,7 +50,7 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
             raise InputError(
                 "is a folder, expected a log or the folder of a ROS 2 bag; name a file in it"
             )
-        return _with_columns(open_rosbag(path, settings))
+        return open_rosbag
     # The file is read more than once, and an idle pipe would block without end.
     if not path.is_file():
         raise InputError(
@@ -50,19 +62,8 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
         raise InputError("is empty (0 bytes), expected a log; record or copy it again")
     for beginning, reader in BEGINNINGS.items():
         if start.startswith(beginning):
-            return _with_columns(reader(path, settings))
+            return reader
     if path.suffix == ".mat":  # v4 has no signature
-        return _with_columns(open_matlab(path, settings))
+        return open_matlab
     is_json = start.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
-    return _with_columns(
-        (open_json if is_json and b"\0" not in start else open_text)(path, settings)
-    )
-
-
-def _with_columns(source: Source) -> Source:
-    if not source.names:
-        raise InputError(
-            f"holds no column of numbers, read as {source.format}; "
-            "export it with plain arrays (of a MATLAB table, table2struct or writetable)"
-        )
-    return source
+    return open_json if is_json and b"\0" not in start else open_text

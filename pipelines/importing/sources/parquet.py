@@ -1,6 +1,5 @@
 """Logs in Parquet."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError
 from pipelines.importing.sources.flatten import flattened
 from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
 
 
@@ -68,9 +68,8 @@ def _damage_reported() -> Iterator[None]:
 
 
 def _refuse_twins(names: Sequence[str]) -> None:
-    twins = [name for name, times in Counter(names).items() if times > 1]
-    if twins:
-        raise InputError(f"has two columns {twins[0]!r}; rename one and write the file again")
+    for name in repeated(names):
+        raise InputError(f"has two columns {name!r}; rename one and write the file again")
 
 
 def _unnested(table: pa.Table) -> pa.Table:

@@ -14,19 +14,7 @@ from pipelines.settings.import_map import SourceSettings
 
 
 def open_text(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a text file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    settings : SourceSettings
-        Dialect of the file, as far as it is given.
-
-    Returns
-    -------
-    Source
-        Columns are read on demand.
+    """Return the log in a text file, in a dialect that is derived as far as it is not given.
 
     Raises
     ------

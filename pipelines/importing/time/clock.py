@@ -14,10 +14,6 @@ from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 
-RESTART_S, RESTART_PERIODS = 1.0, 20
-"""A clock starts over that steps back by more than the longer of these, s and samples."""
-LEAD_PERIODS, LEAD_S = 20, 0.2
-"""Long before is more than the longer of these, samples and s."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
 LONGEST = 29
@@ -45,41 +41,22 @@ class Run:
         return len(self.rows)
 
 
-def usual_units(step: float) -> list[str]:
-    """Return the units in which a step between stamps gives a usual rate of machines.
+def usual_units(step: float, units: Sequence[str] = ("s", "ms", "us", "ns")) -> list[str]:
+    """Return the units in which a step gives a usual rate of machines.
 
     Parameters
     ----------
     step : float
-        In the unknown unit.
-
-    Returns
-    -------
-    list of str
-        Of s, ms, us and ns.
+        From one stamp to the next, in the unknown unit.
+    units : sequence of str
+        Units that are tried.
     """
-    return [
-        unit
-        for unit in ("s", "ms", "us", "ns")
-        if SLOWEST_HZ <= 1.0 / (step * UNITS[unit].factor) <= FASTEST_HZ
-    ]
+    rates_hz = {unit: 1.0 / (step * UNITS[unit].factor) for unit in units}
+    return [unit for unit, rate_hz in rates_hz.items() if SLOWEST_HZ <= rate_hz <= FASTEST_HZ]
 
 
-def check_unit(raw: NDArray, column: str, unit: str) -> None:
-    """Refuse dates with the unit of numbers, and numbers with the unit of dates.
-
-    Parameters
-    ----------
-    raw : (n,) array
-        Stamps as the file has them.
-    column, unit : str
-        Name of their column, and its unit in the map.
-
-    Raises
-    ------
-    SettingsError
-        If they do not fit, with the unit to set.
-    """
+def _check_unit(raw: NDArray, column: str, unit: str) -> None:
+    """Refuse dates with the unit of numbers, and numbers with the unit of dates."""
     content = _content(raw)
     fits = {
         "dates": unit == "iso8601",
@@ -93,18 +70,11 @@ def check_unit(raw: NDArray, column: str, unit: str) -> None:
     known = raw[~pd.isna(raw)]
     right = {"dates": ["iso8601"], "durations": ["ns"]}.get(content)
     if right is None:
-        right = _likely_units(numbers(known))
+        right = usual_units(period(numbers(known))) or ["s", "ms", "us", "ns"]
     raise SettingsError(
         f"{column!r} holds {content}, the first {str(known[0])[:LONGEST]!r}, but the map has"
         f" time.unit = {unit!r}; set it to {' or '.join(right)}"
     )
-
-
-def _likely_units(known: NDArray) -> list[str]:
-    """Return the units in which numeric stamps (n,) give a usual rate; else all units."""
-    steps = np.diff(known)
-    steps = steps[steps > 0.0]
-    return (usual_units(float(np.median(steps))) if len(steps) else []) or ["s", "ms", "us", "ns"]
 
 
 def _content(raw: NDArray) -> str:
@@ -119,7 +89,7 @@ def _content(raw: NDArray) -> str:
     return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
 
 
-def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
+def stamps(raw: NDArray, column: str, settings: TimeSettings, note: Note) -> NDArray:
     """Return time stamps as numbers in the map's unit.
 
     Whole numbers stay integers, as float64 cannot represent every nanosecond since 1970.
@@ -128,6 +98,8 @@ def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
     ----------
     raw : (n,) array
         Stamps as the file has them.
+    column : str
+        Name of their column, for messages.
     settings : TimeSettings
         Unit of the stamps.
     note : callable
@@ -140,9 +112,12 @@ def stamps(raw: NDArray, settings: TimeSettings, note: Note) -> NDArray:
 
     Raises
     ------
+    SettingsError
+        If they are dates and the unit is one of numbers, or the other way round.
     InputError
         If there is no date, or a stamp does not fit into int64.
     """
+    _check_unit(raw, column, settings.unit)
     dates = settings.unit == "iso8601"
     values = whole_nanoseconds(raw) if dates or raw.dtype.kind in "mM" else raw
     if dates and len(raw) and not np.isfinite(values).any():
@@ -231,24 +206,8 @@ def _unwrapped(since: NDArray, modulus: float, note: Note) -> NDArray:
     return since
 
 
-def uniform(rows: int, rate_hz: float, note: Note) -> Run:
-    """Return the run of a log without a clock.
-
-    Parameters
-    ----------
-    rows : int
-        Number of rows.
-    rate_hz : float
-        Their rate, Hz.
-    note : callable
-        Takes what is reported about the clock.
-    """
-    note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
-    return Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
-
-
 def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
-    """Divide a log into runs whose times strictly increase.
+    """Divide a log into runs whose times strictly increase; refuse a clock that runs backwards.
 
     Parameters
     ----------
@@ -267,7 +226,12 @@ def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
         note(f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out")
-    _refuse_backwards(time_s[rows])
+    time = time_s[rows]
+    if runs_backwards(time):
+        raise InputError(
+            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
+            " last; reverse the order of its rows, or correct time.column in the map"
+        )
     # Outliers first: one stamp far ahead would look like a clock that starts over after it.
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
@@ -293,25 +257,22 @@ def runs_backwards(time: NDArray) -> bool:
     return bool(len(steps)) and bool(np.mean(steps < 0.0) > backwards)
 
 
-def _refuse_backwards(time: NDArray) -> None:
-    if runs_backwards(time):
-        raise InputError(
-            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the"
-            " last; reverse the order of its rows, or correct time.column in the map"
-        )
-
-
-def _period(time_s: NDArray) -> float:
-    steps = np.diff(time_s)
+def period(time: NDArray) -> float:
+    """Return the median step forward of times (n,), in their unit; infinite without one."""
+    steps = np.diff(time)
     steps = steps[steps > 0.0]
     return float(np.median(steps)) if len(steps) else np.inf
+
+
+def _far(time: NDArray) -> float:
+    """Return the step, s, back by more than which a clock starts over: 1 s, or 20 periods."""
+    return max(1.0, 20 * period(time))
 
 
 def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
     """Leave out single stamps far from both neighbours, which are close to each other."""
     time = time_s[rows]
-    far = max(RESTART_S, RESTART_PERIODS * _period(time))
-    step = np.diff(time)
+    far, step = _far(time), np.diff(time)
     stray = (
         (np.abs(step[:-1]) > far) & (np.abs(step[1:]) > far) & (np.abs(time[2:] - time[:-2]) < far)
     )
@@ -328,8 +289,7 @@ def _without_outliers(rows: NDArray, time_s: NDArray, note: Note) -> NDArray:
 def _begins(time: NDArray) -> list[int]:
     """Return the first row, and each row at which the clock starts over."""
     # Two kinds of restart: a step far back, then, between those, a small one that lasts.
-    far = max(RESTART_S, RESTART_PERIODS * _period(time))
-    cuts = [0, *(np.flatnonzero(np.diff(time) < -far) + 1), len(time)]
+    cuts = [0, *(np.flatnonzero(np.diff(time) < -_far(time)) + 1), len(time)]
     begins = []
     for first, last in pairwise(cuts):
         begins.append(int(first))
@@ -407,10 +367,9 @@ def _ordered(rows: NDArray, time_s: NDArray) -> Run:
 
 def _lead(time: NDArray) -> int:
     """Return the number of rows at the beginning that are long before the rest."""
-    # At most so many rows at the beginning are left out if they are long before the rest.
-    lead_rows = 5
-    steps = np.diff(time[: lead_rows + 1])
-    far = np.flatnonzero(steps > max(LEAD_S, LEAD_PERIODS * _period(time)))
+    # At most 5 rows: more of them are a run of their own. Long before is 0.2 s and 20 periods.
+    steps = np.diff(time[:6])
+    far = np.flatnonzero(steps > max(0.2, 20 * period(time)))
     return int(far[-1]) + 1 if len(far) else 0
 
 

@@ -11,12 +11,8 @@ from scipy.signal import argrelmin, correlate
 
 from pipelines.importing.quantities.consistency import whole_rows
 
-DIFFERENT = 0.5
-"""Half mean squared difference, in variances, above which a motion differs from its beginning."""
 SIMILAR = 0.5
-"""The same, below which it may repeat."""
-AS_GOOD = 3.0
-"""Factor on the least difference up to which a shorter lag is preferred."""
+"""Half mean squared difference, in variances, below which a motion may repeat."""
 
 
 def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
@@ -40,7 +36,9 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     # Difference of the median pair of neighbouring periods of a periodic motion: 3 % in rms. Drives
     # repeat their errors, too. A machine that swings freely does not repeat so well.
     repeats = 5e-4
-    # Factor on the least difference up to which a lag of fewer digits is preferred.
+    # Factor on the least difference up to which a shorter lag is preferred.
+    as_good = 3.0
+    # The same for a lag of fewer digits.
     as_round = 1.1
     # Difference due to a sensor's resolution and interpolation alone.
     equal = 1e-8
@@ -71,27 +69,19 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         return None
     # The shortest that is nearly as good, because every multiple of a period repeats, too.
     lag, least = min(
-        (lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, equal)
+        (lag, difference) for lag, difference in near if difference <= max(as_good * best, equal)
     )
     # Periods are planned as round numbers; noise moves only the last digits.
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
     limit = max(as_round * least, equal)
-    as_good = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
-    return next(as_good, float(f"{step * lag:.6g}"))
+    near_enough = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
+    return next(near_enough, float(f"{step * lag:.6g}"))
 
 
 def _mean_differences(columns: NDArray) -> NDArray:
     """Return half the mean squared difference at each lag up to half the run, of the worst joint.
 
-    Parameters
-    ----------
-    columns : (n, k) array
-        Motion of k joints, scaled to variance 1.
-
-    Returns
-    -------
-    (n // 2 + 1,) array
-        Difference in variances.
+    The motion of k joints, (n, k), has variance 1; so has the unit of the result, (n // 2 + 1,).
     """
     n = len(columns)
     lags = np.arange(n // 2 + 1)
@@ -107,11 +97,11 @@ def _mean_differences(columns: NDArray) -> NDArray:
 
 
 def _candidates(differences: NDArray) -> list[float]:
-    """Return the lags of minima below SIMILAR after the first above DIFFERENT, the best first."""
+    """Return the lags of minima below SIMILAR after the first lag above it, the best first."""
     # Greatest number of lags that are refined.
     most_lags = 100
     # A smooth motion resembles itself at short lags, without any period.
-    different = np.flatnonzero(differences > DIFFERENT)
+    different = np.flatnonzero(differences > SIMILAR)
     if not len(different):
         return []
     # Infinity after the last lag, so that a period of half the run can be a minimum.
@@ -124,14 +114,8 @@ def _median_difference(columns: NDArray, lag: float) -> float:
     """Return the difference of neighbouring periods without their means, the median of all pairs.
 
     Periods are cut from the middle of the run, as ramps are at its ends. The median is robust
-    against a ramp or a fault in some of them.
-
-    Parameters
-    ----------
-    columns : (n, k) array
-        Motion of k joints.
-    lag : float
-        Length of a period in samples; values between samples are interpolated.
+    against a ramp or a fault in some of them. The lag is the length of a period in samples; values
+    between samples are interpolated.
     """
     # Share of the variance below which a period has too little motion to be compared.
     at_rest = 0.01

@@ -60,45 +60,13 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
 def check_counter(register: Register, name: str) -> None:
     """Refuse a counter whose raw value is not the count, as its wraparound is then unknown.
 
-    Parameters
-    ----------
-    register : Register
-        The counter.
-    name : str
-        Its place in the file, for the message.
-
     Raises
     ------
     ValueError
-        It has a scale, an offset or a sign.
+        It has a scale, an offset or a sign; names its place in the file.
     """
-    if not register.is_plain_count:
+    if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or offset"
-        )
-
-
-def check_no_gap(block: Settings, name: str) -> None:
-    """Refuse a block with unnamed registers, as writing the block would overwrite them.
-
-    Parameters
-    ----------
-    block : Settings
-        Registers by quantity.
-    name : str
-        Its place in the file, for the message.
-
-    Raises
-    ------
-    ValueError
-        Names the first register without a name.
-    """
-    # Reading a gap is harmless. Writing 0 to an unknown register may change the drive's settings.
-    named = {address for register in registers_of(block).values() for address in register.addresses}
-    unnamed = sorted(set(range(min(named), max(named))) - named)
-    if unnamed:
-        raise ValueError(
-            f"{name}: register {unnamed[0]} between {min(named)} and {max(named)} has no name,"
-            " expected a block without gaps, as it is written as a whole"
         )

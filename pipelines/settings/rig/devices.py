@@ -1,18 +1,13 @@
 """The drives, their loops and the force sensors of a rig, and the line that each is on."""
 
-from collections.abc import Mapping
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from pipelines.settings.base import Positive, Settings
-from pipelines.settings.rig.line import LineSettings, TcpLine
 from pipelines.settings.rig.with_human import TIGHTER, check_tighter, limits_in_force
 
 JointName = Literal["hip", "knee"]
-
-MOST_EVERY = 1000
-"""Most cycles between two readings of a sensor, the longest watchdog at 1000 a second."""
 
 
 class DeviceSettings(Settings):
@@ -31,12 +26,6 @@ class DeviceSettings(Settings):
             if self.line is not None and key in self.model_fields_set:
                 raise ValueError(f"{key}: found together with line = {self.line!r}; remove one")
         return self
-
-    def line_among(self, lines: Mapping[str, LineSettings]) -> LineSettings:
-        """Return the line that it is on: one of the shared ones, else its own by TCP."""
-        if self.line is None:
-            return TcpLine(host=self.host, port=self.port)
-        return lines[self.line]
 
 
 class HumanDriveSettings(Settings):
@@ -92,8 +81,9 @@ class SensorSettings(DeviceSettings):
     cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(
         description="Where it sits."
     )
+    # 1000 cycles are the longest watchdog at 1000 cycles a second.
     every: int = Field(
-        1, ge=1, le=MOST_EVERY, description="Cycles between two readings; equal ones take turns."
+        1, ge=1, le=1000, description="Cycles between two readings; equal ones take turns."
     )
 
 

@@ -2,8 +2,7 @@
 
 from pydantic import Field
 
-from pipelines.settings.base import Settings
-from pipelines.settings.physical_bounds import Gravity, Length
+from pipelines.settings.base import Gravity, Length, Settings
 
 
 class GeometrySettings(Settings):

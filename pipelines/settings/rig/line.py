@@ -50,17 +50,12 @@ class NetworkLine(Line):
         return self.silence_s
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time of a request and its reply; that of the network is unknown.
+        """Return the least time of a request and its reply, s; that of the network is unknown.
 
         Parameters
         ----------
         characters : int
             Of both together.
-
-        Returns
-        -------
-        float
-            s.
         """
         return self.quiet_s
 
@@ -157,17 +152,12 @@ class RtuLine(Line):
         return 3.5 * self._character_s if self.baud_rate <= fixed_silence_baud else fixed_silence_s
 
     def exchange_s(self, characters: int) -> float:
-        """Return the least time of a request and its reply.
+        """Return the least time of a request and its reply, s.
 
         Parameters
         ----------
         characters : int
             Of both together.
-
-        Returns
-        -------
-        float
-            s.
         """
         # One silence before the request, one before the reply.
         return characters * self._character_s + 2 * self.quiet_s

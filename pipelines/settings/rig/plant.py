@@ -4,8 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from pipelines.settings.base import NotNegative, Positive, Settings
-from pipelines.settings.physical_bounds import Gravity, Length
+from pipelines.settings.base import Gravity, Length, NotNegative, Positive, Settings
 
 Pair = tuple[float, float]
 Four = tuple[float, float, float, float]

@@ -90,30 +90,15 @@ class Register(Settings):
     @property
     def step(self) -> float:
         """Distance between the SI values of neighbouring counts; 0 for a float."""
-        return 0.0 if self.is_float else abs(self.si[0])
-
-    @property
-    def is_float(self) -> bool:
-        """Whether the bits are those of a floating-point number."""
-        return STRUCT_CODES[self.type] in "fd"
-
-    @property
-    def is_plain_count(self) -> bool:
-        """Whether it is an unsigned integer without scale and offset."""
-        return self._is_unsigned and (self.scale, self.offset) == (1.0, 0.0)
-
-    @property
-    def _is_unsigned(self) -> bool:
-        # Codes of unsigned integers are capital letters.
-        return STRUCT_CODES[self.type].isupper()
+        return 0.0 if self.counts is None else abs(self.si[0])
 
     @property
     def counts(self) -> tuple[int, int] | None:
         """The least and the greatest count of an integer; None for a float."""
-        if self.is_float:
+        if STRUCT_CODES[self.type] in "fd":
             return None
         bits = 16 * self.registers
-        if self._is_unsigned:
+        if self.type.startswith("u"):
             return 0, 2**bits - 1
         return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
 

@@ -1,12 +1,11 @@
 """``[map]`` of a rig file: which registers the drives and force sensors of a make have."""
 
-from collections import Counter
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from pipelines.settings.base import Settings
-from pipelines.settings.rig.block import check_block, check_counter, check_no_gap
+from pipelines.settings.base import Settings, repeated
+from pipelines.settings.rig.block import check_block, check_counter, registers_of
 from pipelines.settings.rig.register import Register
 from pipelines.settings.rig.ring import RingSettings
 
@@ -73,7 +72,7 @@ class DriveMap(Settings):
     def _is_consistent(self) -> Self:
         check_block(self.read, "read")
         check_block(self.write, "write")
-        check_no_gap(self.write, "write")
+        self._check_no_gap()
         self._check_faults()
         self._check_enabled_bits()
         self._check_ring_counters()
@@ -89,6 +88,19 @@ class DriveMap(Settings):
     @property
     def _masks(self) -> dict[str, int]:
         return {"fault_mask": self.fault_mask, "enabled_mask": self.enabled_mask}
+
+    def _check_no_gap(self) -> None:
+        """Refuse unnamed registers in the block that is written as a whole."""
+        # Reading a gap is harmless. Writing 0 to an unknown register may change the drive's
+        # settings.
+        registers = registers_of(self.write).values()
+        named = {address for register in registers for address in register.addresses}
+        unnamed = sorted(set(range(min(named), max(named))) - named)
+        if unnamed:
+            raise ValueError(
+                f"write: register {unnamed[0]} between {min(named)} and {max(named)} has no name,"
+                " expected a block without gaps, as it is written as a whole"
+            )
 
     def _check_faults(self) -> None:
         for name, mask in self._masks.items():
@@ -144,12 +156,11 @@ class DriveMap(Settings):
 
     def _check_control_words(self) -> None:
         words = self._control_words
-        for word, times in Counter(words.values()).items():
-            if times > 1:
-                same = " and ".join(name for name, value in words.items() if value == word)
-                raise ValueError(
-                    f"{same}: both are 0x{word:04X}, expected different control words; correct one"
-                )
+        for word in repeated(words.values()):
+            same = " and ".join(name for name, value in words.items() if value == word)
+            raise ValueError(
+                f"{same}: both are 0x{word:04X}, expected different control words; correct one"
+            )
 
     def _check_word_sizes(self) -> None:
         """Refuse words and masks that do not fit into their registers."""

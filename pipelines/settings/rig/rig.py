@@ -4,6 +4,7 @@ A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage 
 reads that.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -11,8 +12,8 @@ from pydantic import Field, model_validator
 from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
-from pipelines.settings.base import Positive, Settings, load_toml
-from pipelines.settings.rig import consistency
+from pipelines.settings.base import Positive, Settings, load_toml, repeated
+from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import (
     ControllerSettings,
     DeviceSettings,
@@ -21,8 +22,9 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings
+from pipelines.settings.rig.line import LineSettings, TcpLine
 from pipelines.settings.rig.plant import PlantSettings
+from pipelines.settings.rig.register import DIMENSION
 from pipelines.settings.rig.register_map import Maps
 from pipelines.settings.rig.safety import SafetySettings
 from pipelines.settings.rig.safety_bounds import check_safety_bounds
@@ -57,21 +59,69 @@ class RigSettings(Settings):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         # First that every name leads to a map or a line: the later checks look them up.
-        consistency.check_joints(self.drive)
-        consistency.check_maps("drive", self.drive, self.map.drive)
-        consistency.check_maps("sensor", self.sensor, self.map.sensor)
-        consistency.check_lines(self.line, (*self.drive, *self.sensor))
-        consistency.check_cuffs(self.sensor)
+        self._check_joints()
+        self._check_maps()
+        self._check_lines()
+        self._check_cuffs()
         self._check_virtual()
-        if self.sampling == "recorder":
-            consistency.check_rings(self.drive, self.map, self.record_rate_hz)
-        consistency.check_saturation(self.drive, self.controller)
+        self._check_rings()
+        self._check_saturation()
         if self.plant is None:  # a virtual rig has no wearer
             check_safety_bounds(self.drive, self.safety)
-        consistency.check_margin(self.drive, self.safety.angle_margin_rad)
-        consistency.check_set_points(self.drive, self.map, self.safety)
-        consistency.check_reach(self.drive, self.sensor, self.map, self.safety)
+        self._check_margin()
+        self._check_set_points()
+        self._check_reach()
         return self
+
+    def _check_joints(self) -> None:
+        """Refuse all but one drive for the hip, then one for the knee."""
+        joints = [drive.joint for drive in self.drive]
+        # The order matters: column 0 of every array is the hip's, column 1 the knee's.
+        if joints != ["hip", "knee"]:
+            raise ValueError(
+                f"drive: found {', '.join(joints)}, expected one for the hip, then one for the knee"
+            )
+
+    def _check_maps(self) -> None:
+        """Refuse a device whose register map is missing."""
+        for kind in ("drive", "sensor"):
+            maps = getattr(self.map, kind)
+            for i, device in enumerate(getattr(self, kind)):
+                if device.map not in maps:
+                    raise ValueError(
+                        f"{kind}[{i}].map: found {device.map!r}, expected a table below"
+                        f" [map.{kind}]: {', '.join(maps) or 'there is none'}"
+                    )
+
+    def _check_lines(self) -> None:
+        """Refuse missing, unused and duplicate lines, and two devices at one address."""
+        devices = (*self.drive, *self.sensor)
+        for device in devices:
+            if device.line is not None and device.line not in self.line:
+                raise ValueError(
+                    f"line: found {device.line!r} at unit {device.unit}, expected a table below"
+                    f" [line]: {', '.join(self.line) or 'there is none'}"
+                )
+        for name in self.line:
+            if name not in {device.line for device in devices}:
+                raise ValueError(
+                    f'line.{name}: no device is on it; remove it, or give one line = "{name}"'
+                )
+        # Devices take turns on each line. Two lines to one place would send requests at the same
+        # time.
+        for place in repeated(line.place for line in self.line.values()):
+            raise ValueError(
+                f"line: two lines lead to {place}; make them one, with all its devices on it"
+            )
+        for place, unit in repeated((self.line_of(one).place, one.unit) for one in devices):
+            raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
+
+    def _check_cuffs(self) -> None:
+        """Refuse two sensors at one cuff."""
+        for cuff in repeated(sensor.cuff for sensor in self.sensor):
+            raise ValueError(
+                f"sensor: found two sensors at {cuff}, expected one; correct their cuffs"
+            )
 
     def _check_virtual(self) -> None:
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
@@ -85,9 +135,92 @@ class RigSettings(Settings):
                 ' "real_time"'
             )
 
+    def _check_rings(self) -> None:
+        """Refuse to drain rings that the drives do not have, or whose rate is missing."""
+        if self.sampling == "cyclic":
+            return
+        if self.record_rate_hz is None:
+            raise ValueError(
+                "record_rate_hz: missing;"
+                ' sampling = "recorder" needs the rate of the drives\' rings'
+            )
+        for i, drive in enumerate(self.drive):
+            if self.map.drive[drive.map].ring is None:
+                raise ValueError(
+                    f'drive[{i}].map: {drive.map} has no ring, which sampling = "recorder" drains;'
+                    f' add [map.drive.{drive.map}.ring], or set sampling = "cyclic"'
+                )
+
+    def _check_saturation(self) -> None:
+        """Refuse a torque limit that a drive cannot exceed, as it saturates below."""
+        for drive in self.drive:
+            loop = self.controller.get(drive.joint)
+            if loop and loop.limit_nm is not None and drive.torque_nm >= loop.limit_nm:
+                raise ValueError(
+                    f"torque_nm: found {drive.torque_nm:g} of the {drive.joint}, expected less than"
+                    f" its controller.limit_nm ({loop.limit_nm:g}), at which the drive saturates;"
+                    " lower it"
+                )
+
+    def _check_margin(self) -> None:
+        """Refuse a distance from the limits that no set-point can keep."""
+        for drive in self.drive:
+            # Limits with a wearer are within the others.
+            low, high = drive.with_human.angle_rad or drive.angle_rad
+            half_rad = (high - low) / 2.0
+            if not self.safety.angle_margin_rad < half_rad:
+                raise ValueError(
+                    f"safety.angle_margin_rad: found {self.safety.angle_margin_rad:g}, expected"
+                    f" less than {half_rad:g}, half of the {drive.joint}'s angle_rad; lower it"
+                )
+
+    def _check_set_points(self) -> None:
+        """Refuse registers that cannot represent every set-point, or only too coarsely."""
+        following_rad = (
+            self.safety.with_human.following_error_rad or self.safety.following_error_rad
+        )
+        for drive in self.drive:
+            register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
+            if not register.holds(low, high):
+                raise ValueError(
+                    f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad,"
+                    f" the {drive.joint}'s limits; correct its type or scale"
+                )
+            low, high = drive.with_human.angle_rad or drive.angle_rad
+            # Rounding must stay a small part of the following error, or a leg that follows well is
+            # stopped.
+            coarsest = min(following_rad, high - low) / 4.0
+            if register.step > coarsest:
+                raise ValueError(
+                    f"map.drive.{drive.map}.write.reference: one count is {register.step:.3g} rad,"
+                    f" expected at most {coarsest:.3g} rad, a quarter of safety.following_error_rad"
+                    f" or of the {drive.joint}'s range; correct its scale"
+                )
+
+    def _check_reach(self) -> None:
+        """Refuse registers that end before a limit, as a value beyond it could not be seen."""
+        for drive in self.drive:
+            use, most = self.map.drive[drive.map], drive.torque_nm / drive.torque_per_ampere
+            limits = {
+                "angle": drive.angle_rad,
+                "velocity": (-drive.speed_rad_s, drive.speed_rad_s),
+                "current": (-most, most),
+            }
+            place = f"map.drive.{drive.map}"
+            _check_block_reach(f"{place}.read", use.read, limits, drive.joint)
+            if use.ring:
+                _check_block_reach(f"{place}.ring.record", use.ring.record, limits, drive.joint)
+        force = (-self.safety.cuff_force_n, self.safety.cuff_force_n)
+        limits = dict.fromkeys(("force_x", "force_y", "force_z"), force)
+        for sensor in self.sensor:
+            block = self.map.sensor[sensor.map].read
+            _check_block_reach(f"map.sensor.{sensor.map}.read", block, limits, sensor.cuff)
+
     def line_of(self, device: DeviceSettings) -> LineSettings:
-        """Return the line that a device is on."""
-        return device.line_among(self.line)
+        """Return the line that a device is on: a shared one, else its own by TCP."""
+        if device.line is None:
+            return TcpLine(host=device.host, port=device.port)
+        return self.line[device.line]
 
     def turn_of(self, sensor: SensorSettings) -> int:
         """Return the cycle, among its ``every``, in which a sensor is read: they take turns."""
@@ -139,11 +272,8 @@ class RigSettings(Settings):
 
     def known_geometry(self) -> dict[str, float]:
         """Return the known lengths of the leg; a virtual rig's plant fills in the others."""
-        plant = (
-            {name: getattr(self.plant, name) for name in GeometrySettings.model_fields}
-            if self.plant
-            else {}
-        )
+        lengths = set(GeometrySettings.model_fields)
+        plant = self.plant.model_dump(include=lengths) if self.plant else {}
         # Measured lengths of the file count more than those of the plant.
         return plant | self.geometry.model_dump(exclude_none=True)
 
@@ -172,11 +302,6 @@ class RigSettings(Settings):
 def load_rig(path: Path | str) -> RigSettings:
     """Return the rig in a file; names of files in it are relative to its folder.
 
-    Parameters
-    ----------
-    path : Path or str
-        A rig file.
-
     Raises
     ------
     SettingsError
@@ -186,3 +311,24 @@ def load_rig(path: Path | str) -> RigSettings:
     # Only here, as the settings themselves do not know in which folder their file is.
     lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
     return rig.model_copy(update={"line": lines})
+
+
+def _check_block_reach(
+    place: str, block: Settings, limits: Mapping[str, tuple[float, float]], owner: str
+) -> None:
+    """Refuse a register that cannot represent a value beyond both limits, SI."""
+    registers = registers_of(block)
+    for quantity, (lowest, highest) in limits.items():
+        register = registers.get(quantity)
+        if register is None:
+            continue
+        low, high = register.span
+        # Strictly: a register that ends at the limit saturates there, so its value never breaks the
+        # limit.
+        if not (low < lowest and highest < high):
+            unit = DIMENSION[quantity][0]
+            raise ValueError(
+                f"{place}.{quantity}: this {register.type} can represent {low:.4g} to"
+                f" {high:.4g} {unit}, but the {owner}'s limits are {lowest:.4g} to"
+                f" {highest:.4g} {unit}; correct its type or scale, or lower the limits"
+            )

@@ -1,6 +1,6 @@
 """Bounds of the limits themselves: on a rig for a wearer, wider limits protect nobody."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from math import pi
 
 from pipelines.settings.rig.devices import DriveSettings
@@ -18,7 +18,7 @@ SAFETY = {
 """The most that each may be."""
 
 
-def check_safety_bounds(drives: Iterable[DriveSettings], safety: SafetySettings) -> None:
+def check_safety_bounds(drives: Sequence[DriveSettings], safety: SafetySettings) -> None:
     """Refuse limits that are too wide to protect a wearer.
 
     Raises
@@ -26,7 +26,6 @@ def check_safety_bounds(drives: Iterable[DriveSettings], safety: SafetySettings)
     ValueError
         Naming the first such limit, its value and its bound.
     """
-    drives = tuple(drives)
     for i, drive in enumerate(drives):
         for name, most in DRIVE.items():
             _check_at_most(f"drive[{i}].{name}", getattr(drive, name), most)

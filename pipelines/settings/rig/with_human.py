@@ -8,14 +8,7 @@ TIGHTER = "with a wearer a limit may only be tighter"
 
 
 def check_tighter(alone: Settings, with_human: Settings, *names: str) -> None:
-    """Refuse limits of runs with a wearer above those of the others.
-
-    Parameters
-    ----------
-    alone, with_human : Settings
-        Limits of runs without and with a wearer.
-    *names : str
-        Keys to compare.
+    """Refuse limits of runs with a wearer above those of the others, by their keys.
 
     Raises
     ------

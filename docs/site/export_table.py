@@ -1,10 +1,9 @@
 """The table of docs/export.md: how each format holds each effect.
 
-``python -m pipelines.export.reference docs/export.md`` updates it; a test fails if it is outdated.
+``python docs/site/export_table.py`` updates it; a test fails if it is outdated.
 """
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +48,7 @@ def _cell(format: Format[Exported], term: Term) -> str:
 
 
 if __name__ == "__main__":
-    page = Path(sys.argv[1])
+    page = Path(__file__).parents[1] / "export.md"
     text = page.read_text(encoding="utf-8")
     between = re.compile(f"(?<={re.escape(BEGIN)}\n).*?(?={re.escape(END)})", re.DOTALL)
     page.write_text(between.sub(lambda old: f"\n{table()}\n\n", text), encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pipelines.export.reference import table
+from docs.site.export_table import table
 
 
 def test_the_page_holds_the_table_that_the_formats_give():
