@@ -34,7 +34,9 @@ def bring_up_to_date(
     """
     from pipelines.workflow.freshness import Judge
 
-    judge, results, skipped = Judge(folder.out), [], []
+    judge = Judge(folder.out)
+    results: list[dict[str, Any]] = []
+    skipped: list[tuple[Step, str]] = []
     for step in folder.steps:
         judged = judge.judge(step)
         if step not in wanted or (judged.done and not again):
