@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from tests.campaigns.bench import (
     bench_acquire,
     bench_all,
+    bench_at_once,
     bench_design,
     bench_diagnose,
     bench_import,
@@ -26,3 +27,4 @@ show("the operator's view", bench_operator_view.rows())
 show("exoid filter and identify", bench_stream.rows())
 show("exoid import", bench_import.rows())
 show("make all", bench_all.rows())
+show("four commands at once", bench_at_once.rows())
