@@ -52,7 +52,7 @@ def design(
     if not evaluate and not output:
         folder = open_experiment(config, problem="neither -o FILE nor --evaluate FILE is given")
         # With other options than its settings, a design is no step of the experiment.
-        if criterion is harmonics is seed is None:
+        if all(option is None for option in (criterion, harmonics, seed)):
             run_stages(context, folder, "design", again=again)
             return
         output = folder.step("design").target

@@ -65,7 +65,7 @@ def simulate(
     if parameters is None:
         folder = open_experiment(config, problem="no parameters are given")
         # Nothing is given, so the steps of the experiment are meant.
-        if output is run is reference is replay is None:
+        if all(option is None for option in (output, run, reference, replay)):
             run_stages(context, folder, "simulate", "replay", again=again)
             return
         parameters = folder.step("identify").target

@@ -217,9 +217,9 @@ def _models(pair: tuple[Session, Session]) -> Iterator[dict[str, Any]]:
         if one and other:
             a, b = estimates(first.table(one)), estimates(second.table(other))
             files = (first.shown(one.path), second.shown(other.path))
-            _refuse_different_units(changes(a, b), files)
-            only = (_only(first, a, b), _only(second, b, a))
-            yield {"title": title, "files": files, "changes": changes(a, b), "only": only}
+            only, changed = (_only(first, a, b), _only(second, b, a)), changes(a, b)
+            _refuse_different_units(changed, files)
+            yield {"title": title, "files": files, "changes": changed, "only": only}
 
 
 def _refuse_different_units(changes: list[Change], files: tuple[str, str]) -> None:
