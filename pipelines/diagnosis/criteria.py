@@ -111,16 +111,4 @@ HELD = (
 - The others decide which probabilities and errors are reported, and whether all runs are searched.
 """
 
-LEARNED = """\
-They were learned from 335 sessions of seeds from 210000 on. They were learned again from 177
-sessions whose evidence was stored by revision 1b85b45 (`python -m tests.campaigns.learn fit --most
-60`). The mean log probability of the truth was then -1.29 instead of -1.48 in these sessions, and
--1.56 instead of -1.57 in 356 others. So their values were kept. But `cause` is lower by ln(3/2): a
-cause chooses among two prior sizes now, and chose among three before. `look_alike` was learned from
-the 97 causes that were named in 155 sessions of seeds from 505000 and 508000 on. On these same
-causes it raises the mean log probability of the truth from -0.54 to -0.20, and lowers the Brier
-score from 0.079 to 0.060.
-"""
-"""Sessions from which the criteria were learned, for docs/criteria.md."""
-
 CRITERIA = Criteria()

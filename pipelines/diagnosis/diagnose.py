@@ -22,9 +22,6 @@ from pipelines.diagnosis.selection.selection import nothing_selected, select
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 
-FIT_SHARE = 0.75
-"""Position of the progress bar at which the fit begins."""
-
 
 def diagnose(
     motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
@@ -59,7 +56,9 @@ def diagnose(
     data = training_data(motions, known)
     prepared = prepare(data.train, data.baseline)
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
-    report(FIT_SHARE, "fit")
+    # Position of the progress bar at which the fit begins.
+    fit_share = 0.75
+    report(fit_share, "fit")
     scheme = HoldOut.of(data.train, data.validate, data.baseline)
     judged = judged_fit(selected, scheme, prepared.noise)
     # An error above the noise may mean that the training runs alone show too little.
@@ -69,6 +68,6 @@ def diagnose(
             prepared.noise,
             judged,
             # Its shares lie between the fit and the end.
-            lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what),
+            lambda share, what: report(fit_share + (1.0 - fit_share) * share, what),
         )
     return Diagnosis.of(data, prepared.noise, judged)

@@ -19,8 +19,6 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
 
-WHY = {"train": "the model is fitted there", "validate": "the gain is measured there"}
-
 
 @dataclass(frozen=True)
 class TrainingData:
@@ -71,7 +69,8 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     if noisy:
         runs = [observe(motion, CUTOFF_HZ) for motion in valid]
     train, validate = (
-        tuple(run for run in runs if run.motion.purpose == purpose) for purpose in WHY
+        tuple(run for run in runs if run.motion.purpose == purpose)
+        for purpose in ("train", "validate")
     )
     # A spoilt session gets a verdict on its faults instead of an error about its noise.
     if not any(fault.spoils for fault in faults):
@@ -89,7 +88,8 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
 def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
     """Raise InputError without a training or a validation run, or with a kind to validate only."""
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
-    for purpose, why in WHY.items():
+    reasons = {"train": "the model is fitted there", "validate": "the gain is measured there"}
+    for purpose, why in reasons.items():
         if not any(m.purpose == purpose for m in motions):
             raise InputError(
                 f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"

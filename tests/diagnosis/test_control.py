@@ -9,7 +9,7 @@ import pytest
 from pipelines.contracts import HIP_AND_KNEE
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict.control_benefit import CASE, control
+from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
 from pipelines.effects.baseline import Friction, RigidBody
@@ -18,6 +18,7 @@ from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 from pipelines.settings.rig.plant import PlantSettings
+from pipelines.settings.simulate import SimulateSettings
 from tests.diagnosis.naming import missing, naming
 from tests.diagnosis.sessions import session
 
@@ -44,13 +45,15 @@ def true_loop():
         ),
         Term(spring, spring.values_from(np.array(list(SPRING.values())))),
     )
-    return track(make_plant(Model(terms), Geometry(), HIP_AND_KNEE, "with_human"), CASE, gait())
+    return track(
+        make_plant(Model(terms), Geometry(), HIP_AND_KNEE, "with_human"), SimulateSettings(), gait()
+    )
 
 
 @pytest.mark.slow
 def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
     loop, true = control(sprung), true_loop()
-    settled = true.time >= CASE.settled_after_s
+    settled = true.time >= SimulateSettings().settled_after_s
     rms = np.sqrt(np.mean(true.error[settled] ** 2, axis=0))
     peak = np.abs(true.run.torque[settled]).max(axis=0)
     assert (loop["run"], loop["reason"]) == ("with_human", None)

@@ -51,7 +51,7 @@ def test_above_the_motion_noise_is_known_through_gaps(share):
             length = int(rng.integers(10, 50))
             x[at : at + length] = 0.3 * rng.normal(size=len(x[at : at + length]))
             at += length + int(rng.exponential(30.0 * (1.0 / share - 1.0)))
-        densities.append(_spectrum_of([x], RATE_HZ, (4.0, 8.0), np.array([0.2]))[0])
+        densities.append(_spectrum_of([x], RATE_HZ, (4.0, 8.0), 0.2)[0])
     assert 0.7 * true < np.median(densities) < 1.8 * true
     assert np.all((np.array(densities) > 0.1 * true) & (np.array(densities) < 10.0 * true))
 

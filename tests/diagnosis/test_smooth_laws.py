@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from pipelines.contracts.verdict import Verdict
-from pipelines.diagnosis.candidates.smooth_laws import ACROSS, Spans, smooth_laws
+from pipelines.diagnosis.candidates.smooth_laws import Spans, smooth_laws
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import banded, session
 
 STEP = 1e-5
-LABEL = f"law:{ACROSS}"
+LABEL = "law:across_joints"
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,9 @@ def across(run, spans, q):
     """Return the torques of the law's parts, (m, 2, k) N·m, where a run's angles are others."""
     moved = replace(run, state=(q, *run.state[1:]))
     laws, columns = smooth_laws(moved, spans, np.zeros_like(q))
-    return columns[:, :, [law.kind == ACROSS for law in laws]] * spans.torque[:, np.newaxis]
+    return (
+        columns[:, :, [law.kind == "across_joints" for law in laws]] * spans.torque[:, np.newaxis]
+    )
 
 
 def test_its_torques_are_the_slopes_of_an_energy(prepared):

@@ -18,9 +18,6 @@ NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
 """Units of quantities that are counted along a joint's travel."""
-WAVES = 1.5
-"""Fewest waves of a ripple within the swept angles. With fewer it does not repeat, and together
-with a spring it fits any function of the angle."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +219,10 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
     j = runs[0].motion.joints.index(effect.joint)
     # All runs share the wave, so the one with the widest sweep decides.
     swept = max(float(np.ptp(run.state[0][:, j])) for run in runs)
-    return WAVES * 2.0 * np.pi / swept
+    # Fewest waves of a ripple within the swept angles. With fewer it does not repeat, and
+    # together with a spring it fits any function of the angle.
+    fewest_waves = 1.5
+    return fewest_waves * 2.0 * np.pi / swept
 
 
 def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:

@@ -18,11 +18,6 @@ from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
 
-LONGEST_STEP = 0.5
-"""Angle of a wave from block to block, rad, above which block averages do not follow it."""
-RIDGE = 1e-10
-"""Relative to a column's square: keeps a refit of nearly dependent columns finite."""
-
 
 class CandidateRows:
     """Computes weighted rows (N, k) of candidates; nothing is projected out."""
@@ -112,7 +107,9 @@ class CandidateRows:
         cycles = max(
             value for p, value in zip(shapes, candidate.shapes[0], strict=True) if p.unit in TURNS
         )
-        return cycles * self._steps[joint] > LONGEST_STEP
+        # Angle of a wave from block to block, rad, above which block averages do not follow it.
+        longest_step_rad = 0.5
+        return cycles * self._steps[joint] > longest_step_rad
 
     def _transformed(self, candidate: Candidate, others: NDArray | None) -> NDArray:
         """Return the change of the transformed baseline against the plain one, at its own values.
@@ -166,5 +163,7 @@ def _least_squares(rows: NDArray, target: NDArray) -> NDArray:
     """Return the coefficients (k,) with which rows (N, k) come nearest to a target (N,)."""
     gram = rows.T @ rows
     size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    scaled = gram / np.outer(size, size) + RIDGE * np.eye(len(size))
+    # Relative to a column's square: keeps a refit of nearly dependent columns finite.
+    ridge = 1e-10
+    scaled = gram / np.outer(size, size) + ridge * np.eye(len(size))
     return np.asarray(np.linalg.solve(scaled, rows.T @ target / size) / size)

@@ -10,9 +10,6 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.shape_refinement import CandidateFit
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 
-RANK = 1e-6
-"""Relative size below which a direction of a cause's columns adds nothing to the larger ones."""
-
 
 @dataclass(frozen=True)
 class Cause:
@@ -69,7 +66,10 @@ class Cause:
         _, size, turned = np.linalg.svd(
             regression.shares(fitted.columns) * typical, full_matrices=False
         )
-        kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)
+        # Relative size below which a direction of a cause's columns adds nothing to the larger
+        # ones.
+        negligible = 1e-6
+        kept = size > negligible * max(size.max(initial=0.0), np.finfo(float).tiny)
         if not kept.any():
             return None
         amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]

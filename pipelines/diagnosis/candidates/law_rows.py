@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates.quantisation import coarse_step, rounding
 from pipelines.diagnosis.candidates.smooth_laws import (
     HUM,
-    IN_CUFFS,
     QUANTISATION,
     Curve,
     LawColumn,
@@ -59,8 +58,9 @@ def law_rows(
     if "with_human" in kinds and (len(kinds) == 2 or has_cuffs):
         parts.append(([replace(law, wearer="human") for law in laws], _both(worn, worn)))
     if has_cuffs:
-        # Cuff forces may be wrong where the drives' torque is right.
-        chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
+        # Laws of cuff forces, which may be wrong where the drives' torque is right.
+        kinds_in_cuffs = "angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load"
+        chosen = [i for i, law in enumerate(laws) if law.kind in kinds_in_cuffs]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
     parts += [*_hums(prepared), *_coarse_steps(prepared, joints)]

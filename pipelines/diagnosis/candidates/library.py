@@ -30,10 +30,6 @@ from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import EFFECTS, Effect
 from pipelines.wording.law import law_label
 
-ALTERNATIVES = 2
-"""Shapes of a cause besides its best one."""
-SWEEPS = 2
-"""Number of times that the causes of a set are refined in turn."""
 Report = Callable[[float, str], None]
 
 
@@ -122,7 +118,8 @@ class Library:
         if not shaped or len(refined_causes) + len(laws) < 2:
             return None
         rows = [self._law(label) for label in laws]
-        for _ in range(SWEEPS):
+        # Twice, because each shape depends on those of the other causes.
+        for _ in range(2):
             for n in shaped:
                 others = [
                     np.hstack([c.columns, c.derivative])
@@ -241,14 +238,16 @@ def _shapes(
         return []
     swings = fits[0].candidate.effect.swings
     best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
+    # Shapes of a cause besides its best one.
+    alternatives = 2
     # A refinement may end far from its start, and it is unknown which start of a transmission led
     # to the best shape.
-    others = others_of(fits, best if swings else fits[0], ALTERNATIVES)
+    others = others_of(fits, best if swings else fits[0], alternatives)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, is_best_shape=True)]
     none = np.zeros((len(slopes), 0))
     shaped += [
-        Cause.of(other, none, regression, is_best_shape=False) for other in others[:ALTERNATIVES]
+        Cause.of(other, none, regression, is_best_shape=False) for other in others[:alternatives]
     ]
     return [cause for cause in shaped if cause is not None]
 

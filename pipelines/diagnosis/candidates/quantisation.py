@@ -16,10 +16,6 @@ FINEST, COARSEST = 0.1, 2.0
 three percent of it."""
 REACH = 3.0
 """Torque on either side of its median in which the step is sought, in the same unit."""
-BINS = 1024
-"""Bins of torque within that reach: 17 in the finest step."""
-PEAKS = 4
-"""Steps tried within the width of a line."""
 STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
 """Number of steps within the reach that differ by at least the width of a line."""
 
@@ -60,12 +56,16 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     x, y = np.concatenate(torque), np.concatenate(residual)
     if not len(x) or not rms > 0.0:
         return None
-    # Bins first: each step then costs the same, however long the recordings are.
     middle = float(np.median(x))
-    edges = middle + rms * np.linspace(-REACH, REACH, BINS + 1)
+    # Bins of torque within the reach: 17 in the finest step. Each step then costs the same, however
+    # long the recordings are.
+    bins = 1024
+    edges = middle + rms * np.linspace(-REACH, REACH, bins + 1)
     counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=y)[0]
+    # Steps tried within the width of a line.
+    per_line = 4
     # Far from zero the phase of a line turns faster with its step.
-    count = round(PEAKS * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
+    count = round(per_line * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
     # Even spacing in 1 / h, because all lines have the same width there.
     per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms
     waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))

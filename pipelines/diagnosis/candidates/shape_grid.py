@@ -22,16 +22,8 @@ from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect, Parameter
 
-VALUES = 8
-"""Values of a shape parameter in a grid."""
 BENDING = 2
 """Values of a shape parameter to which the effect is nearly proportional."""
-SLOW_WAVES = 4.0
-"""Multiple of the fewest waves of a ripple, up to which block averages are searched for one."""
-OSCILLATING = {"Hz", *TURNS}
-"""Units of parameters along which an effect has many maxima."""
-APART = 2
-"""Least distance between two maxima along an oscillating parameter, in grid steps."""
 
 
 def screened(
@@ -97,13 +89,15 @@ def others_of(fits: Sequence[CandidateFit], chosen: CandidateFit, most: int) -> 
 
 def _differ(effect: Effect, one: Candidate, other: Candidate) -> bool:
     """Return whether two shapes differ by more than a refinement can follow."""
+    # Least distance between two maxima along an oscillating parameter, in grid steps.
+    grid_steps = 2
     for parameter, a, b in zip(effect.shape, one.shapes[0], other.shapes[0], strict=True):
         low, high = parameter.typical
         if parameter.forms:
             apart = a != b
-        elif parameter.unit in OSCILLATING:
+        elif parameter.unit in {"Hz", *TURNS}:
             step = TONE_STEP_HZ if parameter.unit == "Hz" else parameter.grain
-            apart = abs(a - b) > APART * step
+            apart = abs(a - b) > grid_steps * step
         else:
             apart = abs(a - b) > 0.4 * (high - low)
         if apart:
@@ -115,19 +109,23 @@ def _grid(
     effect: Effect, runs: Sequence[Run], regression: DecisionRegression
 ) -> Iterator[tuple[float, ...]]:
     """Yield the shapes to try."""
+    # Values of a shape parameter in a grid.
+    most = 8
     # A rhythm has too many maxima for a grid. A periodogram shows all of them at once.
     if [p.unit for p in effect.shape] == ["Hz"]:
-        yield from ((f,) for f in _rhythms(effect, runs, regression))
+        yield from ((f,) for f in _rhythms(effect, runs, regression)[:most])
         return
-    few = BENDING if transforms_motion(effect) and not effect.swings else VALUES
+    few = BENDING if transforms_motion(effect) and not effect.swings else most
     yield from itertools.product(*(_tried(effect, p, few, runs) for p in effect.shape))
 
 
 def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) -> NDArray:
     values = values_in(effect, parameter, few, runs)
     least = lowest(effect, parameter, runs)
+    # Multiple of the fewest waves of a ripple, up to which block averages are searched for one.
     # Faster waves are lines, known at the full sampling rate.
-    most = SLOW_WAVES * least if parameter.unit in TURNS else np.inf
+    slow_waves = 4.0
+    most = slow_waves * least if parameter.unit in TURNS else np.inf
     return values[(values >= least) & (values <= most)]
 
 
@@ -205,7 +203,7 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
         power += np.abs(np.exp(1j * angle) @ level) ** 2 / len(time)
     inside = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])
     peaks = 1 + np.flatnonzero(inside)
-    return tried[peaks[np.argsort(-power[peaks])[:VALUES]]].tolist()
+    return tried[peaks[np.argsort(-power[peaks])]].tolist()
 
 
 def _from_the_begin(effect: Effect, runs: int) -> Candidate:

@@ -17,28 +17,10 @@ from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.effects import Parameter
 
-STEPS = 3
-"""Largest number of steps."""
-LENGTHS = 3
-"""Number of lengths at which a step is tried, until one gains."""
-SHORTER = 0.3
-"""Factor from each of these lengths to the next."""
 ENOUGH = 0.2
 """Log likelihood that a step must gain to be followed by another."""
-DIFFERENCE = 0.02
-"""Step of a difference quotient, in the shape's own unit of change."""
-LARGEST_STEP = 0.7
-"""Largest change in one step, in the shape's unit of change."""
-MARGIN, BEYOND = 0.5, 2.0
-"""Share of its typical range, and factor, by which a shape may leave that range."""
-ROUNDING = 1e-5
-"""Relative length below which a projected column is rounding error."""
-STIFFNESS = {unit_at(kind, "N·m/rad") for kind in ("revolute", "prismatic")}
-"""Units of a shape whose effect falls as it grows."""
-BODY_REFITS = 2
-"""Number of times that the rigid bodies of a simulated transmission are fitted again."""
-ONSETS, SWEEPS = 40, 3
-"""Instants tried in a run at a time, and number of passes through all runs."""
+ONSETS = 40
+"""Instants tried in a run at a time."""
 TONE_STEP_HZ = 0.01
 """Unit of change of a rhythm's frequency: that of a line over 100 s, Hz."""
 
@@ -93,9 +75,11 @@ class ShapeRefinement:
         """Return rows (N, k) less the baseline and the other causes; zero for rounding."""
         plain = self._regression.project(rows)
         plain -= self._basis @ (self._basis.T @ plain)
-        # What the baseline explains but for rounding would get an enormous amplitude.
         size = np.linalg.norm(rows, axis=0)
-        return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
+        # Relative length below which a projected column is rounding error. What the baseline
+        # explains but for rounding would get an enormous amplitude.
+        rounding_error = 1e-5
+        return np.where(np.linalg.norm(plain, axis=0) > rounding_error * size, plain, 0.0)
 
     def fit(self, candidate: Candidate) -> CandidateFit | None:
         """Fit a candidate's amplitudes; return None where its rows are not finite."""
@@ -144,7 +128,7 @@ class ShapeRefinement:
         own = None if start.candidate.bodies else self.fit(self._with_own_bodies(start.candidate))
         starts = [start] if own is None else [start, own]
         best, slopes = max(map(self._refined, starts), key=lambda pair: pair[0].score)
-        for _ in range(BODY_REFITS):
+        for _ in range(2):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._others))
             refined = None if ahead is None else self._refined(ahead)
             if refined is None or refined[0].score < best.score + ENOUGH:
@@ -161,8 +145,8 @@ class ShapeRefinement:
             best = self._with_onsets(start.candidate)
             return (best or start), np.zeros((len(self._measured), 0))
         best, units = self._scaled(start), free_shapes(start.candidate)
-        slopes = self._slopes(best, units)
-        for _ in range(STEPS if units else 0):
+        slopes, most_steps = self._slopes(best, units), 3
+        for _ in range(most_steps if units else 0):
             ahead = self._step(best, slopes, units)
             if ahead is None:
                 break
@@ -183,7 +167,7 @@ class ShapeRefinement:
 
     def _with_own_bodies(self, candidate: Candidate) -> Candidate:
         """Return a transmission with rigid bodies refitted at its shape."""
-        for _ in range(BODY_REFITS):
+        for _ in range(2):
             candidate = self._rows.with_refitted_bodies(candidate, self._others)
         return candidate
 
@@ -203,7 +187,7 @@ class ShapeRefinement:
         whole = {r: self._only_in(candidate, r) for r in times}
         steps = {r: (t.max() - t.min()) / ONSETS for r, t in times.items()}
         onsets, own = [NEVER] * count, {r: np.zeros(len(self._measured)) for r in times}
-        for sweep in range(SWEEPS):
+        for sweep in range(3):
             for r, t in times.items():
                 # After the first sweep an onset is sought within one step of its last place. A run
                 # without one is searched as a whole again, as the amplitude may have changed.
@@ -251,8 +235,9 @@ class ShapeRefinement:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         if parameter.by_factors:
-            # The twist of a spring is proportional to its compliance, so the stiffness is divided.
-            value = now / amplitude if parameter.unit in STIFFNESS else now * amplitude
+            # The twist of a spring is proportional to its compliance, so a stiffness is divided.
+            of_stiffness = {unit_at(kind, "N·m/rad") for kind in ("revolute", "prismatic")}
+            value = now / amplitude if parameter.unit in of_stiffness else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
         ahead = self.fit(
@@ -271,12 +256,14 @@ class ShapeRefinement:
     def _slopes(self, fitted: CandidateFit, units: list[tuple[int, float]]) -> NDArray:
         """Return the change of the prediction by each free shape, per unit of change, (N, d)."""
         slopes = np.zeros((len(self._measured), len(units)))
+        # Step of a difference quotient, in the shape's own unit of change.
+        difference = 0.02
         for d, (i, unit) in enumerate(units):
-            step = DIFFERENCE * unit_of_change(fitted.candidate, i, unit)
+            step = difference * unit_of_change(fitted.candidate, i, unit)
             moved = self._rows(fitted.candidate.moved(i, step), self._others)
             if moved is not None and moved.shape == fitted.columns.shape:
                 # Amplitudes are held: this is the slope of the prediction, per unit of change.
-                slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / DIFFERENCE
+                slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / difference
         return slopes
 
     def _step(
@@ -290,8 +277,9 @@ class ShapeRefinement:
         remainder = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
         solution, _ = _solved(plain, remainder)
         # Only the slopes' coefficients are used: amplitudes are fitted again at each new shape.
+        # Three lengths are tried, each 0.3 of the one before, until one gains.
         length = 1.0
-        for _ in range(LENGTHS):
+        for _ in range(3):
             candidate = fitted.candidate
             steps = length * solution[len(solution) - len(units) :]
             for (i, unit), step in zip(units, steps, strict=True):
@@ -299,7 +287,7 @@ class ShapeRefinement:
             ahead = self.fit(self._following(candidate))
             if ahead is not None and ahead.gain_as_is > fitted.gain_as_is:
                 return ahead
-            length *= SHORTER
+            length *= 0.3
         return None
 
 
@@ -399,13 +387,15 @@ def changed(
     unit : float
         Unit of change; zero for a change by factors.
     step : float
-        In units of change, at most ``LARGEST_STEP`` either way.
+        In units of change; a larger one than 0.7 either way is cut.
     runs : sequence of int, optional
         Runs that change; all by default.
     """
     parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
+    # Largest change in one step, in the shape's unit of change.
+    largest = 0.7
     # Slopes are local, and a full step may lead far beyond their validity.
-    step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))
+    step = float(np.clip(step, -largest, largest))
     value = now + step * unit if unit else now * np.exp(step)
     return candidate.reshaped(i, float(np.clip(value, *reach(parameter))), runs)
 
@@ -414,8 +404,12 @@ def reach(parameter: Parameter) -> tuple[float, float]:
     """Return the least and the greatest value to which a shape is refined, in its unit."""
     low, high = parameter.typical
     if not _unit_of(parameter):
-        return low / BEYOND, high * BEYOND
-    beyond = MARGIN * (high - low)
+        # Factor by which a shape that changes by factors may leave its typical range.
+        factor = 2.0
+        return low / factor, high * factor
+    # Share of its typical range by which any other shape may leave it.
+    margin = 0.5
+    beyond = margin * (high - low)
     if low >= 0.0:
         return max(low - beyond, 0.0), high + beyond  # a delay is never negative
     return low - beyond, high + beyond

@@ -17,16 +17,6 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.wording.law import law_label
 
-IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
-"""Laws by which cuff forces alone may have small errors."""
-WANDER_HZ = 0.5
-"""Highest frequency of each run's own curves of time, Hz."""
-MOST_CURVES = 80
-"""Largest number of curves of time in one run."""
-WANDER_CORNER_HZ = 0.1
-"""Corner above which the power of a wandering torque falls, as of a random walk, Hz."""
-
-
 TIME = "time"
 """The law whose columns are each run's own curves of time."""
 HUM = "hum"
@@ -35,10 +25,6 @@ BURSTS = "bursts"
 """The law of knocks at random times. It has no columns: its evidence is in the scatter."""
 QUANTISATION = "quantisation"
 """The law of a torque that is reported in coarse steps: its column is the rounding error."""
-ACROSS = "across_joints"
-"""The law of an elastic energy of both angles, as of a muscle or a band over two joints."""
-ACROSS_DEGREE = 4
-"""Highest degree of its elastic energy."""
 
 
 @dataclass(frozen=True)
@@ -133,10 +119,11 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
             # Real laws are smooth: the prior variance falls with the degree.
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
             parts.append((j, column))
-    # The energy is a polynomial in two angles, so other machines have no such law.
+    # An elastic energy of both angles, as of a muscle or a band over two joints. It is a polynomial
+    # in two angles, so other machines have no such law.
     if joints == 2:
         for degree, pulls in _across_joints(_scaled_angle(run, spans), spans):
-            laws.append(LawColumn(ACROSS, None, "all", 1.0 / (1.0 + degree)))
+            laws.append(LawColumn("across_joints", None, "all", 1.0 / (1.0 + degree)))
             parts.append((slice(None), pulls))
     columns = np.zeros((len(run.time), joints, len(parts)))
     for k, (at, column) in enumerate(parts):
@@ -162,16 +149,18 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     polynomials of the scaled angles ``x`` (m, 2), those of one angle alone among them; the larger
     torque of each is of order one.
     """
-    every = np.eye(ACROSS_DEGREE + 1)
+    # Highest degree of the elastic energy.
+    highest_degree = 4
+    every = np.eye(highest_degree + 1)
     value, slope = legval(x, every), legval(x, legder(every))
-    degree = np.arange(ACROSS_DEGREE + 1)
+    degree = np.arange(highest_degree + 1)
     # Rms of each polynomial and of its slope over the whole range.
     rms, steep = 1.0 / np.sqrt(2.0 * degree + 1.0), np.sqrt(0.5 * degree * (degree + 1.0))
     # Dividing by half the range makes the slope one by the angle itself, by the torque a share.
     units = spans.half_range * spans.torque
     for a, b in product(degree, degree):
         # Degree 0 has no torque. Degree 1 has a constant one, as the law of a joint's angle has.
-        if 2 <= a + b <= ACROSS_DEGREE:
+        if 2 <= a + b <= highest_degree:
             pulls = (
                 np.column_stack([slope[a, :, 0] * value[b, :, 1], value[a, :, 0] * slope[b, :, 1]])
                 / units
@@ -265,9 +254,15 @@ def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
     """
     elapsed = run.time - run.time[0]
     duration = float(elapsed[-1]) + 1e-6
+    # Highest frequency of each run's own curves of time, Hz.
+    highest_hz = 0.5
+    # Largest number of curves of time in one run.
+    most_curves = 80
     # Curve k has k half waves, and so the frequency k / (2 duration).
-    k = np.arange(min(MOST_CURVES, int(2.0 * WANDER_HZ * duration)) + 1)
+    k = np.arange(min(most_curves, int(2.0 * highest_hz * duration)) + 1)
     curves = np.cos(np.pi * np.outer(elapsed / duration, k))
+    # Corner above which the power of a wandering torque falls, as of a random walk, Hz.
+    corner_hz = 0.1
     # A random walk's power falls with the square of the frequency above the corner.
-    variance = 1.0 / (1.0 + (k / (2.0 * duration * WANDER_CORNER_HZ)) ** 2)
+    variance = 1.0 / (1.0 + (k / (2.0 * duration * corner_hz)) ** 2)
     return curves, variance / variance.sum()

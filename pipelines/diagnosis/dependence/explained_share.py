@@ -23,29 +23,6 @@ from pipelines.mechanics.machine import Machine
 if TYPE_CHECKING:
     from pipelines.diagnosis.dependence.smooth_term import Surface
 
-LONGEST_S = 2.0
-"""Largest time since a reversal that is distinguished, s."""
-PARTS = 12
-"""Number of parts of the excitation's period that are assigned to folds."""
-PADDING = 4
-"""Factor of zero padding of the spectrum in which a tone is sought."""
-LOWEST_HZ = 0.2
-"""Lowest frequency of a tone, below which it is a drift, Hz."""
-MOST = 0.5
-"""Share that a tone in step with the motion must predict. A law of the motion has many lines
-there."""
-IMITATES = 0.5
-"""Weight of the phase in the ranking. It can imitate everything that repeats, so others go
-first."""
-LITTLE = 0.05
-"""Share from which the residual is reported to depend on a variable."""
-MUCH_MORE = 1.5
-"""Factor by which two variables must predict more than one, to be reported instead of it."""
-NOTICED = 0.2
-"""Excess, as a share of the noise floor, below which its place is not reported."""
-ONE_SIDED = 4.0
-"""Ratio of squared excess between kinds of run, or files, from which it is in one of them only."""
-
 
 @dataclass(frozen=True)
 class Variable:
@@ -79,11 +56,13 @@ def _since_reversal(run: Run, j: int) -> NDArray:
     forward = run.state[1][:, j] > 0
     turned = np.flatnonzero(np.diff(forward, prepend=forward[0]))
     last = np.searchsorted(turned, np.arange(len(forward)), side="right") - 1
+    # Largest time since a reversal that is distinguished, s.
+    longest_s = 2.0
     # Before the first reversal the time since one is unknown, and counts as long.
     since = np.where(
-        last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, LONGEST_S
+        last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, longest_s
     )
-    return np.minimum(since, LONGEST_S)
+    return np.minimum(since, longest_s)
 
 
 def _load(run: Run, j: int) -> NDArray:
@@ -203,7 +182,10 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
 
 
 def _rank(dependence: Dependence) -> float:
-    return dependence.share * (IMITATES if dependence.variable == "phase" else 1.0)
+    # Weight of the phase in the ranking. It can imitate everything that repeats, so others go
+    # first.
+    of_phase = 0.5
+    return dependence.share * (of_phase if dependence.variable == "phase" else 1.0)
 
 
 def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
@@ -296,9 +278,11 @@ def parts_of_period(run: Run) -> NDArray:
     (m,) int array
         Fold of each block.
     """
-    length = (run.motion.period_s or PARTS) / PARTS
+    # Number of parts of the excitation's period that are assigned to folds.
+    parts = 12
+    length = (run.motion.period_s or parts) / parts
     # Rounding must not put a block at a border into the part before it.
-    return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
+    return np.floor(run.time / length + 1e-9).astype(int) % parts % FOLDS
 
 
 def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
@@ -344,14 +328,19 @@ def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[flo
     bool
         Whether it is in step with the motion.
     """
+    # Lowest frequency of a tone, below which it is a drift, Hz.
+    lowest_hz = 0.2
     # A tone that is no harmonic of the motion lies in what does not repeat between periods.
-    free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
+    free = _tone_in(_unrepeated, lowest_hz, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
         return (*free, False)
     above = max(above_the_motion_hz(run) for run in runs)
     # Below this frequency a law of the motion has lines that look like a tone in step.
     in_step = _tone_in(_repeated, above, runs, residuals, j)
-    return (*in_step, True) if in_step[1] > max(MOST, free[1]) else (*free, False)
+    # Share that a tone in step with the motion must predict. A law of the motion has many lines
+    # there.
+    least_share = 0.5
+    return (*in_step, True) if in_step[1] > max(least_share, free[1]) else (*free, False)
 
 
 def _tone_in(
@@ -414,7 +403,9 @@ def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) 
     width = runs[0].block.decimation / runs[0].motion.sample_rate_hz
     # Blocks keep their place in time, so that gaps are zeros and shift no phase.
     places = [np.round((run.time - run.time[0]) / width).astype(int) for run in runs]
-    length = PADDING * (max(int(p[-1]) for p in places) + 1)
+    # Factor of zero padding of the spectrum in which a tone is sought.
+    padding = 4
+    length = padding * (max(int(p[-1]) for p in places) + 1)
     power = np.zeros(length // 2 + 1)
     for place, residual in zip(places, residuals, strict=True):
         series = np.zeros(length)
@@ -476,18 +467,21 @@ def describe(
     own = [d for d in results if d.joint == joint]
     pairs = [s for s in surfaces if s.joint == joint and len(s.curve.variables) > 1]
     pair = max(pairs, key=lambda s: s.share, default=None)
-    if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
+    # Share from which the residual is reported to depend on a variable.
+    little = 0.05
+    # Two variables are reported only where they predict much more than one.
+    if pair and pair.share > 1.5 * max(_rank(own[0]), little):
         words = " together with ".join(
             _words(joint, machine, variable.words) for variable in pair.curve.variables
         )
         return f"{_unexplained(joint, pair.share)} depends on {words}{where}."
-    if own[0].share < LITTLE:
+    if own[0].share < little:
         return (
             f"The remaining error at {the(joint)}{where}{',' * bool(where)} depends on nothing that"
-            f" was measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
+            f" was measured: no variable and no steady tone predicts {100 * little:.0f} % of it."
         )
     second = next(
-        (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)),
+        (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, little)),
         None,
     )
     return (
@@ -497,8 +491,13 @@ def describe(
 
 def _where(above: Sequence[Excess]) -> str:
     """Return in words the kind of run, or the file, that has the excess."""
-    if not any(e.square > (NOTICED * e.floor_nm) ** 2 for e in above):
+    # Excess, as a share of the noise floor, below which its place is not reported.
+    noticed = 0.2
+    if not any(e.square > (noticed * e.floor_nm) ** 2 for e in above):
         return ", and it is hardly above the noise"
+    # Ratio of squared excess between kinds of run, or files, from which it is in one of them
+    # only.
+    one_sided = 4.0
     for what, words in (
         ("run", {"with_human": "with the human", "exo_alone": "without the human"}),
         ("file", {}),
@@ -507,7 +506,7 @@ def _where(above: Sequence[Excess]) -> str:
         for e in above:
             groups.setdefault(getattr(e, what), []).append(e.square)
         means = sorted(((float(np.mean(v)), name) for name, v in groups.items()), reverse=True)
-        if len(means) > 1 and means[0][0] > ONE_SIDED * means[1][0]:
+        if len(means) > 1 and means[0][0] > one_sided * means[1][0]:
             return (
                 f", mostly {words[means[0][1]]}" if what == "run" else f", mostly in {means[0][1]}"
             )

@@ -15,10 +15,6 @@ if TYPE_CHECKING:
 
 DEGREE = 3
 """Degree of the splines."""
-FEWER = 4
-"""Inner knots of each side of a surface."""
-RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
-"""Shrinkage that is tried, in units of a column's mean square."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +42,9 @@ class Curve:
         for variable in variables:
             values = [(run, variable.of(run, j)) for run in runs]
             known = [x[run.usable[:, j]] for run, x in values if x is not None]
-            knots.append(
-                _knots(np.concatenate(known), variable.knots if len(variables) == 1 else FEWER)
-            )
+            # Each side of a surface has fewer knots than a curve.
+            inner = variable.knots if len(variables) == 1 else 4
+            knots.append(_knots(np.concatenate(known), inner))
         return cls(tuple(variables), tuple(knots), j)
 
     def design(self, run: Run) -> NDArray:
@@ -202,7 +198,9 @@ def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
     tuple of float
         Squared error, and the ridge that minimises it.
     """
+    # Shrinkage that is tried, in units of a column's mean square.
+    ridges = (1e-3, 1e-2, 1e-1, 1.0)
     # A curve must predict other periods and other parts of a period, so the worse of both counts.
-    worst = np.max([p.held_out(np.array(RIDGES)) for p in products], axis=0)
+    worst = np.max([p.held_out(np.array(ridges)) for p in products], axis=0)
     best = int(np.argmin(worst))
-    return float(worst[best]), RIDGES[best]
+    return float(worst[best]), ridges[best]

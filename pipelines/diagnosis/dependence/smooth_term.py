@@ -22,13 +22,6 @@ from pipelines.diagnosis.dependence.explained_share import (
 from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
 from pipelines.diagnosis.evidence.observed_run import Run
 
-EARNED = 0.05
-"""Least share of a residual's square that a surface must predict."""
-BETTER = 0.05
-"""Share by which two variables must predict more than one."""
-ONE_SIDED = 2.0
-"""Ratio of mean squares from which a law may act in one kind of run only."""
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -105,7 +98,9 @@ def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surf
         return surface
     # No law serves both kinds of run: it may still act in the kind with most of the error.
     squares = [float(np.mean(pooled(*of_kind, j) ** 2)) for of_kind in kinds]
-    if max(squares) < ONE_SIDED * min(squares):
+    # Ratio of mean squares from which a law may act in one kind of run only.
+    one_sided = 2.0
+    if max(squares) < one_sided * min(squares):
         return None
     return _best(*kinds[squares.index(max(squares))], j)
 
@@ -118,8 +113,12 @@ def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface 
         (_surface(p, runs, residuals, j) for p in itertools.combinations(known, 2)),
         key=lambda s: s.share,
     )
-    best = two if two.share > one.share + BETTER else one
-    return best if best.share > EARNED else None
+    # Share by which two variables must predict more than one.
+    better = 0.05
+    best = two if two.share > one.share + better else one
+    # Least share of a residual's square that a surface must predict.
+    least_share = 0.05
+    return best if best.share > least_share else None
 
 
 def _surface(

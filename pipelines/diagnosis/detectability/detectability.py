@@ -47,24 +47,6 @@ from pipelines.model import TermColumns
 
 POWER = 0.9
 """Chance that an effect of the smallest visible size is detected."""
-USUAL = 0.8
-"""Share of a family's shapes for which the smallest size suffices, as the shape is unknown
-beforehand."""
-SHAPES = 6
-"""Values of a free shape parameter that represent its range."""
-ONSETS = (0.25, 0.5, 0.75)
-"""Parts of a run at which an effect with per-run onsets may begin."""
-DISTINGUISHED = np.log(20.0)
-"""Log likelihood by which one cause must exceed another for the two to be separated: 20 to 1."""
-NEVER = 1e-3
-"""Share of an effect that another does not explain, below which no size separates the two."""
-NOTHING = 1e-10
-"""Share of an effect's square that the baseline does not explain, below which it explains all."""
-LEAST = 1e-3
-"""Share of a joint's torque that an effect of the largest typical size makes if it depends on the
-motion."""
-STEPS = 8
-"""Steps of the search for the size of an effect that transforms the motion."""
 
 
 @dataclass(frozen=True)
@@ -311,9 +293,11 @@ def detectability(
         ]
         # Where no shape is plausible, all count: every cause is reported.
         results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
-    # The size of each suffices for ``USUAL`` of its shapes.
+    # Share of a family's shapes for which the smallest size suffices, as the shape is unknown
+    # beforehand.
+    usual = 0.8
     chosen = [
-        sorted(own, key=lambda result: result.rms)[round(USUAL * (len(own) - 1))]
+        sorted(own, key=lambda result: result.rms)[round(usual * (len(own) - 1))]
         for own in results.values()
     ]
     unexplained = _unexplained(chosen, list(results.values()))
@@ -400,29 +384,31 @@ def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
         weak = values_of(effect.shape[0], BENDING)[-1]
         yield Candidate(effect, ((float(weak),),) * len(runs))
         return
-    grids = [ONSETS if p.per_run else _spread(_seen(effect, p, runs)) for p in effect.shape]
+    # Parts of a run at which an effect with per-run onsets may begin.
+    onsets = (0.25, 0.5, 0.75)
+    grids = [onsets if p.per_run else _seen(effect, p, runs) for p in effect.shape]
     for shape in itertools.product(*grids):
         yield Candidate(effect, tuple(_in_run(effect, shape, run) for run in runs))
 
 
-def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
-    """Return the values of a shape parameter that represent its range.
+def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run], most: int = 6) -> NDArray:
+    """Return at most so many values of a shape parameter that represent its range.
 
     For a ripple, those that blocks pass. Faster ones are found at the full sampling rate
     (``order_tracking``), where they are as detectable.
     """
-    values = values_in(effect, parameter, SHAPES, runs)
+    values = values_in(effect, parameter, most, runs)
     if parameter.unit not in TURNS or effect.joint is None:
-        return values
+        return _spread(values, most)
     j = runs[0].motion.joint_index(effect.joint)
     speeds = np.concatenate([run.state[1][:, j] for run in runs])
     # A ripple of n cycles a turn has n |dq| / 2 pi Hz at the speed dq.
     fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
-    return values[values <= max(fastest, values[0])]
+    return _spread(values[values <= max(fastest, values[0])], most)
 
 
-def _spread(values: NDArray) -> NDArray:
-    return values[np.unique(np.linspace(0, len(values) - 1, SHAPES).round().astype(int))]
+def _spread(values: NDArray, most: int) -> NDArray:
+    return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))]
 
 
 def _in_run(effect: Effect, shape: Sequence[float], run: Run) -> tuple[float, ...]:
@@ -449,6 +435,9 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
     if effect.linear[0].typical[0] < 0:
         least = 0.0
     torque = problem.torque_rms[problem.joint(effect)]
+    # Share of a joint's torque that an effect of the largest typical size makes if it depends on
+    # the motion.
+    least_share = 1e-3
     return DetectionResult(
         candidate.shapes[0],
         size,
@@ -458,7 +447,7 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
         _unit(remainder),
         _orthonormal(span),
         _orthonormal(problem.remainder(_wide(effect, columns, _levels(effect), problem.runs))),
-        least * unit < torque and largest * unit > LEAST * torque,
+        least * unit < torque and largest * unit > least_share * torque,
     )
 
 
@@ -527,7 +516,7 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
     x0 = float(np.log(reach))
     x1 = x0 - np.log(1.5)
     before, now = at(x0), at(x1)
-    for _ in range(STEPS):
+    for _ in range(8):
         if not (np.isfinite(now[0]) and np.isfinite(before[0])) or abs(np.log(now[0])) < 0.02:
             break
         # Secant steps: for a small effect, growth over size is a line of slope -2 in logarithms.
@@ -577,7 +566,9 @@ def _growth(
     power: float,
 ) -> tuple[float, str]:
     """Return the factor by which an effect's square must grow to be named, and its limit."""
-    if _squared(remainder) <= NOTHING * _squared(problem.rows(column)[:, 0]):
+    # Share of an effect's square that the baseline does not explain, below which it explains all.
+    nothing = 1e-10
+    if _squared(remainder) <= nothing * _squared(problem.rows(column)[:, 0]):
         return np.inf, "noise"
     price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
     by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
@@ -610,6 +601,8 @@ def _detectable(
         (share, label) for share, label in others if label != effect.label and _alike(result, share)
     ]
     names = [p.name for p in effect.shape] if result.shape else []
+    # Share of an effect that another does not explain, below which no size separates the two.
+    never = 1e-3
     return Detectable(
         effect,
         result.rms,
@@ -618,7 +611,7 @@ def _detectable(
         min(other.rms for other in results[effect]),
         result.by,
         tuple(label for _, label in alike),
-        tuple(label for share, label in alike if share < NEVER),
+        tuple(label for share, label in alike if share < never),
         torque_rms,
     )
 
@@ -626,7 +619,9 @@ def _detectable(
 def _alike(result: DetectionResult, unexplained: NDArray | float) -> NDArray:
     if not np.isfinite(result.noncentrality):  # detected at no size
         return np.zeros(np.shape(unexplained), bool)
-    return 0.5 * result.noncentrality * np.asarray(unexplained) < DISTINGUISHED
+    # Log likelihood by which one cause must exceed another for the two to be separated: 20 to 1.
+    distinguished = np.log(20.0)
+    return 0.5 * result.noncentrality * np.asarray(unexplained) < distinguished
 
 
 def _unexplained(

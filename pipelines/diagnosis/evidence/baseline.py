@@ -17,10 +17,6 @@ from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
-RELAXATION = 0.5
-"""Share of the step from a rigid body to a refitted one. With a soft spring a full step overshoots,
-and alternates between heavier and lighter bodies for ever."""
-
 
 @dataclass(frozen=True)
 class Baseline:
@@ -102,7 +98,9 @@ def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
     (b,) array
         In the parameters' units.
     """
-    return refitted if before is None else RELAXATION * refitted + (1.0 - RELAXATION) * before
+    # Half a step: with a soft spring a full one overshoots, and alternates between heavier and
+    # lighter bodies for ever.
+    return refitted if before is None else 0.5 * refitted + 0.5 * before
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:

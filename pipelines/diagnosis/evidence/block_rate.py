@@ -11,10 +11,6 @@ import numpy as np
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
-HIGHEST_CUTOFF = 0.4
-"""Highest cutoff, as a share of the rate. A motion filtered above it moves no faster at this
-rate."""
-
 
 def at_block_rate(run: Run) -> Run:
     """Return the run with one sample a block, so that its columns are computed once a block."""
@@ -22,6 +18,9 @@ def at_block_rate(run: Run) -> Run:
     joints = len(motion.joints)
     rate_hz = motion.sample_rate_hz / run.block.decimation
     block = BlockAverage(1)
+    # Highest cutoff, as a share of the rate. A motion filtered above it moves no faster at this
+    # rate.
+    highest_cutoff = 0.4
     slow = replace(
         motion,
         time=run.time,
@@ -32,7 +31,7 @@ def at_block_rate(run: Run) -> Run:
         segment=motion.segment[run.starts],
         valid=run.valid,
         sample_rate_hz=rate_hz,
-        cutoff_hz=min(motion.cutoff_hz, HIGHEST_CUTOFF * rate_hz),
+        cutoff_hz=min(motion.cutoff_hz, highest_cutoff * rate_hz),
         load=None if motion.load is None else run.average(motion.load),
         limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
         temperature=None

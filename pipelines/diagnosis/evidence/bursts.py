@@ -21,21 +21,6 @@ from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slowed
 
-FREEDOM = (6.0, 20.0, np.inf)
-"""Degrees of freedom of the noise's innovations, equally likely: infinite for Gaussian noise. With
-six, the size of the noise varies by a factor of three."""
-OFTEN = (0.001, 0.003, 0.01, 0.03, 0.1)
-"""Shares of innovations with a burst, equally likely: at ten a second, from one in 100 s to one a
-second."""
-LARGER = (4.0, 8.0, 16.0)
-"""Sizes of bursts in units of the noise, equally likely."""
-SCALES = np.geomspace(0.4, 2.5, 25)
-"""Scales of the noise over its robust estimate, equally likely."""
-ROBUST = 1.4826
-"""Standard deviation of Gaussian noise over its median size."""
-FEWEST = 100
-"""Fewest innovations of a run that are evidence."""
-
 
 def bursts(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
     """Return the log Bayes factor of bursts at each joint, (J,).
@@ -70,10 +55,14 @@ def _innovations(series: NDArray) -> NDArray:
     known = np.isfinite(before) & np.isfinite(now)
     before, now = before[known], now[known]
     power = float(before @ before)
-    if len(now) < FEWEST or power == 0.0:
+    # Fewest innovations of a run that are evidence.
+    fewest = 100
+    if len(now) < fewest or power == 0.0:
         return np.zeros(0)
     innovations = now - (before @ now) / power * before
-    usual = ROBUST * float(np.median(np.abs(innovations)))
+    # Standard deviation of Gaussian noise over its median size.
+    robust = 1.4826
+    usual = robust * float(np.median(np.abs(innovations)))
     return innovations / usual if usual > 0.0 else np.zeros(0)
 
 
@@ -82,15 +71,25 @@ def _log_bayes_factor(innovations: NDArray) -> float:
     if not len(innovations):
         return 0.0
     noise, with_bursts = [], []
-    for scale in SCALES:
-        larger = [norm.logpdf(innovations, scale=scale * np.hypot(1.0, size)) for size in LARGER]
-        for freedom in FREEDOM:
+    # Degrees of freedom of the noise's innovations, equally likely: infinite for Gaussian noise.
+    # With six, the size of the noise varies by a factor of three.
+    freedoms = (6.0, 20.0, np.inf)
+    # Shares of innovations with a burst, equally likely: at ten a second, from one in 100 s to
+    # one a second.
+    shares = (0.001, 0.003, 0.01, 0.03, 0.1)
+    # Sizes of bursts in units of the noise, equally likely.
+    sizes = (4.0, 8.0, 16.0)
+    # Scales of the noise over its robust estimate, equally likely.
+    scales = np.geomspace(0.4, 2.5, 25)
+    for scale in scales:
+        larger = [norm.logpdf(innovations, scale=scale * np.hypot(1.0, size)) for size in sizes]
+        for freedom in freedoms:
             density = t.logpdf(innovations / scale, freedom) - np.log(scale)
             noise.append(density.sum())
             with_bursts += [
                 np.logaddexp(np.log1p(-share) + density, np.log(share) + burst).sum()
                 for burst in larger
-                for share in OFTEN
+                for share in shares
             ]
     means = [logsumexp(some, b=1.0 / len(some)) for some in (with_bursts, noise)]
     # Neighbouring differences share a period: half of them are independent.

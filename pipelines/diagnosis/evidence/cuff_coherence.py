@@ -16,16 +16,6 @@ from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slowed
 
-SLOW_S = 0.4
-"""Length of the averages, s: they suppress oscillations on a soft transmission."""
-NEEDED = 0.5
-"""Share of an average that must be present: cuffs have no samples near reversals, and a leg
-reverses often."""
-LOUDER = 1.25
-"""Ratio of variances from which cuffs and drives share any torque."""
-FEWEST = 30
-"""Fewest averages from which a variance is estimated."""
-
 
 def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
     """Return the log likelihood of a wearer's push, from scatter at each joint, (J,).
@@ -38,8 +28,13 @@ def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
         Measured less predicted torque of each run under the baseline, N·m.
     """
     joints = len(runs[0].motion.joints)
+    # Length of the averages, s: they suppress oscillations on a soft transmission.
+    length_s = 0.4
+    # Share of an average that must be present: cuffs have no samples near reversals, and a leg
+    # reverses often.
+    needed = 0.5
     slow = [
-        slowed(run, residual, SLOW_S, NEEDED)
+        slowed(run, residual, length_s, needed)
         for run, residual in zip(runs, residuals, strict=True)
         if run.has_cuffs
     ]
@@ -47,14 +42,18 @@ def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
     if not slow:
         return gains
     scattered = np.concatenate([scatter(run, residual) for run, residual in slow])
+    # Ratio of variances from which cuffs and drives share any torque.
+    louder = 1.25
+    # Fewest averages from which a variance is estimated.
+    fewest = 30
     for j in range(joints):
         drive, cuff = scattered[:, j], scattered[:, joints + j]
         known = np.isfinite(drive) & np.isfinite(cuff)
-        if known.sum() < FEWEST:
+        if known.sum() < fewest:
             continue
         # A push on the limb reaches the drive undiminished, so the plain difference removes it.
         before, after = np.mean(drive[known] ** 2), np.mean((drive - cuff)[known] ** 2)
-        if before > LOUDER * after:
+        if before > louder * after:
             # Neighbouring differences share a period: half of them are independent.
             gains[j] = 0.25 * known.sum() * np.log(before / after)
     return gains

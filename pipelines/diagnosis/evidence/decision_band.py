@@ -14,8 +14,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 
 LENGTH_S = 0.1
 """Length of one average, s."""
-LEAST_SHARE = 0.5
-"""Share of an average's blocks that must be usable."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,10 @@ class DecisionBand:
         blocks = np.concatenate(starts)[:, np.newaxis] + np.arange(k)
         usable = run.usable[blocks]
         count = usable.sum(axis=1)
+        # Share of an average's blocks that must be usable.
+        least_share = 0.5
         # Near a reversal an average has fewer blocks, more noise, and so less weight.
-        weight = np.where(count >= LEAST_SHARE * k, count / k, 0.0)
+        weight = np.where(count >= least_share * k, count / k, 0.0)
         operators = tuple(
             _averaging(blocks, usable[:, :, o], count[:, o], len(run.time))
             for o in range(run.usable.shape[1])

@@ -7,9 +7,6 @@ from pipelines.estimation.regression import block_average
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
-ENOUGH_HZ = 200.0
-"""Rate down to which neighbouring samples are averaged."""
-
 
 def downsampled(motion: Motion) -> Motion:
     """Return the motion at a lower rate.
@@ -22,9 +19,11 @@ def downsampled(motion: Motion) -> Motion:
     Returns
     -------
     Motion
-        Averaged to ``ENOUGH_HZ`` or a little more; unchanged if slower.
+        Averaged to 200 Hz or a little more; unchanged if slower.
     """
-    every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
+    # Rate down to which neighbouring samples are averaged.
+    enough_hz = 200.0
+    every = BlockAverage(int(motion.sample_rate_hz // enough_hz))
     if every.decimation < 2:
         return motion
     # Forces and temperatures are read less often than angles: without interpolation most averages

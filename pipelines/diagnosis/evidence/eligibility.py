@@ -14,17 +14,6 @@ from pipelines.mechanics.origin import settings_of
 from pipelines.mechanics.run import refuse_several_machines
 from pipelines.mechanics.silence import silent_torque
 
-MOST_NM = 10_000.0
-"""Largest plausible torque, N·m; a larger one is in another unit."""
-COPIED = 1e-12
-"""Largest shortfall of a correlation from 1 by rounding. Two encoders differ by more than their
-last count."""
-LEAST_S = 5.0
-"""Least motion of an exoskeleton, s, all runs of a kind and purpose together. Less does not
-separate gravity, inertia and friction."""
-TOGETHER_S = 2.0
-"""Least time for which all joints of an exoskeleton move at once, s: errors are scored there."""
-
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
     """Refuse motions that no diagnosis can use.
@@ -52,12 +41,14 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
 
 def _refuse_monsters(motion: Motion) -> None:
     """Raise InputError for torques that no leg's drive makes."""
+    # Largest plausible torque, N·m; a larger one is in another unit.
+    most_nm = 10_000.0
     for j, joint in enumerate(motion.joints):
         largest = float(np.nanmax(np.abs(motion.torque[:, j])))
-        if largest > MOST_NM:
+        if largest > most_nm:
             raise InputError(
                 f"{motion.file}: the {joint} torque reaches {largest:.3g} N·m, expected at most"
-                f" {MOST_NM:g} N·m; correct torque constant, gear ratio or the unit of the current"
+                f" {most_nm:g} N·m; correct torque constant, gear ratio or the unit of the current"
                 f" in {settings_of(motion)}, or the recording"
             )
 
@@ -72,9 +63,12 @@ def _refuse_one_angle_twice(motion: Motion) -> None:
     q = motion.measured_angle[motion.valid]
     # A constant has no correlation, and a standstill has a message of its own.
     moving = np.flatnonzero(np.ptp(q, axis=0) > 0.0)
+    # Largest shortfall of a correlation from 1 by rounding. Two encoders differ by more than
+    # their last count.
+    rounding = 1e-12
     for one, other in combinations(moving, 2):
         alike = float(np.corrcoef(q[:, one], q[:, other])[0, 1])
-        if abs(alike) > 1.0 - COPIED:
+        if abs(alike) > 1.0 - rounding:
             times = alike * np.ptp(q[:, other]) / np.ptp(q[:, one])
             first, second = motion.joints[one], motion.joints[other]
             raise InputError(
@@ -107,7 +101,10 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
     moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
     machine = motions[0].machine
-    least = machine.lasting(LEAST_S)
+    # Least motion of an exoskeleton, s, all runs of a kind and purpose together. Less does not
+    # separate gravity, inertia and friction.
+    least_s = 5.0
+    least = machine.lasting(least_s)
     for j, joint in enumerate(machine.joints):
         # First: a constant angle is the reason why a joint seems not to move.
         _refuse_dead_angle(motions, j)
@@ -122,7 +119,9 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
                 f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
-    least = machine.lasting(TOGETHER_S)
+    # Least time for which all joints of an exoskeleton move at once, s: errors are scored there.
+    together_s = 2.0
+    least = machine.lasting(together_s)
     lasts = _seconds(motions, [m.all(axis=1) for m in moving])
     if lasts < least:
         raise InputError(

@@ -9,11 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-PASSES = 3
-"""Passes in which outputs are weighted by their own errors."""
-RIDGE = 1e-9
-"""Relative to a column's square: keeps solves of nearly dependent sets finite."""
-
 
 @dataclass(frozen=True)
 class Gram:
@@ -75,7 +70,9 @@ def solve(gram: Gram, weights: NDArray) -> NDArray:
     b = np.einsum("o,oi->i", weights, gram.measured)
     # At unit length the ridge shrinks all columns alike, whatever their units.
     size = np.sqrt(np.maximum(np.diag(A), np.finfo(float).tiny))
-    scaled = A / np.outer(size, size) + RIDGE * np.eye(len(b))
+    # Relative to a column's square: keeps solves of nearly dependent sets finite.
+    ridge = 1e-9
+    scaled = A / np.outer(size, size) + ridge * np.eye(len(b))
     return np.linalg.solve(scaled, b / size) / size
 
 
@@ -116,7 +113,7 @@ def weights_under(gram: Gram) -> NDArray:
         1/(N·m)²; zero without usable blocks.
     """
     weights = np.where(gram.count > 0, 1.0, 0.0)
-    for _ in range(PASSES):
+    for _ in range(3):
         squares = error(gram, solve(gram, weights))
         # An output without any error would have infinite weight.
         least = 1e-9 * np.maximum(gram.count, 1)

@@ -22,20 +22,6 @@ from scipy.special import fdtrc, gammaincinv
 
 from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel
 
-GRID = 8
-"""Points of the angle's grid in a wave of the highest order."""
-OVERSAMPLED = 8
-"""Number of orders within the width of a line at which the spectrum over angle is computed."""
-AROUND_IN_ANGLE, AROUND_IN_TIME = 20, 120
-"""Line widths over which the median of the local level is taken."""
-STEEP = 6
-"""The same where the level may be steep. A line itself would raise so narrow a median."""
-LEAST_INFORMED = 1e-3
-"""Least information about an order, as a share of that about the best known one; smaller values are
-raised to it."""
-HARMONICS = 8
-"""Number of the motion's harmonics on each side that are compared with one."""
-
 
 class Kind(StrEnum):
     """The variable over which a line is periodic."""
@@ -59,12 +45,17 @@ class Spectrum:
     """Width of a line, in cycles a turn or Hz: independent places are that far apart."""
     phases: int
     """Phases that a line has: one for all runs over angle, one in each run over time."""
+    around: int = 1
+    """Line widths over which the median of the local level is taken."""
 
     @property
     def steep_level(self) -> NDArray:
         """The level after all lines are subtracted, (m,), from nearer neighbours too."""
         places = max(1, round(self.width / (self.cycles[1] - self.cycles[0])))
-        near = _level(self.log_likelihood_ratio * self.level, STEEP * places, self.phases)
+        # Line widths of a median where the level may be steep. A line itself would raise so narrow
+        # a median.
+        narrow = 6
+        near = _level(self.log_likelihood_ratio * self.level, narrow * places, self.phases)
         return np.maximum(self.level, near)
 
     def false_alarm(self, ratio: float, searches: int) -> float:
@@ -86,8 +77,7 @@ class Spectrum:
             return 1.0
         # The level is an estimate too, so the ratio has an F distribution. A median of k values has
         # half the efficiency of their mean.
-        around = AROUND_IN_ANGLE if self.kind is Kind.ANGLE else AROUND_IN_TIME
-        tail = float(fdtrc(2 * self.phases, around, ratio / self.phases))
+        tail = float(fdtrc(2 * self.phases, self.around, ratio / self.phases))
         # Maxima between independent places are higher than at them.
         places = 2.5 * (1.0 + (self.cycles[-1] - self.cycles[0]) / self.width)
         # By logarithms, because a small chance would be lost to rounding in 1 - p.
@@ -124,8 +114,10 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     searched : Orders
         Range and width of the search, cycles per turn.
     """
+    # Points of the angle's grid in a wave of the highest order.
+    points_per_wave = 8
     # Sum the scores over a grid of angles: there a line is periodic at any speed.
-    finest = GRID * searched.highest
+    finest = points_per_wave * searched.highest
     step = 2.0 * np.pi / finest
     first = min(float(channel.grid.angle.min()) for channel in channels)
     total = np.zeros(int(searched.swept / step) + 3)
@@ -136,8 +128,10 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
         share = place - below
         total += np.bincount(below, channel.score * (1.0 - share), len(total))
         total += np.bincount(below + 1, channel.score * share, len(total))
+    # Number of orders within the width of a line at which the spectrum over angle is computed.
+    oversampled = 8
     # Zero padding: a line between two orders of a coarse spectrum would lose power.
-    points = max(len(total), int(OVERSAMPLED * finest / searched.width))
+    points = max(len(total), int(oversampled * finest / searched.width))
     length = fft.next_fast_len(points, real=True)
     transform = fft.rfft(total, length)
     orders = np.arange(len(transform)) * (finest / length)
@@ -150,10 +144,15 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     # The information changes slowly with the order, so it is interpolated between some.
     some = orders[:: max(1, len(orders) // 256)]
     information = np.sum([_information_at(channel, some) for channel in channels], axis=0)
-    information = np.maximum(information, LEAST_INFORMED * np.max(information))
+    # Least information about an order, as a share of that about the best known one; smaller
+    # values are raised to it.
+    least_informed = 1e-3
+    information = np.maximum(information, least_informed * np.max(information))
     ratio = power / np.interp(orders, some, information)
-    level = _level(ratio, OVERSAMPLED * AROUND_IN_ANGLE, 1)
-    return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1)
+    # Line widths over which the median of the local level is taken over the angle.
+    around = 20
+    level = _level(ratio, oversampled * around, 1)
+    return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1, around)
 
 
 def _information_at(channel: Channel, orders: NDArray) -> NDArray:
@@ -188,10 +187,12 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
         information = np.maximum(len(channel.score) * channel.weight(hz), TINY)
         # Each run has its own phase, so ratios add up, not amplitudes.
         ratio += np.abs(fft.rfft(x)[kept]) ** 2 / information
-    level = _level(ratio, 2 * AROUND_IN_TIME, len(channels))
+    # The same over time, where lines are narrower than colours of noise.
+    around = 120
+    level = _level(ratio, 2 * around, len(channels))
     if channels[0].grid.period_s:
         level = _with_harmonics(hz, ratio, level, channels[0].grid.period_s, len(channels))
-    return Spectrum(Kind.TIME, hz, ratio / level, level, 2.0 * step, len(channels))
+    return Spectrum(Kind.TIME, hz, ratio / level, level, 2.0 * step, len(channels), around)
 
 
 def _level(ratio: NDArray, around: int, phases: int) -> NDArray:
@@ -224,9 +225,11 @@ def _with_harmonics(
     # A harmonic falls between grid points, so the highest of three counts as its height.
     place = np.clip(np.round((harmonics - hz[0]) / step).astype(int), 1, len(hz) - 2)
     at = np.maximum(np.maximum(ratio[place - 1], ratio[place]), ratio[place + 1])
-    padded = np.pad(at, HARMONICS, mode="edge")
-    neighbours = [np.roll(padded, k) for k in range(-HARMONICS, HARMONICS + 1) if k]
-    highest = np.max(neighbours, axis=0)[HARMONICS:-HARMONICS] / phases
+    # Number of the motion's harmonics on each side that are compared with one.
+    around = 8
+    padded = np.pad(at, around, mode="edge")
+    neighbours = [np.roll(padded, k) for k in range(-around, around + 1) if k]
+    highest = np.max(neighbours, axis=0)[around:-around] / phases
     number = np.round(hz * period_s)
     near = np.abs(hz * period_s - number) < 2.0 * step * period_s
     raised = highest[np.clip(number - first, 0, len(harmonics) - 1).astype(int)]

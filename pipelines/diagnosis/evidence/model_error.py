@@ -11,10 +11,6 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
 
-IMPERFECTION = (0.009, 0.02)
-"""Share of a drive's and of a cuff's torque that even a good model of a good machine does not
-explain."""
-
 
 def imperfection(runs: Sequence[Run]) -> NDArray:
     """Return the error that every model of a real machine has.
@@ -30,8 +26,10 @@ def imperfection(runs: Sequence[Run]) -> NDArray:
         N·m.
     """
     torque = varying_torque(runs)
-    # Drives come first, then cuffs.
-    return torque * np.repeat(IMPERFECTION, len(torque) // 2)
+    # Shares of a drive's and of a cuff's torque that even a good model of a good machine does not
+    # explain. Drives come first.
+    shares = (0.009, 0.02)
+    return torque * np.repeat(shares, len(torque) // 2)
 
 
 def varying_torque(runs: Sequence[Run]) -> NDArray:

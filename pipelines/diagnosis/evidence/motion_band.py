@@ -4,16 +4,14 @@ import numpy as np
 
 from pipelines.diagnosis.evidence.observed_run import Run
 
-LOWEST_HZ = 1.2
-"""Least frequency above the motion: below it a slow motion has lines too, Hz."""
-HARMONICS, MOVING = 2.0, 0.99
-"""Multiple of the motion's band in which its misfit has lines, and share of the speed's power in
-that band."""
-
 
 def above_the_motion_hz(run: Run) -> float:
     """Return the frequency, Hz, above which motion and model error have no lines."""
-    return max(LOWEST_HZ, HARMONICS * _band_hz(run))
+    # Least frequency above the motion: below it a slow motion has lines too, Hz.
+    lowest_hz = 1.2
+    # Multiple of the motion's band in which its misfit has lines.
+    multiple = 2.0
+    return max(lowest_hz, multiple * _band_hz(run))
 
 
 def _band_hz(run: Run) -> float:
@@ -22,4 +20,6 @@ def _band_hz(run: Run) -> float:
     speed = run.slow(run.motion.dq)[run.motion.valid]
     power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)
     share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
-    return float(np.searchsorted(share, MOVING) * run.motion.sample_rate_hz / len(speed))
+    # Share of the speed's power in the motion's band.
+    moving = 0.99
+    return float(np.searchsorted(share, moving) * run.motion.sample_rate_hz / len(speed))

@@ -9,10 +9,6 @@ from scipy.ndimage import uniform_filter1d
 
 from pipelines.diagnosis.evidence.observed_run import Run
 
-LONGEST_LAG_S = 1.0
-"""Without periods, noise is the part that changes faster than averages of this length, s, on an
-exoskeleton's scale."""
-
 
 @dataclass(frozen=True)
 class Floor:
@@ -41,7 +37,10 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     from_periods = any(len(d) for d in pairs)
     averaged = np.inf
     if not from_periods:
-        lag = runs[0].motion.machine.lasting(LONGEST_LAG_S)
+        # Without periods, noise is the part that changes faster than averages of this length, s,
+        # on an exoskeleton's scale.
+        longest_s = 1.0
+        lag = runs[0].motion.machine.lasting(longest_s)
         averaged = min(_blocks(run, lag) for run in runs)
         pairs = [_faster(run, residual, lag) for run, residual in zip(runs, residuals, strict=True)]
     outputs = residuals[0].shape[1]

@@ -23,28 +23,8 @@ from pipelines.diagnosis.evidence.observed_run import Run
 
 WANDER_HZ = 0.25
 """Frequency below which differences between periods hold wandering torque as well as noise, Hz."""
-HIGHEST_HZ = 6.0
-"""Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above."""
-WITHOUT_PERIODS_HZ = (4.0, 8.0)
-"""Without periods: highest begin of the band, and its end, Hz."""
-CORRELATION_S = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
-"""Correlation times tried, s. Noise of sensors and drives is no slower; slower torque wanders."""
 PINK_HZ = 1.5
 """Frequency at which pink noise is compared with first-order noise, Hz."""
-PINK = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
-"""Ratios of pink to first-order noise at ``PINK_HZ`` that are tried."""
-UNKNOWN_PINK = 0.2
-"""The ratio where it cannot be measured."""
-TINY_HZ = 1e-3
-"""Slower than any run, Hz."""
-PIECE_S = 20.0
-"""Length of the pieces of a series whose spectra are taken, s."""
-SHORTEST = 64
-"""Fewest blocks of a series whose spectrum counts."""
-LARGEST_SLOW = 0.8
-"""Largest number of slow cosines, as a share of a series' known blocks."""
-UNLIKE = 3.0
-"""Multiple of the median of all pieces above which a piece holds an event, not noise."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +54,9 @@ class NoiseModel:
             (N·m)²/Hz.
         """
         first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
-        pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, TINY_HZ))
+        # Slower than any run, Hz.
+        tiny_hz = 1e-3
+        pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, tiny_hz))
         return (self.density * (first + pink).T).T
 
     def averaged(self, length_s: float) -> tuple[NDArray, NDArray]:
@@ -154,16 +136,21 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     """
     differences = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(one) for one in differences)
+    pink: float | None = None
     if from_periods:
-        series, band, pink = differences, (WANDER_HZ, HIGHEST_HZ), PINK
+        # Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above.
+        highest_hz = 6.0
+        series, band = differences, (WANDER_HZ, highest_hz)
     else:
         series = [
             np.where(run.usable, residual, np.nan)
             for run, residual in zip(runs, residuals, strict=True)
         ]
         above = max(above_the_motion_hz(run) for run in runs)
-        latest, highest = WITHOUT_PERIODS_HZ
-        band, pink = (min(above, latest), highest), np.array([UNKNOWN_PINK])
+        # Highest begin of the band without periods, and its end, Hz.
+        latest, highest = 4.0, 8.0
+        # Here the ratio of pink noise cannot be measured.
+        band, pink = (min(above, latest), highest), 0.2
     rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
     outputs = range(residuals[0].shape[1])
     fits = [
@@ -175,30 +162,37 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
 
 
 def _spectrum_of(
-    series: Sequence[NDArray], rate_hz: float, band: tuple[float, float], pink: NDArray = PINK
+    series: Sequence[NDArray], rate_hz: float, band: tuple[float, float], pink: float | None = None
 ) -> tuple[float, float, float]:
     """Fit noise to series that are NaN where not usable; return S0, tau and the pink share.
 
+    ``pink`` is that share where it is known.
     Maximum likelihood of the periodogram (Whittle, 1953, Arkiv för Matematik 2(23)).
     """
     pieces = [piece for x in series for piece in _pieces(x, rate_hz, band)]
     sizes = np.array([power.sum() / share.sum() for _, power, share in pieces])
     if not sizes.any():
         return np.nan, np.nan, np.nan
-    # Events first: a step in one piece would raise the density of all.
-    alike = sizes <= UNLIKE * np.median(sizes)
+    # Multiple of the median of all pieces above which a piece holds an event, not noise: a step in
+    # one piece would raise the density of all.
+    unlike = 3.0
+    alike = sizes <= unlike * np.median(sizes)
     chosen = [piece for piece, is_alike in zip(pieces, alike, strict=True) if is_alike]
     frequency, power, share = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
+    # Correlation times tried, s. Noise of sensors and drives is no slower; slower torque wanders.
+    correlation_s = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
     # A band does not determine a correlation time longer than its slowest wave.
-    tried = CORRELATION_S[2.0 * np.pi * band[0] * CORRELATION_S <= 1.0]
+    tried = correlation_s[2.0 * np.pi * band[0] * correlation_s <= 1.0]
     first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(tried, frequency)) ** 2)
-    shapes = first[:, np.newaxis] + pink[:, np.newaxis] * PINK_HZ / frequency
+    # Ratios of pink to first-order noise at `PINK_HZ` that are tried.
+    ratios = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0] if pink is None else [pink])
+    shapes = first[:, np.newaxis] + ratios[:, np.newaxis] * PINK_HZ / frequency
     # For each shape the likeliest density is a closed form, so only shapes are tried. There
     # Whittle's sum of power / S is constant, and the sum of log S remains.
     densities = np.sum(power / shapes, axis=2) / share.sum()
     misfit = share.sum() * np.log(densities) + np.log(shapes) @ share
     t, p = np.unravel_index(np.argmin(misfit), misfit.shape)
-    return float(densities[t, p]), float(tried[t]), float(pink[p])
+    return float(densities[t, p]), float(tried[t]), float(ratios[p])
 
 
 Piece = tuple[NDArray, NDArray, NDArray]
@@ -206,16 +200,22 @@ Piece = tuple[NDArray, NDArray, NDArray]
 
 def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece]:
     """Return each piece's spectrum within a band, as of ``_of_piece``."""
-    pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
+    # Length of the pieces of a series whose spectra are taken, s.
+    piece_s = 20.0
+    pieces = np.array_split(x, max(1, round(len(x) / (piece_s * rate_hz))))
+    # Fewest blocks of a series whose spectrum counts.
+    shortest = 64
     return [
-        _of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST
+        _of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= shortest
     ]
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
     """Return a piece's frequencies (Hz), power densities, and remaining shares of white noise."""
     known, n = np.isfinite(x), len(x)
-    count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))
+    # Largest number of slow cosines, as a share of a series' known blocks.
+    largest_slow = 0.8
+    count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(largest_slow * known.sum()))
     # Slow cosines are fitted and subtracted, because slow content leaks into the band through
     # gaps. They also remove some faster content, whose share of white noise is known.
     slow = np.zeros((n, count))

@@ -15,8 +15,6 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
 
-FOLD_S = 10.0
-"""Time after which an excitation without a period moves to the next fold, s."""
 FOLDS = 4
 """Number of folds of a run."""
 
@@ -175,7 +173,9 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     # A filter would spread one NaN over its whole stretch.
     whole = np.nan_to_num(np.hstack(outputs))
     slow = whole if cutoff_hz is None else filtered(motion, whole, cutoff_hz)
-    length = motion.period_s or FOLD_S
+    # Time after which an excitation without a period moves to the next fold, s.
+    fold_s = 10.0
+    length = motion.period_s or fold_s
     # Rounding must not move the first block of a period into the one before.
     number = np.floor(time / length + 1e-9).astype(int)
     # A short run has no whole period for each fold, so its stretches are assigned to folds instead.

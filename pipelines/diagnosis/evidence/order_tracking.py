@@ -33,25 +33,7 @@ from pipelines.mechanics.motion import Motion
 
 LEAST_WAVES = 4.0
 """Fewest waves within the swept angles: with fewer, a line is a smooth law of the angle."""
-FALSE_ALARMS = 0.005
-"""Chance that a session of noise alone shows any line."""
-WORTH_A_TRIAL = 0.3
-"""Largest such chance of a line that is tried. Its significance is judged after the other lines are
-subtracted."""
-LEAST_HZ, SLOWEST_HZ = 1.0, 0.2
-"""Least frequency of a hum, below which torque wanders; least frequency that counts as slow, Hz."""
-APART = 1.5
-"""Least distance between two lines of one kind, in widths."""
-LONGEST_STEP = 1.5
-"""Longest step of a refinement, as a multiple of Gauss and Newton's."""
-NEIGHBOURS, MUCH_WEAKER = 5.0, 0.05
-"""A line within so many widths of a stronger one, with at most this share of its likelihood ratio,
-is a part of it."""
-LEAST_S = 2.0
-"""Least usable motion in a run that is searched, s."""
-RIPPLES = tuple(effect for effect in EFFECTS if effect.order_tracked)
-"""Effects that have lines over the angle."""
-MOST_LINES = max(effect.most_parts for effect in RIPPLES)
+MOST_LINES = max(effect.most_parts for effect in EFFECTS if effect.order_tracked)
 """Largest number of lines of one kind at a joint."""
 
 
@@ -208,7 +190,8 @@ def lines_of(
 
 def _orders(joint: str, machine: Machine) -> tuple[float, float]:
     """Return the range of cycles a turn of ripples at a joint, rad/m where it slides."""
-    ranges = [ripple(joint, on=machine).shape[0].typical for ripple in RIPPLES]
+    ripples = (effect for effect in EFFECTS if effect.order_tracked)
+    ranges = [ripple(joint, on=machine).shape[0].typical for ripple in ripples]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
@@ -217,7 +200,9 @@ def _lines_of_joint(
     bounds: tuple[float, float],
     searches: int,
 ) -> JointLines:
-    moving = [trace for trace in traces if trace.usable.sum() >= LEAST_S * trace.rate_hz]
+    # Least usable motion in a run that is searched, s.
+    least_s = 2.0
+    moving = [trace for trace in traces if trace.usable.sum() >= least_s * trace.rate_hz]
     swept = _swept(moving)
     if not swept > 0.0:
         return JointLines((), nothing(Kind.ANGLE), nothing(Kind.TIME))
@@ -254,7 +239,9 @@ def _slow_hz(traces: Sequence[Trace], swept: float) -> float:
     """Return the frequency of ``LEAST_WAVES`` in the swept angles at the joint's usual speed."""
     speeds = np.concatenate([trace.speed[trace.usable] for trace in traces])
     usual = float(np.sqrt(np.mean(speeds**2)))
-    return float(np.clip(LEAST_WAVES * usual / swept, SLOWEST_HZ, traces[0].rate_hz / 16.0))
+    # Least frequency that counts as slow, Hz.
+    slowest_hz = 0.2
+    return float(np.clip(LEAST_WAVES * usual / swept, slowest_hz, traces[0].rate_hz / 16.0))
 
 
 class _Waves:
@@ -282,16 +269,21 @@ def _strongest(
 ) -> tuple[Kind, float] | None:
     """Return kind and place of the strongest line worth a trial, away from those tried before."""
     best: tuple[float, Kind, float] | None = None
+    # Largest chance of a false alarm of a line that is tried. Its significance is judged after the
+    # other lines are subtracted.
+    worth_a_trial = 0.3
+    # Least distance between two lines of one kind, in widths.
+    apart = 1.5
     for spectrum in spectra:
         ratio = spectrum.log_likelihood_ratio.copy()
         before = [cycles for kind, cycles in tried if kind is spectrum.kind]
         for cycles in before:
             # A line that was tried in vain would come first again, for ever.
-            ratio[np.abs(spectrum.cycles - cycles) < APART * spectrum.width] = 0.0
+            ratio[np.abs(spectrum.cycles - cycles) < apart * spectrum.width] = 0.0
         if len(before) >= MOST_LINES or not len(ratio):
             continue
         at = int(np.argmax(ratio))
-        if spectrum.false_alarm(ratio[at], searches) > WORTH_A_TRIAL:
+        if spectrum.false_alarm(ratio[at], searches) > worth_a_trial:
             continue
         if best is None or ratio[at] > best[0]:
             best = float(ratio[at]), spectrum.kind, _peak(spectrum, at)
@@ -320,7 +312,8 @@ class _Search:
         self.waves = [_Waves(Grid.of(trace, slow_hz)) for trace in traces]
         self.orders = orders
         self.longest_s = max(float(np.ptp(waves.grid.time)) for waves in self.waves)
-        self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
+        # A hum has at least 1 Hz: below it, torque wanders.
+        self.least_hz = max(1.0, 2.0 * slow_hz)
 
     def remainder(self, lines: Sequence[Sinusoids]) -> list[Channel]:
         """Return the residual in each run less the lines of each kind."""
@@ -407,7 +400,9 @@ class _Search:
             torque = then.torque(waves, r) - now.torque(waves, r)
             slope += torque @ channel.score
             bend += torque @ channel.score_of(torque)
-        share = float(np.clip(slope / bend, 0.0, LONGEST_STEP))
+        # Longest step of a refinement, as a multiple of Gauss and Newton's.
+        longest_step = 1.5
+        share = float(np.clip(slope / bend, 0.0, longest_step))
         return replace(
             now,
             cycles=now.cycles + share * (then.cycles - now.cycles),
@@ -434,6 +429,8 @@ class _Search:
         The channels hold the residual less all lines.
         """
         significant = []
+        # Chance that a session of noise alone shows any line.
+        false_alarms = 0.005
         for known, spectrum in zip(lines, spectra, strict=True):
             # Lines are subtracted now, so near neighbours show a steep level that no line raises.
             level = spectrum.steep_level if len(known) else spectrum.level
@@ -442,7 +439,7 @@ class _Search:
                 ratio = self._ratio(known.only(number), channels)
                 ratio /= float(np.interp(cycles, spectrum.cycles, level))
                 alarm = spectrum.false_alarm(ratio, searches)
-                if alarm > FALSE_ALARMS:
+                if alarm > false_alarms:
                     continue
                 size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
                 # Over the angle all runs have the same amplitudes, so the first shows the phase.
@@ -460,10 +457,14 @@ class _Search:
 
 def _is_trace_of(line: Line, stronger: Sequence[Line], widths: dict[Kind, float]) -> bool:
     """Return whether a line is the residual of a stronger one whose size changes."""
+    # Widths within which a line is a part of a stronger one, if it is much weaker.
+    near = 5.0
+    # Share of the stronger line's likelihood ratio below which a line is much weaker.
+    much_weaker = 0.05
     return any(
         line.kind is other.kind
-        and abs(line.cycles - other.cycles) < NEIGHBOURS * widths[line.kind]
-        and line.log_likelihood_ratio < MUCH_WEAKER * other.log_likelihood_ratio
+        and abs(line.cycles - other.cycles) < near * widths[line.kind]
+        and line.log_likelihood_ratio < much_weaker * other.log_likelihood_ratio
         for other in stronger
     )
 

@@ -16,9 +16,6 @@ from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
-SLOW_S = 0.1
-"""Length of the averages, s: they pass frequencies below 4.4 Hz."""
-
 
 @dataclass(frozen=True)
 class SlowError:
@@ -63,7 +60,7 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
 
 
 def slowed(
-    run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0
+    run: Run, residual: NDArray, length_s: float = 0.1, needed: float = 1.0
 ) -> tuple[Run, NDArray]:
     """Average neighbouring blocks to a length, never across a gap.
 

@@ -16,12 +16,6 @@ from scipy.ndimage import median_filter
 from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.motion import Motion
 
-SEGMENT_S = 1.28
-"""Length of the segments whose spectra are averaged to the noise's, s."""
-SMOOTHED = 9
-"""Number of frequencies whose median is taken, so that a hum does not count as noise."""
-SPEEDS = 64
-"""Number of speeds that represent all of a joint's: a line's frequency follows them."""
 TINY = 1e-300
 """Keeps the division by a spectrum without power finite."""
 
@@ -124,13 +118,15 @@ class Grid:
         hz = fft.rfftfreq(len(mask), 1.0 / trace.rate_hz)
         # A Gaussian window whose width is a quarter of the slow frequency's period.
         smooth = np.exp(-2.0 * (np.pi * hz * 0.25 / slow_hz) ** 2)
+        # Number of speeds that represent all of a joint's: a line's frequency follows them.
+        speeds = 64
         return cls(
             trace.rate_hz,
             trace.period_s,
             trace.time[used] - np.mean(trace.time[used]),
             trace.angle[used],
             hz_per_order,
-            np.quantile(hz_per_order, (np.arange(SPEEDS) + 0.5) / SPEEDS),
+            np.quantile(hz_per_order, (np.arange(speeds) + 0.5) / speeds),
             trace.residual[used],
             place[used],
             mask,
@@ -254,13 +250,16 @@ def noise(x: NDArray, mask: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
     (k,) array
         Power of a sample at them, (N·m)².
     """
-    length = min(len(x), max(32, round(SEGMENT_S * rate_hz)))
+    # Length of the segments whose spectra are averaged to the noise's, s.
+    segment_s = 1.28
+    length = min(len(x), max(32, round(segment_s * rate_hz)))
     window = np.hanning(length)
     starts = np.arange(0, len(x) - length + 1, max(1, length // 2))
     rows = starts[:, np.newaxis] + np.arange(length)
     # Segments count by their usable part, or gaps would lower the noise.
     used = max(float(np.sum(mask[rows] * window**2)), 1e-12)
     power = np.sum(np.abs(fft.rfft(x[rows] * window, axis=1)) ** 2, axis=0) / used
-    # A median over frequencies: a narrow line does not count as noise.
-    around = median_filter(power, SMOOTHED, mode="nearest")
+    # Number of frequencies whose median is taken, so that a hum does not count as noise.
+    smoothed = 9
+    around = median_filter(power, smoothed, mode="nearest")
     return fft.rfftfreq(length, 1.0 / rate_hz), np.maximum(around, 1e-9 * power.max() + TINY)

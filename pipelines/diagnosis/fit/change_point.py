@@ -19,8 +19,6 @@ from pipelines.estimation.long_run import long_run_covariance
 ALIKE_S = 0.5
 """Correlation time of model error, s. It depends on the motion, whose fastest parts are about 1
 Hz."""
-ALIKE = 4.0
-"""Weighted squared error within which two onsets explain a run equally well."""
 CRITICAL = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
 """95 % quantile of the ratio of likelihoods, 7.35: that of the larger peak of two walks that drift
 down."""
@@ -86,7 +84,9 @@ class Onset:
         for simple in (0, -1):
             if self.squares[simple] <= self.squares.min() + doubt:
                 return float(self.instants[simple])
-        likely = self.instants[self.squares < self.squares.min() + ALIKE]
+        # Weighted squared error within which two onsets explain a run equally well.
+        alike = 4.0
+        likely = self.instants[self.squares < self.squares.min() + alike]
         return float(likely[len(likely) // 2])
 
     def interval(self, run: Run, misfit: NDArray) -> tuple[float, float]:

@@ -19,14 +19,6 @@ from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.diagnosis.fit.joint_fit import Fit, step_of, with_loads_of
 from pipelines.model import Model, Term
 
-STRETCH_S = 1.0
-"""Length of the stretches of a run that alternate between the two halves, s."""
-ROUNDS = 2
-"""Rounds in which onsets are sought and all else is fitted again, as each is found with the others
-held."""
-NEWTON_STEPS = 3
-"""Steps of Gauss and Newton along per-run shapes, in which the torque is nearly linear."""
-
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return the residuals of runs under a model fitted to other runs.
@@ -74,7 +66,9 @@ def halves(run: Run) -> NDArray:
     -------
     (m,) int array
     """
-    return np.bitwise_count(np.floor((run.time - run.time[0]) / STRETCH_S).astype(np.int64)) % 2
+    # Length of the stretches of a run that alternate between the two halves, s.
+    stretch_s = 1.0
+    return np.bitwise_count(np.floor((run.time - run.time[0]) / stretch_s).astype(np.int64)) % 2
 
 
 def _shared_term(cause: Candidate) -> Term:
@@ -102,7 +96,8 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     for place in begins:
         terms = _with_shape(terms, *place, NEVER)
     learned = _learn_amplitudes(fit, terms, run, baseline, learnt)
-    for _ in range(ROUNDS if begins else 0):
+    # Onsets are sought twice, because each is found with the others held.
+    for _ in range(2 if begins else 0):
         for place in begins:
             instant = _begun(fit, learned, place, run, baseline, learnt)
             learned = _learn_amplitudes(
@@ -156,7 +151,8 @@ def _bent(
         for number, cause in enumerate(fit.causes)
         if (i := cause.per_run_transform) is not None
     ]
-    for _ in range(NEWTON_STEPS if places else 0):
+    # Along per-run shapes the torque is nearly linear, so three steps suffice.
+    for _ in range(3 if places else 0):
         columns, measured = plain
         slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
         # Own amplitudes move with the shapes, or shapes would make up for their errors.

@@ -15,9 +15,6 @@ from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.effects import Side
 from pipelines.model import ParameterLayout, TermColumns
 
-STEP = 0.01
-"""Step of a difference along a shape parameter, as a share of its typical range."""
-
 
 @dataclass(frozen=True)
 class Fit:
@@ -236,4 +233,6 @@ def step_of(cause: Candidate, i: int, run: int = 0) -> float:
         In the shape's unit.
     """
     low, high = cause.effect.shape[i].typical
-    return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)
+    # Step of a difference along a shape parameter, as a share of its typical range.
+    share = 0.01
+    return share * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)

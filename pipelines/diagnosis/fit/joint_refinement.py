@@ -17,17 +17,6 @@ from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacked_columns
 
-ROUNDS = 3
-"""Rounds in which joint loads are computed again from the refitted rigid bodies."""
-SETTLING = 5
-"""Steps in which rigid bodies converge at given shapes, each half way to the refitted ones."""
-STEPS = 3
-"""Steps of a round."""
-HALVINGS = 3
-"""Times that a step is halved until one gains."""
-ENOUGH = 1e-4
-"""Relative fall of the cost below which a round has converged."""
-
 Place = tuple[int, int, int, float]
 """Cause, shape parameter, run (-1 where runs share it), and its unit of change."""
 
@@ -54,7 +43,8 @@ class Refinement:
 
     def _at_rest(self, best: Fit) -> Fit:
         """Return the fit at the same shapes with joint loads of its own rigid bodies."""
-        for _ in range(SETTLING):
+        # Five steps converge, each half way to the refitted bodies.
+        for _ in range(5):
             loads = self._loads_after(best)
             best = self._fit(best.causes, self._with_loads(loads), loads)
         return best
@@ -62,14 +52,16 @@ class Refinement:
     def _refined(self, best: Fit) -> Fit:
         """Return the best fit of some rounds from a start."""
         fits = [best]
-        for _ in range(ROUNDS if best.causes else 0):
+        # Relative fall of the cost below which a round has converged.
+        enough = 1e-4
+        for _ in range(3 if best.causes else 0):
             # Without this cause the fit's bodies were biased, and so were the loads.
             loads = self._loads_after(best)
             runs = self._with_loads(loads)
             start = self._fit(best.causes, runs, loads)
             ahead = self._stepped(self._forms(start, runs), runs)
             fits.append(ahead)
-            if ahead.cost > best.cost - ENOUGH * abs(best.cost):
+            if ahead.cost > best.cost - enough * abs(best.cost):
                 break
             best = ahead
         return min(fits, key=lambda one: one.cost)
@@ -97,7 +89,7 @@ class Refinement:
 
     def _stepped(self, best: Fit, runs: Sequence[Run]) -> Fit:
         """Return the fit after a few steps of its shapes, its forms unchanged."""
-        for _ in range(STEPS):
+        for _ in range(3):
             best = self._onsets(best, runs)
             ahead = self._step(best, runs)
             if ahead is None:
@@ -154,8 +146,9 @@ class Refinement:
         gram = gram_of_runs(runs, wide, [measured for _, measured in plain])
         # Only the steps of shapes are used: amplitudes are fitted again at each length.
         steps = solve(gram, self._weights)[len(best.values) :]
+        # The step is halved until it gains.
         length = 1.0
-        for _ in range(HALVINGS):
+        for _ in range(3):
             causes = _moved(best.causes, places, length * steps, runs)
             ahead = self._fit(causes, runs, best.loads)
             if ahead.cost < best.cost:

@@ -28,27 +28,6 @@ from pipelines.signals.blocks import dilate
 
 NEAR_S = 0.12
 """Half width of a reversal's neighbourhood, s: the memory of a low-pass of ``CUTOFF_HZ``."""
-SHORTEST, LONGEST = 2e-5, 0.01
-"""Range of travels, rad, on an exoskeleton's scale. A shorter travel is at once; a longer one shows
-away from reversals too."""
-TRAVELS = 16
-"""Number of travels tried between ``SHORTEST`` and ``LONGEST``."""
-SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
-"""Speeds, rad/s, on an exoskeleton's scale, within which friction that depends on speed
-reverses."""
-LATE_S = (0.02, 0.04, 0.06)
-"""Delays after the reversal, as far as ``time_delay`` goes, s. Friction is late where the torque is
-read late."""
-ROUNDING = 1e-9
-"""Share of the largest angle below which a step between two readings is rounding."""
-TAKEN = 0.2
-"""Share of the error's power near reversals that a travel must explain in addition to speed or
-delay."""
-NEEDED = 6.0
-"""Log likelihood that a travel must gain over the best way without one."""
-COUNTS = 2
-"""Shortest travel in counts of the encoder: over a shorter one friction changes sides between two
-readings."""
 
 
 @dataclass(frozen=True)
@@ -173,32 +152,53 @@ def _of_joint(
     joint = baseline.joints[j]
     scale = baseline.machine.scale(joint)
     count = max(_count(about.read) for about in (*train, *validate))
-    shortest, longest = max(SHORTEST * scale.travel, COUNTS * count), LONGEST * scale.travel
+    # Over a shorter travel than two counts, friction changes sides between two readings.
+    at_once = 2e-5 * scale.travel
+    shortest = max(at_once, 2 * count)
+    # A longer travel shows away from reversals too.
+    longest = 0.01 * scale.travel
     # A coarse encoder does not show travels as short as presliding.
     if 2.0 * shortest > longest:
         return None
-    travels = np.geomspace(shortest, longest, TRAVELS)
+    travels = np.geomspace(shortest, longest, 16)
     over = [_side_over(0.5 * count, travel) for travel in travels]
     best, trained = _best(train, over)
-    if best in (0, TRAVELS - 1):
+    if best in (0, len(travels) - 1):
         # At once, within the encoder's resolution, or over more than a reversal's neighbourhood.
         return None
-    by_speed = [_side_by_speed(speed * scale.speed) for speed in SPEEDS]
     # At once by the measured angle is a rival too: its gain is not the travel's.
-    as_read = _side_over(0.5 * count, SHORTEST * scale.travel)
-    rivals = [_side_at_once, as_read, *by_speed, *map(_side_late, LATE_S)]
+    rivals = [_side_over(0.5 * count, at_once), *_sides_without_travel(scale.speed)]
     beaten, otherwise = (_best(some, rivals)[1] for some in (train, validate))
     remaining = _power(validate, over[best])
+    # Share of the error's power near reversals that a travel must explain in addition to a rival.
+    taken = 0.2
+    # Log likelihood that a travel must gain over the best rival.
+    needed = 6.0
     independent = CUTOFF_HZ * sum(about.seconds for about in train)
     # The travel was chosen on the training runs, so the validation runs must gain as well.
     ratios = trained / beaten, remaining / otherwise
-    if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
+    if max(ratios) > 1.0 - taken or -0.5 * independent * np.log(ratios[0]) < needed:
         return None
     return BuildUp(
         joint,
         float(travels[best]),
         *np.sqrt([_power(validate, _side_at_once), otherwise, remaining]).tolist(),
     )
+
+
+def _sides_without_travel(scale: float) -> list[Side]:
+    """Return the ways in which friction changes sides at once, by speed or late.
+
+    ``scale`` is the joint's speed over an exoskeleton's.
+    """
+    # Speeds, rad/s, on an exoskeleton's scale, within which friction that depends on speed
+    # reverses.
+    speeds = (0.02, 0.04, 0.08, 0.16, 0.32)
+    # Delays after the reversal, as far as `time_delay` goes, s. Friction is late where the torque
+    # is read late.
+    late_s = (0.02, 0.04, 0.06)
+    by_speed = [_side_by_speed(speed * scale) for speed in speeds]
+    return [_side_at_once, *by_speed, *map(_side_late, late_s)]
 
 
 def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:
@@ -233,7 +233,9 @@ def _count(angle: NDArray) -> float:
     """Return the smallest step of a measured angle above rounding."""
     read = angle[np.isfinite(angle)]
     steps = np.abs(np.diff(read))
-    return float(np.min(steps[steps > ROUNDING * np.abs(read).max(initial=0.0)], initial=np.inf))
+    # Share of the largest angle below which a step between two readings is rounding.
+    rounding = 1e-9
+    return float(np.min(steps[steps > rounding * np.abs(read).max(initial=0.0)], initial=np.inf))
 
 
 @njit(cache=True)

@@ -26,10 +26,6 @@ from pipelines.diagnosis.fit.joint_fit import (
 from pipelines.estimation.long_run import long_run_covariance
 from pipelines.estimation.sandwich import sandwich
 
-RECURRENCE_S = 10.0
-"""Time after which a motion without a period is assumed to pass through the same states again,
-s."""
-
 
 @dataclass(frozen=True)
 class Uncertainty:
@@ -161,7 +157,10 @@ def _correlated_blocks(run: Run) -> float:
     They are neighbours within ``ALIKE_S``, once a period.
     """
     seconds = len(run.time) / run.blocks_in(1.0)
-    return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or RECURRENCE_S), 1.0)
+    # Time after which a motion without a period is assumed to pass through the same states again,
+    # s.
+    recurrence_s = 10.0
+    return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or recurrence_s), 1.0)
 
 
 def _onsets(

@@ -12,11 +12,6 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
 
-RESAMPLES = 500
-"""Bootstrap samples of an interval."""
-STRETCH_S = 5.0
-"""Length of a bootstrap block where the excitation does not repeat."""
-
 
 @dataclass(frozen=True)
 class Errors:
@@ -65,11 +60,13 @@ def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
     Errors
     """
     squares, counts, everywhere, valid = [], [], 0.0, 0
+    # Length of a bootstrap block where the excitation does not repeat.
+    stretch_s = 5.0
     for run, residual in zip(runs, residuals, strict=True):
         J = len(run.motion.joints)
         chosen = scored(run)
         # Errors within a period are dependent, so whole periods are drawn in the bootstrap.
-        length = run.motion.period_s or STRETCH_S
+        length = run.motion.period_s or stretch_s
         number = np.floor(run.time / length).astype(int)
         number -= number.min()
         own = np.zeros((number.max() + 1, J))
@@ -109,8 +106,10 @@ def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0)
         joint = int(np.argmax(before.rms - after.rms))
     rng = np.random.default_rng(seed)
     blocks = len(before.counts)
+    # Bootstrap samples of an interval.
+    resamples = 500
     # The same blocks for both models, so that noise that they share cancels.
-    drawn = rng.integers(0, blocks, (RESAMPLES, blocks))
+    drawn = rng.integers(0, blocks, (resamples, blocks))
     counts = np.maximum(before.counts[drawn].sum(axis=1), 1)
     worth = [np.sqrt(e.squares[drawn, joint].sum(axis=1) / counts) for e in (before, after)]
     low, high = np.quantile(worth[0] - worth[1], [0.025, 0.975])

@@ -22,9 +22,6 @@ from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import Family
 from pipelines.wording.law import FAMILIES, law_label
 
-LEAST_VARIANCE = 1e-10
-"""Least variance of slow noise's coefficients, in squared shares of the torque: keeps their
-precision finite."""
 LineEvidence = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and its number of phases."""
 
@@ -190,7 +187,10 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     rest = np.setdiff1d(np.arange(len(gram)), slow)
     order = np.concatenate([slow, rest]).astype(int)
     free = np.full(len(gram), 1.0 / CRITERIA.explained_share**2)
-    as_noise = np.concatenate([1.0 / np.maximum(variance, LEAST_VARIANCE), free[: len(rest)]])
+    # Least variance of slow noise's coefficients, in squared shares of the torque: keeps their
+    # precision finite.
+    least_variance = 1e-10
+    as_noise = np.concatenate([1.0 / np.maximum(variance, least_variance), free[: len(rest)]])
     next_to_noise = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
     if not most:
         return next_to_noise

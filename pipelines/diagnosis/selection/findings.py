@@ -13,8 +13,6 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.answer import Answer, NamedCause
 from pipelines.diagnosis.selection.posterior import Posterior
 
-CLOSEST = 3
-"""Largest number of listed causes that are reported where none is named."""
 LEVELS = ("repeats", "joint", "family")
 """From the root to the causes: attributes of elements."""
 Inside = frozenset[int]
@@ -142,13 +140,15 @@ def _finding(
 ) -> Finding:
     """Return the finding that one of these elements within a node is missing."""
     deepest = [level for level in LEVELS if level in node] or ["repeats"]
+    # Largest number of listed causes that are reported where none is named.
+    most = 3
     return Finding(
         "repeatability" if deepest[-1] == "repeats" else deepest[-1],
         node.get("repeats"),
         node.get("joint"),
         node.get("family"),
         probability,
-        tuple(_ranked(posterior, inside, are_laws=False))[:CLOSEST],
+        tuple(_ranked(posterior, inside, are_laws=False))[:most],
         tuple(_ranked(posterior, inside, are_laws=True)),
         _path(posterior, node),
     )

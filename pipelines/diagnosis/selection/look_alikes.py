@@ -18,9 +18,6 @@ from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.wording.law import UNLISTED, law_label
 
-LEAST = 0.01
-"""Smallest share of the systematic error whose logarithm is taken."""
-
 
 def kept_share(
     removed: ArrayLike,
@@ -45,8 +42,10 @@ def kept_share(
         Between 0 and 1.
     """
     intercept, slope = np.asarray(look_alike)
+    # Smallest share of the systematic error whose logarithm is taken.
+    least = 0.01
     # One less the chance of a true cause, whose log odds are a + b ln r.
-    resembles = expit(-intercept - slope * np.log(np.maximum(removed, LEAST)))
+    resembles = expit(-intercept - slope * np.log(np.maximum(removed, least)))
     return np.asarray(1.0 - np.maximum(resembles - np.asarray(smooth_law_ratio), 0.0))
 
 

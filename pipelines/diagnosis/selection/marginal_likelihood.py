@@ -22,14 +22,8 @@ from pipelines.diagnosis.selection.prior import FEATURES, features, of_set, weig
 
 ROUGH_SHARE = 0.08
 """Prior share with which sets are screened before they are weighed in full."""
-WIDEST = 12
-"""Largest number of an element's columns that count in screening."""
-WIDTHS = (3, 6, WIDEST)
-"""Numbers of columns by which elements are screened together."""
-CHUNK = 4000
-"""Number of sets that are screened at once: bounds the memory."""
-LEAST_SIZE = 1e-4
-"""Least share of an element's size, because its logarithm is taken."""
+WIDTHS = (3, 6, 12)
+"""Numbers of columns by which elements are screened together; the last is the most that count."""
 
 
 class MarginalLikelihood:
@@ -128,7 +122,7 @@ class MarginalLikelihood:
         Returns
         -------
         (set,) array
-            At least ``LEAST_SIZE``.
+            At least 1e-4, because logarithms of it are taken.
         """
         elements = [self.evidence.elements[i] for i in chosen]
         columns = np.concatenate([self.parts[i] for i in chosen])
@@ -140,7 +134,7 @@ class MarginalLikelihood:
         ends = np.cumsum([0, *(len(self.parts[i]) for i in chosen)])
         own = [values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)]
         # The columns of a cause are orthonormal, so the norm is its share.
-        return np.maximum([np.linalg.norm(v) for v in own], LEAST_SIZE)
+        return np.maximum([np.linalg.norm(v) for v in own], 1e-4)
 
     def _log_evidence(
         self, columns: NDArray, variance: NDArray, elements: Sequence[Element]
@@ -197,11 +191,13 @@ class MarginalLikelihood:
         # A few common widths: thousands of small systems are solved at once.
         columns, sd, width = self._padded(numbers)
         odds = np.empty(len(one))
+        # Number of sets that are screened at once: bounds the memory.
+        chunk = 4000
         for a in WIDTHS:
             for b in WIDTHS:
                 rows = np.flatnonzero((width[one] == a) & (width[other] == b))
-                for start in range(0, len(rows), CHUNK):
-                    some = rows[start : start + CHUNK]
+                for start in range(0, len(rows), chunk):
+                    some = rows[start : start + chunk]
                     c = np.hstack([columns[one[some], :a], columns[other[some], :b]])
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
@@ -212,13 +208,14 @@ class MarginalLikelihood:
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and their true widths."""
         # A padded column has no prior variance: it adds a row of the unit matrix, and no evidence.
-        columns = np.zeros((len(chosen), WIDEST), dtype=int)
-        sd, width = np.zeros((len(chosen), WIDEST)), np.zeros(len(chosen), dtype=int)
+        widest = WIDTHS[-1]
+        columns = np.zeros((len(chosen), widest), dtype=int)
+        sd, width = np.zeros((len(chosen), widest)), np.zeros(len(chosen), dtype=int)
         for n, i in enumerate(chosen):
-            own = self.parts[i][:WIDEST]
+            own = self.parts[i][:widest]
             columns[n, : len(own)] = own
             variance = self._variance(self.evidence.elements[i], ROUGH_SHARE**2)
-            sd[n, : len(own)] = np.sqrt(variance[:WIDEST])
+            sd[n, : len(own)] = np.sqrt(variance[:widest])
             width[n] = next(w for w in WIDTHS if w >= len(own))
         return columns, sd, width
 

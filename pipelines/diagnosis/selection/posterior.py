@@ -20,28 +20,8 @@ from pipelines.diagnosis.criteria import CRITERIA, Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 
-SHAPES = 2
-"""Number of shapes of each cause in pairs."""
-PAIRS = 150
-"""Number of pairs that are weighed in full."""
-PARTNERS = 15
-"""Number of elements that are paired with a wandering torque."""
-EXTENDED = 6
-"""Number of pairs that are extended to triples."""
-TRIPLES = 8
-"""Number of triples of each pair that are weighed in full."""
-
-CONTEXTS = 8
-"""Most sets whose causes are refined together."""
-
-STRONGEST = 2
-"""Number of most probable single causes, each of which is refined together with possible
-partners."""
-
 SURE = 1.0 - 1e-12
 """Probability that counts as certain: above it rounding decides."""
-TOLERANCE = 1e-6
-"""Log odds by which a probability may fall short of its least value."""
 
 Set = tuple[int, ...]
 
@@ -100,7 +80,9 @@ class Posterior:
         lacking = wanted - float(
             logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside])
         )
-        if not TOLERANCE < lacking < np.inf:
+        # Log odds by which a probability may fall short of its least value.
+        tolerance = 1e-6
+        if not tolerance < lacking < np.inf:
             return self
         return self._with(self.log_odds + np.where(inside, lacking, 0.0))
 
@@ -200,6 +182,8 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
     The sets are more probable than nothing, unless it is likely that something is missing.
     """
     contexts: dict[frozenset[str], Context] = {}
+    # Most sets whose causes are refined together.
+    most = 8
     for chosen in weighed.sets:
         # A law without columns leaves a cause's shape as it is.
         elements = [e for e in (weighed.elements[i] for i in chosen) if e.columns]
@@ -208,7 +192,7 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
             laws = tuple(e.variant for e in elements if e.is_law)
             contexts.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
         # Sets come by falling probability: all after the empty one are less likely than nothing.
-        if len(contexts) == CONTEXTS or (not chosen and weighed.nothing > CRITERIA.named_from):
+        if len(contexts) == most or (not chosen and weighed.nothing > CRITERIA.named_from):
             break
     return list(contexts.values())
 
@@ -219,9 +203,12 @@ def strongest(weighed: Posterior) -> list[int]:
     The result is empty where nothing is missing.
     """
     causes: dict[str, int] = {}
+    # Number of most probable single causes, each of which is refined together with possible
+    # partners.
+    most = 2
     for chosen in weighed.sets:
         element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
-        if len(causes) == STRONGEST or (not chosen and weighed.nothing > CRITERIA.named_from):
+        if len(causes) == most or (not chosen and weighed.nothing > CRITERIA.named_from):
             break
         if element is not None and not element.is_law:
             causes.setdefault(element.label, element.library_number)
@@ -238,7 +225,9 @@ def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[i
     # Screening sees few columns of an element, and a wandering torque has dozens. So it is paired
     # with the best elements instead.
     wide = [i for i, e in enumerate(elements) if e.is_law and e.name == TIME]
-    several = [i for own in shapes.values() for i in own[:SHAPES] if i not in wide]
+    # Number of shapes of each cause in pairs.
+    of_each = 2
+    several = [i for own in shapes.values() for i in own[:of_each] if i not in wide]
     return several, [own[0] for own in shapes.values()], wide
 
 
@@ -246,9 +235,13 @@ def _pairs(weigh: MarginalLikelihood) -> list[Set]:
     """Return the pairs to weigh in full."""
     several, best, wide = _contenders(weigh)
     pairs, odds = weigh.pairs(several)
-    order = np.argsort(-odds)[:PAIRS]
+    # Number of pairs that are weighed in full.
+    most = 150
+    order = np.argsort(-odds)[:most]
     chosen = {tuple(sorted(map(int, pairs[n]))) for n in order}
-    chosen |= {tuple(sorted((w, i))) for w in wide for i in best[:PARTNERS] if i != w}
+    # Number of elements that are paired with a wandering torque.
+    partners = 15
+    chosen |= {tuple(sorted((w, i))) for w in wide for i in best[:partners] if i != w}
     return sorted(chosen)
 
 
@@ -256,11 +249,15 @@ def _triples(weigh: MarginalLikelihood, odds: dict[Set, float]) -> list[Set]:
     """Return the triples to weigh in full: they extend the best pairs."""
     elements = weigh.evidence.elements
     _, best, wide = _contenders(weigh)
-    pairs = sorted((s for s in odds if len(s) == 2), key=lambda s: -odds[s])[:EXTENDED]
+    # Number of pairs that are extended to triples.
+    extended = 6
+    pairs = sorted((s for s in odds if len(s) == 2), key=lambda s: -odds[s])[:extended]
     triples: set[Set] = set()
+    # Number of triples of each pair that are weighed in full.
+    of_each_pair = 8
     for pair in pairs:
         labels = {elements[i].label for i in pair}
         more = [i for i in {*best, *wide} if elements[i].label not in labels]
         scored = sorted(more, key=lambda i: -weigh.rough((*pair, i)))
-        triples |= {tuple(sorted((*pair, i))) for i in scored[:TRIPLES]}
+        triples |= {tuple(sorted((*pair, i))) for i in scored[:of_each_pair]}
     return sorted(triples)

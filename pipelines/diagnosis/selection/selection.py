@@ -24,13 +24,6 @@ from pipelines.diagnosis.selection.posterior import (
 )
 from pipelines.effects import EFFECTS
 
-LIBRARY_SHARE = 0.6
-"""Position of the progress bar at which the library is done."""
-PARTNERS = 5
-"""Number of causes that are refined together with each of the most probable ones."""
-ROUNDS = 50
-"""Rounds in which the probabilities of several groups are raised to their least values in turn."""
-
 
 @dataclass(frozen=True)
 class Selection:
@@ -239,7 +232,7 @@ def _lowered(one: NamedCause, charges: Mapping[str, float], elements: Sequence[E
 def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> Posterior:
     """Return the posterior where each group of labels has at least its least probability."""
     # To raise one group lowers the others, so they take turns until none changes.
-    for _ in range(ROUNDS):
+    for _ in range(50):
         before = weighed
         for members, probability in floors.items():
             weighed = weighed.at_least(members, probability)
@@ -273,15 +266,19 @@ def weighed(prepared: PreparedRuns, report: Report = silent) -> tuple[Library, E
 
     Causes are refined alone first, then together with the others of likely sets.
     """
-    library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
-    report(LIBRARY_SHARE, "posterior")
+    # Position of the progress bar at which the library is done.
+    library_share = 0.6
+    library = build_library(prepared, lambda share, what: report(library_share * share, what))
+    report(library_share, "posterior")
     auxiliary = _auxiliary(prepared)
     evidence = Evidence.of(library, auxiliary)
     result = posterior(evidence)
     # The first posterior names sets that are worth a joint refinement, which is expensive.
     refined = library
+    # Number of causes that are refined together with each of the most probable ones.
+    partners = 5
     for number in strongest(result):
-        refined = refined.with_partners(number, PARTNERS)
+        refined = refined.with_partners(number, partners)
     refined = refined.refined_together(likely_contexts(result))
     if refined is library:
         return library, evidence, result

@@ -14,8 +14,6 @@ from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
 from pipelines.wording.law import LAW
 
-ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "absorbed": 4}
-
 
 def candidates(d: Diagnosis) -> pd.DataFrame:
     """Return every set that was weighed, the named one first, then by probability."""
@@ -38,7 +36,8 @@ def candidates(d: Diagnosis) -> pd.DataFrame:
         _row(d, {label}, "rejected", f"it was left out: {left_out}")
         for label in (library.left_out if library else ())
     ]
-    rows.sort(key=lambda r: (ORDER[r["verdict"]], -(r["probability"] or 0.0)))
+    order = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "absorbed": 4}
+    rows.sort(key=lambda r: (order[r["verdict"]], -(r["probability"] or 0.0)))
     frame = pd.DataFrame(rows)
     frame.insert(0, "rank", range(1, len(frame) + 1))
     return frame

@@ -6,10 +6,6 @@ from pipelines.diagnosis.selection.answer import NamedCause, in_place
 from pipelines.effects import Effect
 from pipelines.wording.label import amount, effect_labelled, in_words, number
 
-CERTAIN = 1000.0
-"""Odds above which no figure is given: no calibration supports one."""
-MENTIONED_FROM = 3.0
-"""Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
 NEARLY_ALL = 0.9
 """Share of the systematic error below which the evidence says that a cause may be a look-alike."""
 
@@ -40,7 +36,9 @@ def cause_evidence(d: Diagnosis, named: NamedCause) -> list[str]:
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None
-    if d.selected.evidence.auxiliary.get(label, 0.0) > MENTIONED_FROM:
+    # Log likelihood from which auxiliary evidence is mentioned: odds of 20.
+    mentioned_from = 3.0
+    if d.selected.evidence.auxiliary.get(label, 0.0) > mentioned_from:
         sentences.append(effect.cuff_coherence)
     lines = len(named.element.lines)
     if lines:
@@ -89,12 +87,14 @@ def _next(d: Diagnosis, named: NamedCause) -> str | None:
         return None
     rival, p = others[0]
     odds = (own + sum(rivals[tied] for tied in ties)) / p
+    # Odds above which no figure is given: no calibration supports one.
+    certain = 1000.0
     times = (
         "no"
         if odds <= 1.0
         else f"{odds:.3g} times"
-        if odds < CERTAIN
-        else f"over {CERTAIN:g} times"
+        if odds < certain
+        else f"over {certain:g} times"
     )
     return (
         f"the next listed cause in its place, {in_words(effect_labelled(rival))}, is {times} less"

@@ -11,13 +11,6 @@ from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.mechanics.geometry import Geometry
 from pipelines.wording.label import amount, label_in_words
 
-HIDING = 0.2
-"""Share of a joint's torque above which a noise floor is doubtful: no sensor is as
-noisy, and friction is seldom more."""
-
-LARGER = 2.0
-"""Error of the validation runs over that of the training runs from which a caveat reports it."""
-
 
 def caveats(d: Diagnosis) -> list[str]:
     """Return the caveats of the verdict, a sentence or two each."""
@@ -51,7 +44,10 @@ def caveats(d: Diagnosis) -> list[str]:
 def floor_that_hides(d: Diagnosis) -> dict[str, float]:
     """Return joints whose noise floor is high, with its share of their torque."""
     shares = zip(d.baseline.joints, (d.floor_rms / d.torque_rms).tolist(), strict=True)
-    return {joint: share for joint, share in shares if share > HIDING}
+    # Share of a joint's torque above which a noise floor is doubtful: no sensor is as noisy, and
+    # friction is seldom more.
+    hiding = 0.2
+    return {joint: share for joint, share in shares if share > hiding}
 
 
 def _high_floor(d: Diagnosis) -> list[str]:
@@ -164,10 +160,12 @@ def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
     # The fit has errors of the cuffs too, after those of the drives.
     errors = zip(d.after.errors.rms.tolist(), d.after.fit.rms.tolist(), strict=False)
     pairs = zip(d.baseline.joints, errors, strict=True)
+    # Error of the validation runs over that of the training runs from which a caveat reports it.
+    larger = 2.0
     return (
         {}
         if d.data.spoilt or d.fitted_to_all
-        else {joint: both for joint, both in pairs if both[0] > LARGER * both[1]}
+        else {joint: both for joint, both in pairs if both[0] > larger * both[1]}
     )
 
 

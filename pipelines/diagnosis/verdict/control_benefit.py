@@ -19,10 +19,6 @@ from pipelines.mechanics.gait import gait
 from pipelines.model import Model, Term
 from pipelines.settings.simulate import SimulateSettings
 
-CASE = SimulateSettings()
-"""The reference case of docs/simulation.md: the same for every machine, so that numbers can be
-compared."""
-
 
 def control(d: Diagnosis) -> dict[str, Any]:
     """Return tracking error and peak torque of the adaptive loop, as JSON objects.
@@ -30,6 +26,9 @@ def control(d: Diagnosis) -> dict[str, Any]:
     They are predicted without and with the named causes, from ``settled_after_s`` on: before, the
     drives are at their limit, whatever the leg.
     """
+    # The reference case of docs/simulation.md is the same for every machine, so that numbers can be
+    # compared.
+    case = SimulateSettings()
     # The loop is meant for a leg with a wearer; without such runs the empty machine stands in.
     run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
     benefit: dict[str, Any] = {
@@ -38,7 +37,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
             "type": "rbf",
             "reference": "gait",
             # These settings of `exoid simulate` do not change the loop.
-            **CASE.model_dump(mode="json", exclude={"sweep_nm_s_rad", "figures"}),
+            **case.model_dump(mode="json", exclude={"sweep_nm_s_rad", "figures"}),
         },
         "without": None,
         "with": None,
@@ -54,23 +53,25 @@ def control(d: Diagnosis) -> dict[str, Any]:
     reasons = [] if d.causes else ["no cause is named"]
     for which, fitted in fits.items():
         try:
-            benefit[which] = _tracked(fitted_model(fitted, d.baseline, run), run, d)
+            benefit[which] = _tracked(fitted_model(fitted, d.baseline, run), run, case, d)
         except ExoidError as error:
             # Only the first sentence applies: the second is advice for `exoid simulate`.
             reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
     return benefit | {"reason": "; ".join(reasons) or None}
 
 
-def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:
+def _tracked(
+    model: Model, run: str, case: SimulateSettings, d: Diagnosis
+) -> dict[str, dict[str, float]]:
     motion = d.validate[0].motion
     terms = tuple(_from_the_begin(term) for term in model)
     loop = track(
-        make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait()
+        make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), case, gait()
     )
     # A loop that diverges has no tracking error; the verdict gives the reason instead.
     if loop.ran_away:
         raise InputError(loop.ran_away)
-    settled = loop.time >= CASE.settled_after_s
+    settled = loop.time >= case.settled_after_s
     rms = np.sqrt(np.mean(loop.error[settled] ** 2, axis=0))
     peak = np.abs(loop.run.torque[settled]).max(axis=0)
     joints = d.baseline.joints

@@ -15,20 +15,13 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.validation_error import scored
 
-FLOOR, REPEATS, WANDERS, UNEXPLAINED = (
-    "noise_floor",
-    "repeatable_unexplained",
-    "not_repeatable",
-    "unexplained",
-)
-"""Names of the shares that are no causes; without a period ``UNEXPLAINED`` replaces the two before
-it."""
-
 
 def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     """Return the shares of each joint's mean square error.
 
-    A cause's share, by its label, is below zero at a joint whose error it raises.
+    A cause's share, by its label, is below zero at a joint whose error it raises. The others are
+    ``noise_floor``, ``repeatable_unexplained`` and ``not_repeatable``; without a period
+    ``unexplained`` replaces the last two.
 
     Parameters
     ----------
@@ -47,16 +40,16 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     scatter = scatter_between_periods(d.validate, d.after.residuals)
     budget = {}
     for j, joint in enumerate(d.baseline.joints):
-        shares = {FLOOR: float(floor[j])} | {
+        shares = {"noise_floor": float(floor[j])} | {
             label: float(share[j]) for label, share in causes.items()
         }
         above = float(remaining[j] - floor[j])
         if scatter is None:
-            shares[UNEXPLAINED] = above
+            shares["unexplained"] = above
         else:
             # The scatter is an estimate as well, so the difference may be negative.
-            shares[REPEATS] = float(np.clip(remaining[j] - scatter[j], 0.0, above))
-            shares[WANDERS] = above - shares[REPEATS]
+            repeats = float(np.clip(remaining[j] - scatter[j], 0.0, above))
+            shares |= {"repeatable_unexplained": repeats, "not_repeatable": above - repeats}
         budget[joint] = shares
     return budget
 

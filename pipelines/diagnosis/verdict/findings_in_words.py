@@ -12,9 +12,6 @@ from pipelines.mechanics.machine import Machine
 from pipelines.wording.label import in_words
 from pipelines.wording.law import family_in_words, is_of_other_joint, kind_and_joint, law_in_words
 
-WORTH_A_LINE = 0.01
-"""Probability below which a law is not listed with a finding."""
-
 
 def findings(d: Diagnosis) -> list[dict[str, Any]]:
     """Return the findings as JSON objects, each with its words and its unlisted laws."""
@@ -71,8 +68,10 @@ def _node_in_words(
 
 def _laws(finding: Finding, machine: Machine) -> Iterator[dict[str, Any]]:
     """Yield the unlisted laws of a finding that are worth a line."""
+    # Probability below which a law is not listed with a finding.
+    least = 0.01
     for label, p in finding.laws:
-        if p >= WORTH_A_LINE:
+        if p >= least:
             kind, joint = kind_and_joint(label)
             yield {
                 "law": kind,

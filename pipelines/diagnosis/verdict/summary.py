@@ -13,8 +13,6 @@ from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.wording.label import amount, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import UNLISTED
 
-MENTIONED = 3
-"""Largest number of tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
 """Least probability of a cause that is reported as the closest."""
 
@@ -252,6 +250,8 @@ def _in_words(cause: Cause) -> str:
     likely = f"{cause.probability:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
-    more = [f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else []
-    *most, last = [*alike[:MENTIONED], *more]
+    # Largest number of tied causes in the summary; `indistinguishable_from` has all.
+    mentioned = 3
+    more = [f"{len(alike) - mentioned} more"] if len(alike) > mentioned else []
+    *most, last = [*alike[:mentioned], *more]
     return f"{', '.join(most)} or {last}, which these data cannot separate (together {likely})"

@@ -10,9 +10,6 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.joint_fit import residuals_on
 from pipelines.diagnosis.fit.validation_error import errors_of
 
-MENTIONED = 5
-"""Most variables that the verdict lists for the remaining error."""
-
 
 def unexplained(d: Diagnosis, dependences: list[Dependence]) -> dict[str, Any]:
     """Describe the residual of the validation runs, and fit a smooth term to the training runs.
@@ -34,11 +31,13 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> dict[str, Any]:
         for run, r in zip(d.validate, d.after.residuals, strict=True)
     ]
     rms = zip(d.baseline.joints, errors_of(d.validate, joints).rms.tolist(), strict=True)
+    # Most variables that the verdict lists for the remaining error.
+    most = 5
     return {
         "description": describe(d.baseline.machine, dependences, above, term.surfaces),
         "depends_on": [
             {"joint": one.joint, "variable": one.variable, "share": one.share}
-            for one in dependences[:MENTIONED]
+            for one in dependences[:most]
         ],
         # Its error is measured, as the term may do harm on the validation runs.
         "smooth_term": {"what": term.describe(), "rmse_nm": dict(rms)},

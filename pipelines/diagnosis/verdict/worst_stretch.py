@@ -16,11 +16,6 @@ from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 
-STRETCH_S = 6.0
-"""Length of the stretch, s."""
-STEP_S = 0.5
-"""Time between the starts of successive stretches, s."""
-
 
 @dataclass(frozen=True)
 class Stretch:
@@ -54,18 +49,22 @@ def worst_stretch(d: Diagnosis) -> Stretch:
 
 
 def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
+    # Length of the stretch, s.
+    stretch_s = 6.0
+    # Time between the starts of successive stretches, s.
+    step_s = 0.5
     for number, (run, residual) in enumerate(zip(d.validate, d.before.residuals, strict=True)):
         # Blocks near reversals are left out: no fit uses them.
         square = np.sum((residual[:, : len(d.floor_rms)] / d.floor_rms) ** 2, axis=1) * scored(run)
         # A difference of cumulated sums is the sum over a stretch.
         total = np.concatenate([[0.0], np.cumsum(square)])
         # A run that is shorter than a stretch is one stretch.
-        last = max(run.time[-1] - STRETCH_S, run.time[0])
-        for begin in np.arange(run.time[0], last + STEP_S, STEP_S):
-            inside = np.searchsorted(run.time, [begin, begin + STRETCH_S])
+        last = max(run.time[-1] - stretch_s, run.time[0])
+        for begin in np.arange(run.time[0], last + step_s, step_s):
+            inside = np.searchsorted(run.time, [begin, begin + stretch_s])
             yield (
                 float(np.diff(total[inside])[0]),
-                Stretch(number, float(begin), float(begin + STRETCH_S)),
+                Stretch(number, float(begin), float(begin + stretch_s)),
             )
 
 

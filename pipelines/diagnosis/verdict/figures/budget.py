@@ -10,13 +10,9 @@ from matplotlib.patches import Patch
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.error_budget import FLOOR, REPEATS, UNEXPLAINED, WANDERS
 from pipelines.diagnosis.verdict.figures.shared import heading
-from pipelines.plotting.style import BLUE, CAUSES, NOISE
-from pipelines.plotting.style import WANDERS as SCATTER
+from pipelines.plotting.style import BLUE, CAUSES, NOISE, WANDERS
 from pipelines.wording.label import SHARES, in_words
-
-COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, UNEXPLAINED: BLUE}
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -52,9 +48,15 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
 
 def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
     """Return the colour of every share."""
-    labels = [key for key in next(iter(budget.values())) if key not in COLOURS]
+    of_no_cause = {
+        "noise_floor": NOISE,
+        "repeatable_unexplained": BLUE,
+        "not_repeatable": WANDERS,
+        "unexplained": BLUE,
+    }
+    labels = [key for key in next(iter(budget.values())) if key not in of_no_cause]
     # There are as many colours as causes in the largest set.
-    return COLOURS | dict(zip(labels, CAUSES, strict=False))
+    return of_no_cause | dict(zip(labels, CAUSES, strict=False))
 
 
 def words_of(key: str, d: Diagnosis) -> str:
@@ -99,7 +101,7 @@ def stack(
                 ha="center",
                 va="center",
                 fontsize=8,
-                color="black" if key in (FLOOR, WANDERS) else "white",
+                color="black" if key in ("noise_floor", "not_repeatable") else "white",
             )
         right, left = (right + width, left) if width >= 0 else (right, left + width)
     axis.grid(axis="y", visible=False)

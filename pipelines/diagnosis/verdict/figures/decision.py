@@ -40,16 +40,6 @@ FAMILIES = {
     "time": "#fde68a",
 }
 """Colours of the families of laws, by rising lightness, so that they differ in grey too."""
-UNLISTED = "////"
-"""Hatching of an unlisted law."""
-SHOWN, LEAST = 6, 0.01
-"""Largest number of sets in the figure, and the least probability of one: the others share one
-bar."""
-NEGLIGIBLE = 0.01
-"""Share below which a part has no entry in the legend."""
-PERSON = "of it with a person only"
-LABEL = 34
-"""Characters in a line of a label."""
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -69,7 +59,10 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
 def _shares(axis: Axes, verdict: Verdict) -> None:
     """Draw a bar for each joint, split into the parts of its residual."""
     seen: dict[str, Patch] = {}
+    with_person = "of it with a person only"
     router = verdict.router
+    # Share below which a part has no entry in the legend.
+    negligible = 0.01
     for row, shares in enumerate(router.values()):
         start = 0.0
         for part, colour in COLOURS.items():
@@ -77,16 +70,16 @@ def _shares(axis: Axes, verdict: Verdict) -> None:
             axis.barh(row, share, 0.6, start, color=colour, edgecolor="white", lw=0.8)
             if share > 0.08:  # its number fits in it
                 _number(axis, row, start, share, part)
-            if share > NEGLIGIBLE:
+            if share > negligible:
                 seen[PARTS[part]] = Patch(color=colour)
             start += share
             # What shows with a person only is a part of what repeats, at its right end.
             person = min(shares.with_person_only or 0.0, share) if part == "repeats" else 0.0
-            if person > NEGLIGIBLE:
+            if person > negligible:
                 axis.barh(
                     row, person, 0.6, start - person, fill=False, hatch="..", ec="white", lw=0
                 )
-                seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
+                seen[with_person] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
     units = {joint: of["torque"] for joint, of in verdict.units.items()}
     names = [f"{j}\n{router[j].rms_nm:.3g} {units[j]} rms" for j in router]
     axis.set_yticks(range(len(names)), names)
@@ -97,7 +90,7 @@ def _shares(axis: Axes, verdict: Verdict) -> None:
     axis.set_xlabel(
         f"share of the mean square, 0.1 s averages, {searched_runs(verdict)}", fontsize=8
     )
-    words = [*(PARTS[part] for part in COLOURS), PERSON]
+    words = [*(PARTS[part] for part in COLOURS), with_person]
     legend_below(axis, {one: seen[one] for one in words if one in seen}, 0.32, 2)
     _title(axis, "Does the error of rigid body and friction repeat?")
 
@@ -170,11 +163,14 @@ def _bars(d: Diagnosis) -> list[Bar]:
     if weighed is None:
         return []
     ranked = sorted(weighed.by_labels.items(), key=lambda item: -item[1])
-    shown = [(labels, p) for labels, p in ranked[:SHOWN] if p >= LEAST]
+    # Largest number of sets in the figure, and the least probability of one: the others share one
+    # bar.
+    most, least = 6, 0.01
+    shown = [(labels, p) for labels, p in ranked[:most] if p >= least]
     bars = [Bar(p, tuple(_elements(d, labels))) for labels, p in shown]
     rest = 1.0 - sum(p for _, p in shown)
     # A smaller rest reads as 0.00.
-    if rest >= 0.5 * LEAST:
+    if rest >= 0.5 * least:
         others = ranked[len(shown) :]
         words = f"{len(others)} other set{'s' * (len(others) > 1)}"
         if (
@@ -184,7 +180,7 @@ def _bars(d: Diagnosis) -> list[Bar]:
             and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest
         ):
             words += ", mostly the first with a further cause or law"
-        bars.append(Bar(rest, ((fill(words, LABEL), None, False, False),)))
+        bars.append(Bar(rest, ((_in_lines(words), None, False, False),)))
     return bars
 
 
@@ -200,7 +196,12 @@ def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str |
         words = label_in_words(label, d.baseline.machine)
         words += " (validation runs against it)" * (label in against)
         family, unlisted = family_of(label, weighed), label.startswith(LAW)
-        yield fill(words, LABEL), family, unlisted, label in answers
+        yield _in_lines(words), family, unlisted, label in answers
+
+
+def _in_lines(words: str) -> str:
+    """Break a label into lines that leave room for the bars."""
+    return fill(words, 34)
 
 
 def _height(bar: Bar) -> float:
@@ -216,13 +217,14 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         axis.set_axis_off()
         return
     ticks, families, top = [], dict[str, Patch](), 0.0
+    of_unlisted = "////"
     for bar in bars:
         begin = top
         for words, family, unlisted, named in bar.elements:
             height = 1.3 + words.count("\n")
             colour = FAMILIES.get(str(family), GREY)
             style: dict[str, Any] = {"color": colour, "edgecolor": "white", "lw": 0.8}
-            hatch, y = UNLISTED if unlisted else None, top + 0.5 * height
+            hatch, y = of_unlisted if unlisted else None, top + 0.5 * height
             axis.barh(y, bar.probability, height, hatch=hatch, **style)
             ticks.append((y, words, named))
             if family:
@@ -249,7 +251,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
         fontsize=8,
     )
     if any(unlisted for bar in bars for _, _, unlisted, _ in bar.elements):
-        families["unlisted law"] = Patch(facecolor=GREY, hatch=UNLISTED, edgecolor="white")
+        families["unlisted law"] = Patch(facecolor=GREY, hatch=of_unlisted, edgecolor="white")
     legend_below(axis, families, 0.17, 4)
 
 

@@ -9,9 +9,6 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
 from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE
 
-SHOWN = ("angle", "speed", "load", "time", "phase")
-"""Variables that are always shown; others only where they predict something."""
-
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw a row for each joint and a column for each rank."""
@@ -55,7 +52,9 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
 
 def _shown(ranking: list[Dependence]) -> list[Dependence]:
     """Return the variables to draw, the phase last: it can imitate everything that repeats."""
-    chosen = [one for one in ranking if one.share_before > 0.05 or one.variable in SHOWN]
+    # Variables that are always shown; others only where they predict something.
+    always_shown = ("angle", "speed", "load", "time", "phase")
+    chosen = [one for one in ranking if one.share_before > 0.05 or one.variable in always_shown]
     phase = [one for one in chosen if one.variable == "phase"]
     others = [one for one in chosen if one.variable != "phase"]
     return sorted(others, key=lambda one: -one.share_before)[:6] + phase
