@@ -33,18 +33,10 @@ from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTAB
 
 Vector = tuple[float, float, float]
 
-SWINGS_FORWARD: Vector = (0.0, -1.0, 0.0)
-"""Axis about which a positive angle swings a hanging body forward: x is forward, z up."""
 
-HANGS: Vector = (0.0, 0.0, -1.0)
-LIES_FORWARD: Vector = (1.0, 0.0, 0.0)
 RISES: Vector = (0.0, 0.0, 1.0)
-SLIDES_FORWARD: Vector = (1.0, 0.0, 0.0)
 
 NOMINAL = "Masses are nominal where X does not determine them; joint torques are unchanged."
-
-NOMINAL_MASS = 1.0
-"""Mass of a body whose dynamics do not depend on it, kg."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +55,10 @@ class Body:
     """Position of the centre of mass across the body, in the direction of positive angles, m."""
     along: float = 0.0
     """Position of the centre of mass along the body, m."""
-    axis: Vector = SWINGS_FORWARD
-    lies: Vector = HANGS
-    """Direction from the joint along the body, at angle zero."""
+    axis: Vector = (0.0, -1.0, 0.0)
+    """x is forward, z up: about the default a positive angle swings a hanging body forward."""
+    lies: Vector = (0.0, 0.0, -1.0)
+    """Direction from the joint along the body, at angle zero; the default hangs."""
     beyond: float = 0.0
     """Distance from the previous joint along the previous body, m."""
     shift: float = 0.0
@@ -94,17 +87,25 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
         If no bodies have such X, because only rotor inertia makes the mass matrix positive
         definite; or if the mechanism has no rule for its bodies.
     """
+    bodies_of: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
+        LEG: _leg,
+        LEVEL_LEG: _level_leg,
+        PENDULUM: _pendulum,
+        TURNTABLE: _turntable,
+        LIFT: _lift,
+        SLIDE: _slide,
+    }
     mechanism = exported.machine.mechanism
-    if mechanism not in BODIES_OF:
+    if mechanism not in bodies_of:
         raise InputError(
             f"{mechanism.name} ({mechanism.joints_in_words}) has no rule for its bodies' masses."
             " Export to c, matlab or json, which need no bodies"
         )
-    return BODIES_OF[mechanism](exported)
+    return bodies_of[mechanism](exported)
 
 
 def _level_leg(exported: Exported) -> tuple[Body, ...]:
-    return tuple(replace(body, axis=RISES, lies=LIES_FORWARD) for body in _leg(exported))
+    return tuple(replace(body, axis=RISES, lies=(1.0, 0.0, 0.0)) for body in _leg(exported))
 
 
 def _leg(exported: Exported) -> tuple[Body, ...]:
@@ -140,13 +141,15 @@ def _pendulum(exported: Exported) -> tuple[Body, ...]:
     (joint,), (X1, X2), (shift,) = exported.joints, exported.X, exported.shift()
     across = _moment_across(exported, joint)
     moment = np.hypot(X2, across)
-    mass = max(2.0 * moment**2 / X1, NOMINAL_MASS)
+    # At its minimum the body would be a point mass; light ones get 1 kg.
+    mass = max(2.0 * moment**2 / X1, 1.0)
     return (Body(joint, mass, X1 - moment**2 / mass, across / mass, X2 / mass, shift=shift),)
 
 
 def _turntable(exported: Exported) -> tuple[Body, ...]:
     (joint,), (X1,), (shift,) = exported.joints, exported.X, exported.shift()
-    return (Body(joint, NOMINAL_MASS, X1, axis=RISES, shift=shift),)
+    # No torque depends on its mass.
+    return (Body(joint, 1.0, X1, axis=RISES, shift=shift),)
 
 
 def _lift(exported: Exported) -> tuple[Body, ...]:
@@ -158,7 +161,7 @@ def _lift(exported: Exported) -> tuple[Body, ...]:
 
 def _slide(exported: Exported) -> tuple[Body, ...]:
     (joint,), (mass,), (shift,) = exported.joints, exported.X, exported.shift()
-    return (Body(joint, mass, _cube(mass), axis=SLIDES_FORWARD, shift=shift),)
+    return (Body(joint, mass, _cube(mass), axis=(1.0, 0.0, 0.0), shift=shift),)
 
 
 def _cube(mass: float) -> float:
@@ -169,14 +172,3 @@ def _cube(mass: float) -> float:
 def _moment_across(exported: Exported, joint: Joint) -> float:
     term = exported.of(Element.MASS_ACROSS, joint.name)
     return float(term.values[0]) if term else 0.0
-
-
-BODIES_OF: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
-    LEG: _leg,
-    LEVEL_LEG: _level_leg,
-    PENDULUM: _pendulum,
-    TURNTABLE: _turntable,
-    LIFT: _lift,
-    SLIDE: _slide,
-}
-"""Functions that return each mechanism's bodies."""

@@ -36,13 +36,6 @@ GROUPS = ("link_inertia", "link_torque", "drive_inertia", "drive_torque")
 GEOMETRY = ("thigh_length", "gravity")
 """The values of a kernel's argument ``geometry``."""
 
-OWN_NAMES = """
-    sign at tau rate geometry at_rest inertial velocity_torque instant instant_of sensor_shift
-    link_shift memory_rate torque_reading
-"""
-RESERVED = (*GROUPS, *GEOMETRY, *OWN_NAMES.split())
-"""Names that an exported file uses itself."""
-
 
 @dataclass(frozen=True)
 class Constant:
@@ -137,8 +130,13 @@ def equations(exported: Exported) -> Equations:
     terms = [term for term in exported.terms if holding(term).degree is not Degree.NOT]
     named = ((term.effect, parameter) for term in terms for parameter in term.effect.fitted)
     full = (filter(None, (effect.joint, effect.name, p.name)) for effect, p in named)
+    own_names = """
+        sign at tau rate geometry at_rest inertial velocity_torque instant instant_of sensor_shift
+        link_shift memory_rate torque_reading
+    """
     # Two effects can have parameters of one name at a joint; the file's own names are taken, too.
-    names = iter(unique((identifier("_".join(parts)) for parts in full), RESERVED))
+    taken = (*GROUPS, *GEOMETRY, *own_names.split())
+    names = iter(unique((identifier("_".join(parts)) for parts in full), taken))
     length, gravity = exported.geometry.array().tolist()
     # An encoder's error is in the angles of motor and link alike, a tilt only in the link's.
     sensor = exported.shift(Side.SENSOR)

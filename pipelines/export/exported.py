@@ -22,9 +22,6 @@ from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, Term, model_from_parameters
 
-HUMAN = "human"
-"""The wearer only, in addition to the kinds of run."""
-
 
 @dataclass(frozen=True)
 class Exported:
@@ -185,7 +182,7 @@ def exported(
         present = [term for term, reason in judged if not reason]
         absent = [(term, left_out(reason)) for term, reason in judged if reason]
         # Effects of the wearer act only in runs with one.
-        kind = "with_human" if run == HUMAN else run
+        kind = "with_human" if run == "human" else run
         acting = Model(tuple(present)).for_run(kind)
         # Rigid, as each format lists springs at a joint or leaves them out. Cuffs stay, because the
         # limb behind them has its own body.
@@ -199,7 +196,7 @@ def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:
     effect = term.effect
     if not any((effect.reaction, effect.spring, effect.reading, effect.torque_reading)):
         return "a machine of this kind cannot have it"
-    if run != HUMAN:
+    if run != "human":
         acts = run in effect.acts_in and effect.run in (None, run)
         return "" if acts else f"it does not act in {run} runs"
     # With cuffs, machine and limb have a body each; without, the only body is the wearer's.

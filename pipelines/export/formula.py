@@ -15,9 +15,11 @@ from typing import Any
 
 from pipelines.errors import ExoidError
 
-OF_MATH = ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2")
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(math, name) for name in OF_MATH},
+    **{
+        name: getattr(math, name)
+        for name in ("sin", "cos", "tan", "exp", "expm1", "log", "sqrt", "tanh", "atan", "atan2")
+    },
     "abs": abs,
     "max": max,
     "min": min,
@@ -303,19 +305,17 @@ def _product(a: Any, b: Any) -> Any:
     return Formula("*", (a, b))
 
 
-_COMPARED = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}
-
-
 def _compare(sign: str, a: Any, b: Any) -> Condition | bool:
     one, other = (side.value if isinstance(side, Formula) else float(side) for side in (a, b))
     # Two known values are compared now: constants of the file never take the other branch.
     if one is None or other is None:
         return Condition(sign, a, b)
-    return bool(_COMPARED[sign](one, other))
+    compared = {
+        "<": operator.lt,
+        "<=": operator.le,
+        ">": operator.gt,
+        ">=": operator.ge,
+        "==": operator.eq,
+        "!=": operator.ne,
+    }
+    return bool(compared[sign](one, other))

@@ -13,22 +13,6 @@ from pipelines.export.exported import Exported
 from pipelines.export.format import Format, exact
 from pipelines.model import Term
 
-CONVENTIONS = {
-    "units": "SI",
-    "angles": (
-        "of the first revolute joint from the downward vertical, forward positive, of the next"
-        " relative to the previous link; a prismatic joint rises if gravity acts; all as encoder"
-        " readings"
-    ),
-    "torques": (
-        "positive torque accelerates its angle upward; an effect's equation is the torque that the"
-        " drive must add"
-    ),
-    "covariance": (
-        "of the parameters' values, rows and columns in their order; null if it was not estimated"
-    ),
-}
-
 
 def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the document's text."""
@@ -42,7 +26,7 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
         "method": table.metadata.get("method"),
         "joints": [_joint(joint) for joint in exported.joints],
         "geometry": exported.machine.metadata(exported.geometry),
-        "conventions": CONVENTIONS,
+        "conventions": _conventions(),
         # JSON has no NaN.
         "parameters": [
             {str(key): None if pd.isna(value) else value for key, value in row.items()}
@@ -53,6 +37,25 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
         "not_in_this_run": [_effect(term) | {"why": why.how} for term, why in exported.absent],
     }
     return {".json": json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False) + "\n"}
+
+
+def _conventions() -> dict[str, str]:
+    return {
+        "units": "SI",
+        "angles": (
+            "of the first revolute joint from the downward vertical, forward positive, of the next"
+            " relative to the previous link; a prismatic joint rises if gravity acts; all as"
+            " encoder readings"
+        ),
+        "torques": (
+            "positive torque accelerates its angle upward; an effect's equation is the torque that"
+            " the drive must add"
+        ),
+        "covariance": (
+            "of the parameters' values, rows and columns in their order; null if it was not"
+            " estimated"
+        ),
+    }
 
 
 def _joint(joint: Joint) -> dict[str, str]:

@@ -3,14 +3,23 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
+from importlib.resources import files
+from string import Template
 from typing import Any
 
 from pipelines.errors import InputError
 from pipelines.export.formula import Branch, Formula
 
-SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
-"""Precedence, lowest first."""
-BINARY = {"+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT}
+
+class Precedence(IntEnum):
+    """How tightly an operator binds, the loosest first."""
+
+    SUM = 0
+    PRODUCT = 1
+    SIGN = 2
+    POWER = 3
+    ATOM = 4
 
 
 @dataclass(frozen=True)
@@ -27,7 +36,7 @@ class Language:
     branch: Callable[[str, list[str], list[str]], list[str]]
     """Returns the lines of a branch, from its condition and both lists of statements."""
 
-    def text(self, formula: Any, at_least: int = SUM) -> str:
+    def text(self, formula: Any, at_least: int = Precedence.SUM) -> str:
         """Return a formula or a number as code.
 
         Parameters
@@ -43,25 +52,27 @@ class Language:
     def _text_and_precedence(self, formula: Any) -> tuple[str, int]:
         if not isinstance(formula, Formula):
             # A negative number is a negation: as the base of a power it needs brackets.
-            return repr(float(formula)), SIGN if formula < 0 else ATOM
+            return repr(float(formula)), Precedence.SIGN if formula < 0 else Precedence.ATOM
         operator, operands = formula.operator, formula.operands
         if operator == "constant":
-            return self.names.get(operands[0], operands[0]), ATOM
+            return self.names.get(operands[0], operands[0]), Precedence.ATOM
         if operator == "element":
-            return self.element(*operands), ATOM
-        if operator in BINARY:
-            precedence = BINARY[operator]
+            return self.element(*operands), Precedence.ATOM
+        if operator in ("+", "-", "*", "/"):
+            precedence = Precedence.SUM if operator in "+-" else Precedence.PRODUCT
             # Differences and quotients associate to the left, so that an equal operator at the
             # right needs brackets.
             right = self.text(operands[1], precedence + (operator in "-/"))
             return f"{self.text(operands[0], precedence)} {operator} {right}", precedence
         if operator == "neg":
-            return f"-{self.text(operands[0], POWER)}", SIGN
+            return f"-{self.text(operands[0], Precedence.POWER)}", Precedence.SIGN
         if operator == "**":
             # Brackets around both operands: MATLAB's ^ associates to the left, Python's ** to the
             # right.
-            return self.power(*(self.text(operand, ATOM) for operand in operands)), POWER
-        return f"{self.names.get(operator, operator)}({', '.join(map(self.text, operands))})", ATOM
+            both = (self.text(operand, Precedence.ATOM) for operand in operands)
+            return self.power(*both), Precedence.POWER
+        called = self.names.get(operator, operator)
+        return f"{called}({', '.join(map(self.text, operands))})", Precedence.ATOM
 
     def added(self, outcome: list | Branch, to: str) -> list[str]:
         """Return the statements that add a kernel's outcome to an array, without zeros.
@@ -113,6 +124,20 @@ class Language:
             compared = f"{self.text(condition.left)} {sign} {self.text(condition.right)}"
             return self.branch(compared, yes, no) if yes or no else []
         return [line for i, value in enumerate(outcome) for line in statement(i, value)]
+
+
+def filled(template: str, places: Mapping[str, Any]) -> str:
+    """Return the text of a file in ``templates`` with its places filled.
+
+    Parameters
+    ----------
+    template : str
+        Name of the file.
+    places : dict
+        Text of each ``${place}`` by its name.
+    """
+    file = files("pipelines.export") / "templates" / template
+    return Template(file.read_text(encoding="utf-8")).substitute(places)
 
 
 def indented(lines: Iterable[str]) -> list[str]:

@@ -6,12 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
 from pipelines.export.exported import Exported
 from pipelines.export.format import Format
-from pipelines.export.language import Language, function_name, indented, one_line
-
-KEYWORDS = """
-    break case catch classdef continue else elseif end for function global if otherwise parfor
-    persistent return spmd switch try while
-"""
+from pipelines.export.language import Language, filled, function_name, indented, one_line
 
 LANGUAGE = Language(
     # MATLAB has every function under its own name.
@@ -27,75 +22,6 @@ LANGUAGE = Language(
     ],
 )
 
-FILE = """\
-function [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
-{comment}
-%
-% [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
-%   q, dq, ddq  {joints} x 1: encoder angles and their rates; SI units
-%   t           seconds since the start of the run; 0 by default
-%   memory      {memories} x 1: {memory_of}; zeros by default
-%   tau         {joints} x 1: torque that the drives must deliver
-%   M, C, G     mass matrix with rotors, Coriolis matrix (dM/dt - 2 C is skew), gravity torque:
-%               the rest of tau, friction and springs, is tau - M*ddq - C*dq - G
-%   rate        {memories} x 1: d(memory)/dt
-%   reading     {joints} x 1: reading of the torque channels at drive torque tau
-if nargin < 4
-    t = 0;
-end
-if nargin < 5
-    memory = zeros({memories}, 1);
-end
-sensor_shift = {sensor_shift}; % encoders less motors, rad
-link_shift = {link_shift}; % motors less angles from the vertical, rad
-at.t = t;
-at.motor = q(:) - sensor_shift;
-at.q = at.motor - link_shift;
-at.dq = dq(:);
-at.ddq = ddq(:);
-at.direction = sign(dq(:));
-at.load = zeros({joints}, 1);
-at.memory = memory(:);
-
-tau = link_torque(at, link_inertia(at, zeros({joints}, 1)));
-at.load = tau;
-tau = drive_torque(at, drive_inertia(at, tau));
-if nargout > 1
-    still = at;
-    still.dq = zeros({joints}, 1);
-    still.ddq = zeros({joints}, 1);
-    G = inertial(still);
-    M = zeros({joints});
-    for k = 1:{joints}
-        still.ddq(k) = 1;
-        M(:, k) = inertial(still) - G;
-        still.ddq(k) = 0;
-    end
-    C = zeros({joints});
-    for k = 1:{joints}
-        unit = zeros({joints}, 1);
-        unit(k) = 1;
-        % The velocity torque is a quadratic form in dq; its polarization is the Christoffel matrix.
-        C(:, k) = 0.5 * (velocity_torque(still, at.dq + unit, G) ...
-            - velocity_torque(still, at.dq, G) - velocity_torque(still, unit, G));
-    end
-    rate = memory_rate(at);
-    reading = torque_reading(at, tau);
-end
-end
-
-function tau = inertial(at)
-tau = drive_inertia(at, link_inertia(at, zeros({joints}, 1)));
-end
-
-function tau = velocity_torque(at, dq, G)
-at.dq = dq;
-tau = inertial(at) - G;
-end
-
-{functions}
-"""
-
 
 def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the function file."""
@@ -104,18 +30,25 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     order = [
         f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(model.joints, start=1)
     ]
-    return {
-        ".m": FILE.format(
-            name=function_name(stem, ".m", KEYWORDS.split()),
-            comment=_comment([*exported.heading(MATLAB), "", *order]),
-            joints=joints,
-            memories=model.memories,
-            memory_of=one_line(", ".join(dict.fromkeys(model.memory_of)) or "no effect has memory"),
-            sensor_shift=_column(model.sensor_shift),
-            link_shift=_column(model.link_shift),
-            functions="\n\n".join(_functions(model)),
-        )
+    keywords = """
+        break case catch classdef continue else elseif end for function global if otherwise parfor
+        persistent return spmd switch try while
+    """
+    keywords = """
+        break case catch classdef continue else elseif end for function global if otherwise parfor
+        persistent return spmd switch try while
+    """
+    places = {
+        "name": function_name(stem, ".m", keywords.split()),
+        "comment": _comment([*exported.heading(MATLAB), "", *order]),
+        "joints": joints,
+        "memories": model.memories,
+        "memory_of": one_line(", ".join(dict.fromkeys(model.memory_of)) or "no effect has memory"),
+        "sensor_shift": _column(model.sensor_shift),
+        "link_shift": _column(model.link_shift),
+        "functions": "\n\n".join(_functions(model)),
     }
+    return {".m": filled("model.m", places)}
 
 
 def _comment(lines: Iterable[str]) -> str:

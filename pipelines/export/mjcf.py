@@ -29,21 +29,6 @@ def _friction(term: Term) -> Holding:
     return held_friction(term, approximate(how))
 
 
-EXACT: dict[Element | None, str] = {
-    Element.RIGID_BODIES: "bodies of nominal masses that have these X",
-    Element.QUADRATIC_DAMPING: "second coefficient of the joint's damping (read by MuJoCo 4.0)",
-    Element.ARMATURE: "joint armature",
-    Element.SPRING: "joint stiffness and springref",
-    Element.MASS_ACROSS: "place of the body's centre of mass",
-    Element.SERIES_SPRING: (
-        "a second joint, its stiffness and damping; the motor's inertia is the first one's armature"
-    ),
-    Element.TORQUE_GAIN: "gain of the actuator",
-    Element.TORQUE_OFFSET: "bias of the actuator",
-}
-"""Places in the file that hold an element exactly."""
-
-
 def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the model's text."""
     root = ET.Element("mujoco", model=one_line(stem))
@@ -187,6 +172,23 @@ MJCF = Format(
     "mjcf",
     "MuJoCo model",
     ".xml",
-    holding_from(EXACT, _friction, "orientation of the joint's frame", "MJCF"),
+    holding_from(
+        {
+            Element.RIGID_BODIES: "bodies of nominal masses that have these X",
+            Element.QUADRATIC_DAMPING: "second coefficient of the joint's damping (read by MuJoCo 4.0)",
+            Element.ARMATURE: "joint armature",
+            Element.SPRING: "joint stiffness and springref",
+            Element.MASS_ACROSS: "place of the body's centre of mass",
+            Element.SERIES_SPRING: (
+                "a second joint, its stiffness and damping; the motor's inertia is the first one's"
+                " armature"
+            ),
+            Element.TORQUE_GAIN: "gain of the actuator",
+            Element.TORQUE_OFFSET: "bias of the actuator",
+        },
+        _friction,
+        "orientation of the joint's frame",
+        "MJCF",
+    ),
     _write,
 )

@@ -25,13 +25,6 @@ def _friction(term: Term) -> Holding:
     return held_friction(term, exact(how))
 
 
-EXACT: dict[Element | None, str] = {
-    Element.RIGID_BODIES: "links of nominal masses that have these X",
-    Element.MASS_ACROSS: "place of the link's centre of mass",
-}
-"""Places in the file that hold an element exactly."""
-
-
 def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     """Return the model's text."""
     root = ET.Element("robot", name=one_line(stem))
@@ -86,6 +79,14 @@ URDF = Format(
     "urdf",
     "URDF model",
     ".urdf",
-    holding_from(EXACT, _friction, "origin of the joint", "URDF"),
+    holding_from(
+        {
+            Element.RIGID_BODIES: "links of nominal masses that have these X",
+            Element.MASS_ACROSS: "place of the link's centre of mass",
+        },
+        _friction,
+        "origin of the joint",
+        "URDF",
+    ),
     _write,
 )
