@@ -197,24 +197,24 @@ def _command_line(arguments: Sequence[str]) -> int:
     return code or 0
 
 
-_REMEDIES = {
-    errno.EACCES: "you may not read or write there; change the permissions or choose another place",
-    errno.EPERM: "you may not read or write there; change the permissions or choose another place",
-    errno.ENOSPC: "free some space and run the command again",
-    errno.EDQUOT: "free some space and run the command again",
-    errno.EFBIG: (
-        "files may not be so large there; raise the limit (ulimit -f), or choose another place"
-    ),
-    errno.EROFS: "choose a folder that can be written to",
-    errno.ENOENT: "check the name",
-    errno.EEXIST: "a file stands where a folder should; choose another name",
-    errno.ENOTDIR: "a file stands where a folder should; choose another name",
-}
-
-
 def _system_error(error: OSError) -> str:
     file = f"{error.filename}: " if error.filename else ""
-    remedy = _REMEDIES.get(error.errno or 0)
+    denied = "you may not read or write there; change the permissions or choose another place"
+    full = "free some space and run the command again"
+    remedies = {
+        errno.EACCES: denied,
+        errno.EPERM: denied,
+        errno.ENOSPC: full,
+        errno.EDQUOT: full,
+        errno.EFBIG: (
+            "files may not be so large there; raise the limit (ulimit -f), or choose another place"
+        ),
+        errno.EROFS: "choose a folder that can be written to",
+        errno.ENOENT: "check the name",
+        errno.EEXIST: "a file stands where a folder should; choose another name",
+        errno.ENOTDIR: "a file stands where a folder should; choose another name",
+    }
+    remedy = remedies.get(error.errno or 0)
     if remedy is None:
         return f"{file}{error.strerror or error}"
     # The system's words: Arrow's own would mean nothing to a user.

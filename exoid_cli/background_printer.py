@@ -5,18 +5,26 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-QUEUE_SIZE = 100
-"""Lines that may wait; further lines are dropped."""
-CLOSING_S = 1.0
-"""Longest time to wait for the last lines, s."""
-
 
 class BackgroundPrinter:
     """Print lines in order while the block runs, for as long as the output can be written."""
 
-    def __init__(self, write: Callable[[str], None]) -> None:
-        self._write = write
-        self._queue = queue.Queue[str | None](QUEUE_SIZE)
+    def __init__(
+        self, write: Callable[[str], None], *, waiting: int = 100, closing_s: float = 1.0
+    ) -> None:
+        """Prepare the thread.
+
+        Parameters
+        ----------
+        write : callable
+            Writes a line.
+        waiting : int, optional
+            Lines that may wait; further lines are dropped.
+        closing_s : float, optional
+            Longest time to wait for the last lines, s.
+        """
+        self._write, self._closing_s = write, closing_s
+        self._queue = queue.Queue[str | None](waiting)
         self._thread = threading.Thread(target=self._run, name="printer", daemon=True)
 
     def __enter__(self) -> "BackgroundPrinter":
@@ -29,7 +37,7 @@ class BackgroundPrinter:
         # exit.
         self.print(None)
         # Bounded, as a terminal stopped by Ctrl-S would never take the last lines.
-        self._thread.join(CLOSING_S)
+        self._thread.join(self._closing_s)
 
     def print(self, text: str | None) -> None:
         """Queue a line, or drop it if the queue is full; never wait, never fail."""

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text
 
-LATE_S = 5.0
-"""Time after which a start that shows nothing needs a line of explanation, s."""
-
 
 class Console:
     """The terminal of one invocation; results go to stdout, progress and warnings to stderr."""
@@ -177,9 +174,9 @@ class Console:
         return self.progress(what, None)
 
     @contextmanager
-    def starting(self, what: str) -> Iterator[None]:
-        """Show the task that is being started; without a terminal, print it once it takes long."""
-        late = threading.Timer(LATE_S, lambda: self.err.print(_as_text(what), soft_wrap=True))
+    def starting(self, what: str, late_s: float = 5.0) -> Iterator[None]:
+        """Show the task that is being started; without a terminal, print it after ``late_s``."""
+        late = threading.Timer(late_s, lambda: self.err.print(_as_text(what), soft_wrap=True))
         late.daemon = True
         # On a terminal the spinner says it already.
         if self.speaks and not self._may_move:

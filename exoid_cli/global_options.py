@@ -38,17 +38,6 @@ def with_global_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-TYPE_NAMES = {
-    "list[Path]": "path",
-    "str": "name",
-    "list[str]": "name",
-    "float range": "number",
-    "int range": "number",
-    "int": "number",
-}
-"""Names of Python's types in help texts."""
-
-
 class Command(TyperCommand):
     """A command whose help names types as paths, names and numbers."""
 
@@ -61,4 +50,13 @@ class Command(TyperCommand):
 
 def _plain_type(display_type: Callable[[Any], str], ctx: Any) -> str:
     name = display_type(ctx).strip("<>")
-    return f"<{TYPE_NAMES.get(name, name)}>"
+    # Names of Python's types in help texts.
+    names = {
+        "list[Path]": "path",
+        "str": "name",
+        "list[str]": "name",
+        "float range": "number",
+        "int range": "number",
+        "int": "number",
+    }
+    return f"<{names.get(name, name)}>"

@@ -15,12 +15,10 @@ if TYPE_CHECKING:
     from pipelines.settings.rig import RigSettings
 
 CUFFS = ("thigh front", "thigh back", "shank front", "shank back")
-NEAR = 0.05
-"""Share of the range between two limits within which one of them is near."""
 
 # Blue and orange differ to everyone, and words repeat whatever a colour says.
 PLAIN, FAINT = Style(), Style(dim=True)
-CALM, URGENT = Style(color="bright_blue"), Style(color="dark_orange", bold=True)
+URGENT = Style(color="dark_orange", bold=True)
 
 Line = list[tuple[str, Style]]
 
@@ -42,7 +40,9 @@ class Gauge(NamedTuple):
     @property
     def near(self) -> bool:
         """Whether a limit is near, or passed."""
-        return not NEAR <= self.share <= 1.0 - NEAR
+        # Share of the range between two limits within which one of them is near.
+        near_share = 0.05
+        return not near_share <= self.share <= 1.0 - near_share
 
     def line(self) -> Line:
         """Return value and bar; an exclamation mark shows that a limit is near."""
@@ -51,7 +51,7 @@ class Gauge(NamedTuple):
         if np.isnan(self.value):
             return [(f"{self.name:<11}   not read", FAINT)]
         position = round(min(max(self.share, 0.0), 1.0) * (bar - 1))
-        style = URGENT if self.near else CALM
+        style = URGENT if self.near else Style(color="bright_blue")
         value = f"{self.value:+.2f} {self.unit}"
         return [
             (f"{self.name:<11}", PLAIN),

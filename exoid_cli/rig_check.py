@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from pipelines.acquisition.check.rate import Rate
     from pipelines.acquisition.check.survey import DeviceReport, RigReport
 
-BLOCKS = " ▁▂▃▄▅▆▇█"
 FORCES = ("force_x", "force_y", "force_z")
 DRIVE = {"angle": "angle rad", "velocity": "rad/s", "current": "current A", "temperature": "°C"}
 
@@ -144,8 +143,9 @@ def _times(latency: "Latency | None") -> tuple[str, ...]:
 def _small(histogram: tuple[int, ...]) -> str:
     """Draw a histogram on one line."""
     most = max(histogram)
+    blocks = " ▁▂▃▄▅▆▇█"
     # Rounded up, so that a single slow answer is seen.
-    return "".join(BLOCKS[-(-count * (len(BLOCKS) - 1) // most)] for count in histogram)
+    return "".join(blocks[-(-count * (len(blocks) - 1) // most)] for count in histogram)
 
 
 def _drive(device: "DeviceReport") -> list[Any]:

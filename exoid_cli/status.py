@@ -13,9 +13,6 @@ from exoid_cli.options import ConfigOption, OutOption
 if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
 
-REMEDY = "import it again, or remove it"
-"""Advice on a recording that cannot be read."""
-
 
 def status(config: ConfigOption = None, out: OutOption = None) -> None:
     """Say of each stage of an experiment whether it is done, stale and why, or missing.
@@ -32,13 +29,15 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
     folder = open_experiment(config, out, allow_damaged=True)
     judged = Judge(folder.out).all(folder.steps)
-    of_damaged = {"stage": "import", "state": "damaged", "why": [REMEDY], "command": None}
+    # Advice on a recording that cannot be read.
+    remedy = "import it again, or remove it"
+    of_damaged = {"stage": "import", "state": "damaged", "why": [remedy], "command": None}
     damaged = [of_damaged | {"target": file} for file in folder.imported.damaged]
     console.emit([*damaged, *map(_as_json, judged)])
     # Steps of a stage follow each other in the graph, as groupby needs.
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
     files = [file.relative_to(folder.out).as_posix() for file in folder.imported.damaged]
-    rows = [("import", "damaged", file, REMEDY) for file in files]
+    rows = [("import", "damaged", file, remedy) for file in files]
     rows += [_line(stage, folder.out) for stage in stages]
     console.table(("stage", "state", "result", "why"), rows)
     # After the table, so that the state of all else is seen.

@@ -12,25 +12,6 @@ if TYPE_CHECKING:
     from pipelines.contracts.verdict import Cause, Control, Parameter, Verdict
 
 
-ERRORS = {
-    "torque_rms_nm": "measured",
-    "noise_floor_nm": "noise floor",
-    "baseline_rmse_nm": "rigid + friction",
-    "extended_rmse_nm": "with the causes",
-}
-ROUTER = {
-    "noise": "noise",
-    "repeats": "repeats",
-    "wanders": "wanders",
-    "between_runs": "per run",
-    "unsplit": "beyond noise",
-}
-"""Headings of the residual's parts; one that is zero at every joint has no column."""
-MISSING, WHAT = "is anything missing?", "what is missing, and where"
-FAULTS = 5
-"""Faults of acquisition that are listed."""
-
-
 def show_verdict(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     """Print a verdict about a machine of these joints."""
     from pipelines.contracts.joints import HIP_AND_KNEE
@@ -61,10 +42,11 @@ def _show_faults(verdict: "Verdict") -> None:
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")
-    for fault in faults[:FAULTS]:
+    most = 5
+    for fault in faults[:most]:
         console.note(f"- {fault.file}, {fault.channel}: {fault.what}")
-    if len(faults) > FAULTS:
-        console.note(f"- {len(faults) - FAULTS} more, in data_faults of verdict.json")
+    if len(faults) > most:
+        console.note(f"- {len(faults) - most} more, in data_faults of verdict.json")
 
 
 def _show_findings(verdict: "Verdict") -> None:
@@ -75,11 +57,13 @@ def _show_findings(verdict: "Verdict") -> None:
     if not cases:
         return
     shown = [_broken(row.words, row.depth) for row in tree]
+    missing = "is anything missing?"
+    which = "what is missing, and where"
     # One width for both tables, so that their probabilities stand in one column.
-    width = max(map(len, chain([MISSING, WHAT], *shown)))
+    width = max(map(len, chain([missing, which], *shown)))
     tables = {
-        MISSING: [(case.words, case.probability) for case in cases],
-        WHAT: [("\n".join(s), row.probability) for s, row in zip(shown, tree, strict=True)],
+        missing: [(case.words, case.probability) for case in cases],
+        which: [("\n".join(s), row.probability) for s, row in zip(shown, tree, strict=True)],
     }
     for heading, lines in tables.items():
         if lines:
@@ -102,7 +86,19 @@ def _show_router(verdict: "Verdict") -> None:
     joints = shares(verdict)
     if not joints or verdict.acquisition_at_fault:
         return
-    parts = {part: words for part, words in ROUTER.items() if any(j.parts[part] for j in joints)}
+    # A part that is zero at every joint has no column.
+    part_headings = {
+        "noise": "noise",
+        "repeats": "repeats",
+        "wanders": "wanders",
+        "between_runs": "per run",
+        "unsplit": "beyond noise",
+    }
+    parts = {
+        part: words
+        for part, words in part_headings.items()
+        if any(one.parts[part] for one in joints)
+    }
     variables = list(joints[0].predicted)
     headings = ("joint", *parts.values(), *variables)
     rows = []
@@ -126,8 +122,14 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     from pipelines.wording.increased_errors import increased_errors
 
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
+    error_headings = {
+        "torque_rms_nm": "measured",
+        "noise_floor_nm": "noise floor",
+        "baseline_rmse_nm": "rigid + friction",
+        "extended_rmse_nm": "with the causes",
+    }
     # Files of older versions lack one of these errors.
-    errors = {key: words for key, words in ERRORS.items() if getattr(verdict, key)}
+    errors = {key: words for key, words in error_headings.items() if getattr(verdict, key)}
     if not verdict.causes:
         del errors["extended_rmse_nm"]
     headings, rows = ["joint", *errors.values()], []

@@ -2,7 +2,7 @@
 
 import pyarrow as pa
 
-from pipelines.contracts.table import FLOAT, INTEGER, TEXT, Column, Contract, per_joint
+from pipelines.contracts.table import Column, Contract, per_joint
 
 CANDIDATES = Contract(
     name="candidates",
@@ -10,15 +10,20 @@ CANDIDATES = Contract(
     purpose="every cause that was tried",
     made_by="exoid diagnose",
     columns=(
-        Column("rank", "", "1 is the best", dtype=INTEGER),
+        Column("rank", "", "1 is the best", dtype=pa.int64()),
         Column(
-            "causes", "", "the causes tried together, each as effect@joint", dtype=pa.list_(TEXT)
+            "causes",
+            "",
+            "the causes tried together, each as effect@joint",
+            dtype=pa.list_(pa.string()),
         ),
         Column(
             "parameters",
             "",
             "what was fitted",
-            dtype=pa.list_(pa.struct([("name", TEXT), ("value", FLOAT), ("unit", TEXT)])),
+            dtype=pa.list_(
+                pa.struct([("name", pa.string()), ("value", pa.float64()), ("unit", pa.string())])
+            ),
         ),
         Column(
             "train_score",
@@ -41,9 +46,9 @@ CANDIDATES = Contract(
             "verdict",
             "",
             "decision on this set",
-            dtype=TEXT,
+            dtype=pa.string(),
             choices=("named", "indistinguishable", "unlisted", "absorbed", "rejected"),
         ),
-        Column("reason", "", "one sentence", dtype=TEXT),
+        Column("reason", "", "one sentence", dtype=pa.string()),
     ),
 )

@@ -12,8 +12,6 @@ from pipelines.errors import ContractError
 
 LARGEST_ANGLE_RAD = 3 * math.pi
 """Largest angle in radians, 1.5 turns; a hip's swing of 20 degrees would exceed it as 20 rad."""
-LARGEST = 1e12
-"""Largest value of any quantity in SI units; the squares of a file's rows still have a sum."""
 
 
 @dataclass(frozen=True)
@@ -179,11 +177,11 @@ def refuse_implausible(column: pa.ChunkedArray, unit: str, where: Place) -> None
     Raises
     ------
     ContractError
-        A number is larger than ``LARGEST``, or an angle than ``LARGEST_ANGLE_RAD``.
+        A number is larger than 1e12, or an angle than ``LARGEST_ANGLE_RAD``.
     """
+    # Up to 1e12, in SI units, the squares of a file's rows still have a sum.
     limits = {
-        LARGEST: f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop"
-        " the row"
+        1e12: ", expected at most 1e+12; correct the unit or scale of the column, or drop the row"
     }
     if unit == "rad":
         limits[LARGEST_ANGLE_RAD] = (

@@ -12,8 +12,6 @@ KEY = b"exoid"
 """Key of exoid's entry in a Parquet file's schema metadata."""
 MAGIC = b"PAR1"
 """First bytes of a Parquet file."""
-BLOCK = 2**20
-"""Bytes that are compared at a time."""
 
 
 def equal_except_time(old: Path, new: Path) -> bool:
@@ -44,7 +42,9 @@ def _tables_equal(old: BinaryIO, new: BinaryIO) -> bool:
         return False
     old.seek(0)
     new.seek(0)
-    lengths = (min(BLOCK, end - begin) for begin in range(0, end, BLOCK))
+    # Bytes that are compared at a time.
+    block = 2**20
+    lengths = (min(block, end - begin) for begin in range(0, end, block))
     return all(old.read(length) == new.read(length) for length in lengths)
 
 

@@ -1,6 +1,6 @@
 """Describe any exoid file: its contract, its origin and its content."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,6 @@ import pyarrow.compute as pc
 from pipelines.contracts import checks, contract_of, parquet
 from pipelines.errors import ContractError
 from pipelines.validation.toml import read_toml
-
-ORIGIN = ("created_by", "created_at", "software", "inputs", "config")
 
 
 @dataclass(frozen=True)
@@ -70,12 +68,13 @@ def _table(path: Path) -> Inspection:
         contract.load(path)
     except ContractError as error:
         fault = error
+    origin, rest = _origin_and_rest(metadata)
     return Inspection(
         file=str(path),
         contract=metadata["contract"],
         purpose=contract.purpose,
-        origin={key: metadata[key] for key in ORIGIN if key in metadata},
-        metadata={key: metadata[key] for key in metadata if key not in (*ORIGIN, "contract")},
+        origin=origin,
+        metadata={key: rest[key] for key in rest if key != "contract"},
         rows=table.num_rows,
         columns=[_column(table, name) for name in dict.fromkeys(table.column_names)],
         fault=fault,
@@ -104,21 +103,19 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
     }
 
 
-DOCUMENTS = {
-    "verdict/1": "the answer of `exoid diagnose`",
-    "model/1": "a model, as `exoid export --to json` writes it",
-    "detectability/1": "the smallest detectable size of each cause",
-}
-"""JSON documents, for people and programs without Parquet, and their purposes."""
-
-
 def _document(path: Path) -> Inspection | None:
     from pipelines.contracts import verdict  # its many models take time to build
 
     # Only a file that calls itself JSON is refused for a fault of its text.
     is_json = path.suffix == ".json" and path.is_file()
     content = verdict.parsed(path) if is_json else _parsed(path, verdict.parsed)
-    if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
+    # JSON documents, for people and programs without Parquet, and their purposes.
+    documents = {
+        "verdict/1": "the answer of `exoid diagnose`",
+        "model/1": "a model, as `exoid export --to json` writes it",
+        "detectability/1": "the smallest detectable size of each cause",
+    }
+    if not isinstance(content, dict) or content.get("contract") not in documents:
         return None
     fault = None
     if content["contract"] == "verdict/1":
@@ -127,10 +124,15 @@ def _document(path: Path) -> Inspection | None:
         except ContractError as error:
             fault = error
     contract, provenance = content.pop("contract"), content.pop("provenance", {})
-    origin = {key: provenance.pop(key) for key in ORIGIN if key in provenance}
-    return Inspection(
-        str(path), contract, DOCUMENTS[contract], origin, content | provenance, fault=fault
-    )
+    origin, rest = _origin_and_rest(provenance)
+    return Inspection(str(path), contract, documents[contract], origin, content | rest, fault=fault)
+
+
+def _origin_and_rest(metadata: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Split metadata into those that say where a file comes from, and the others."""
+    names = ("created_by", "created_at", "software", "inputs", "config")
+    origin = {name: metadata[name] for name in names if name in metadata}
+    return origin, {name: metadata[name] for name in metadata if name not in origin}
 
 
 def _trajectory_toml(path: Path) -> Inspection | None:

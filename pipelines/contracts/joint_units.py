@@ -43,7 +43,6 @@ UNITS = {
     "1/turn": Unit("rad/m", 0, -1, 0),
 }
 """Units that depend on the kind of joint; s, Hz, 1 and °C do not."""
-_KNOWN = {*UNITS, *(unit.prismatic for unit in UNITS.values())}
 
 
 def refuse_unknown_unit(name: str, unit: str) -> None:
@@ -56,8 +55,9 @@ def refuse_unknown_unit(name: str, unit: str) -> None:
     """
     # Lengths, masses and forces are the same at all joints: only their products with angles differ.
     of_joint = [part for part in ("N·m", "rad", "turn") if part in unit]
+    known = {*UNITS, *(unit.prismatic for unit in UNITS.values())}
     # A parameter at a prismatic joint has its unit there.
-    if of_joint and unit not in _KNOWN:
+    if of_joint and unit not in known:
         raise ValueError(
             f"{name}: found the unit {unit}, expected one without {' and '.join(of_joint)}, or one"
             f" of {', '.join(UNITS)}; add it to UNITS in pipelines/contracts/joint_units.py"

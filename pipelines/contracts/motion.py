@@ -2,11 +2,12 @@
 
 from typing import Annotated, Any
 
+import pyarrow as pa
 from pydantic import Field
 
 from pipelines.contracts.metadata import Keys, Positive, RunKeys
 from pipelines.contracts.recording import CUFF_FORCES
-from pipelines.contracts.table import BOOLEAN, INTEGER, Column, Contract, per_joint
+from pipelines.contracts.table import Column, Contract, per_joint
 
 
 class RegressionFilterKeys(Keys):
@@ -45,9 +46,9 @@ MOTION = Contract(
         per_joint("current", "motor current", required=False, nullable=True),
         per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
         *CUFF_FORCES,
-        Column("sequence", "", "the device's sample counter", dtype=INTEGER, required=False),
-        Column("segment", "", "number of the stretch without gaps", dtype=INTEGER),
-        Column("valid", "", "false at filter edges and where data were bad", dtype=BOOLEAN),
+        Column("sequence", "", "the device's sample counter", dtype=pa.int64(), required=False),
+        Column("segment", "", "number of the stretch without gaps", dtype=pa.int64()),
+        Column("valid", "", "false at filter edges and where data were bad", dtype=pa.bool_()),
     ),
     metadata=MotionKeys,
     time="time_s",

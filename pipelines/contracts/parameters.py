@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from pipelines.contracts.checks import first_true
 from pipelines.contracts.metadata import Finite, Geometry, InputKeys, Matrix, TableKeys
-from pipelines.contracts.table import BOOLEAN, TEXT, Column, Contract
+from pipelines.contracts.table import Column, Contract
 from pipelines.errors import ContractError
 
 
@@ -75,19 +75,19 @@ PARAMETERS = Contract(
     purpose="a model",
     made_by="exoid identify",
     columns=(
-        Column("name", "", "the parameter's name", dtype=TEXT),
-        Column("symbol", "", "its symbol in print", dtype=TEXT),
-        Column("joint", "", "its joint; null where shared", dtype=TEXT, nullable=True),
+        Column("name", "", "the parameter's name", dtype=pa.string()),
+        Column("symbol", "", "its symbol in print", dtype=pa.string()),
+        Column("joint", "", "its joint; null where shared", dtype=pa.string(), nullable=True),
         Column(
             "run",
             "",
             "the kind of run it holds for; null where it holds for all",
-            dtype=TEXT,
+            dtype=pa.string(),
             nullable=True,
             choices=("exo_alone", "with_human", "human"),
         ),
         Column("value", "", "its estimate, in the row's unit"),
-        Column("unit", "", "the unit of value, std_error and the interval", dtype=TEXT),
+        Column("unit", "", "the unit of value, std_error and the interval", dtype=pa.string()),
         Column("std_error", "", "standard error; null where it was not estimated", nullable=True),
         Column("ci95_low", "", "lower end of the 95 % interval", nullable=True),
         Column("ci95_high", "", "upper end of the 95 % interval", nullable=True),
@@ -95,15 +95,15 @@ PARAMETERS = Contract(
             "step",
             "",
             "the fit it comes from",
-            dtype=TEXT,
+            dtype=pa.string(),
             choices=("friction", "inertia", "extension"),
         ),
-        Column("effect", "", "rigid_body, friction, or a cause's name", dtype=TEXT),
+        Column("effect", "", "rigid_body, friction, or a cause's name", dtype=pa.string()),
         Column(
             "each_run",
             "",
             "whether every run has its own, of which this is the first training run's",
-            dtype=BOOLEAN,
+            dtype=pa.bool_(),
             required=False,
         ),
     ),

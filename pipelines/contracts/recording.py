@@ -1,7 +1,9 @@
 """``recording/1``: one run on the rig."""
 
+import pyarrow as pa
+
 from pipelines.contracts.metadata import RunKeys
-from pipelines.contracts.table import INTEGER, Column, Contract, per_joint
+from pipelines.contracts.table import Column, Contract, per_joint
 
 # Null between two readings, as sensors may be read less often than drives.
 CUFF_FORCES = tuple(
@@ -32,7 +34,7 @@ RECORDING = Contract(
         per_joint("current", "motor current", required=False, nullable=True),
         per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
         *CUFF_FORCES,
-        Column("sequence", "", "the device's sample counter", dtype=INTEGER, required=False),
+        Column("sequence", "", "the device's sample counter", dtype=pa.int64(), required=False),
     ),
     metadata=RunKeys,
     time="time_s",

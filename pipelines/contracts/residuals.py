@@ -1,6 +1,8 @@
 """``residuals/1``: measured less predicted torque, run by run and model by model."""
 
-from pipelines.contracts.table import BOOLEAN, INTEGER, TEXT, Column, Contract, per_joint
+import pyarrow as pa
+
+from pipelines.contracts.table import Column, Contract, per_joint
 
 RESIDUALS = Contract(
     name="residuals",
@@ -8,15 +10,21 @@ RESIDUALS = Contract(
     purpose="measured less predicted torque",
     made_by="exoid identify",
     columns=(
-        Column("file", "", "the motion file", dtype=TEXT),
-        Column("run", "", "kind of run", dtype=TEXT, choices=("exo_alone", "with_human")),
-        Column("purpose", "", "what the run is for", dtype=TEXT, choices=("train", "validate")),
-        Column("segment", "", "number of the stretch without gaps", dtype=INTEGER),
+        Column("file", "", "the motion file", dtype=pa.string()),
+        Column("run", "", "kind of run", dtype=pa.string(), choices=("exo_alone", "with_human")),
+        Column(
+            "purpose", "", "what the run is for", dtype=pa.string(), choices=("train", "validate")
+        ),
+        Column("segment", "", "number of the stretch without gaps", dtype=pa.int64()),
         Column("time_s", "s", "device time since the recording began"),
         Column(
-            "model", "", "the model that predicts", dtype=TEXT, choices=("baseline", "extended")
+            "model",
+            "",
+            "the model that predicts",
+            dtype=pa.string(),
+            choices=("baseline", "extended"),
         ),
-        Column("scored", "", "true where the RMSE counts the sample", dtype=BOOLEAN),
+        Column("scored", "", "true where the RMSE counts the sample", dtype=pa.bool_()),
         per_joint("angle", "joint angle"),
         per_joint("velocity", "joint velocity"),
         per_joint("acceleration", "joint acceleration"),

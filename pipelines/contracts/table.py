@@ -1,7 +1,7 @@
 """A data contract as code: columns with unit, meaning and type, checked on reading and writing."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string()
-
 
 @dataclass(frozen=True)
 class Column:
@@ -32,7 +30,7 @@ class Column:
     name: str
     unit: str
     meaning: str
-    dtype: pa.DataType = FLOAT
+    dtype: pa.DataType = field(default_factory=pa.float64)
     required: bool = True
     nullable: bool = False
     """Whether values may be missing (null or NaN); infinities never may."""
@@ -466,11 +464,16 @@ class Contract:
             checks.refuse_unknown_values(values, column.choices, where)
         # Only physical quantities have a plausible range: a fitted parameter has its unit in
         # another column.
-        if self.is_bounded and column.dtype == FLOAT and column.unit and column.name != self.time:
+        if (
+            self.is_bounded
+            and column.dtype == pa.float64()
+            and column.unit
+            and column.name != self.time
+        ):
             checks.refuse_implausible(values, column.unit, where)
         about = {"unit": column.unit, "meaning": column.meaning}
-        field = pa.field(column.name, column.dtype, metadata=about)
-        return table.set_column(index, field, values)
+        described = pa.field(column.name, column.dtype, metadata=about)
+        return table.set_column(index, described, values)
 
     def _check_metadata(self, metadata: Mapping[str, Any], source: str) -> None:
         try:

@@ -7,6 +7,7 @@ Fourier coefficients.
 """
 
 import math
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,16 +18,19 @@ from pipelines.design.sines import VECTORIZED, sines
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import regressor_rows
 
-CRITERIA = ("log_det", "condition", "scaled_condition")
-LOG_DET, SCALED_CONDITION = CRITERIA.index("log_det"), CRITERIA.index("scaled_condition")
+
+class Criterion(IntEnum):
+    """What a search optimizes, by its name in the settings."""
+
+    log_det = 0
+    condition = 1
+    scaled_condition = 2
+
 
 FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
 
 PARAMETERS = 8
-HIP_PARAMETERS = (0, 1, 2, 3, 4, 5)
-KNEE_PARAMETERS = (1, 2, 6, 7)
-"""Columns that are not zero in each joint's row: X1 .. X4, then Coulomb and viscous friction of hip
-and knee."""
+"""X1 .. X4, then Coulomb and viscous friction of hip and knee."""
 
 
 class Problem(NamedTuple):
@@ -85,7 +89,7 @@ def problem(
     geometry : Geometry
         Lengths and gravity.
     criterion : str
-        One of ``CRITERIA``.
+        Name of a ``Criterion``.
     theta0 : (J,) array or None
         Mean angles, rad; None to search them too.
     basis : (2, n, f) array
@@ -103,7 +107,7 @@ def problem(
         theta0_is_free=theta0 is None,
         bounds=np.ascontiguousarray(bounds),
         geometry=geometry.array(),
-        criterion=CRITERIA.index(criterion),
+        criterion=Criterion[criterion].value,
     )
 
 
@@ -150,10 +154,10 @@ def cost(candidate, problem, work):
     repair(candidate, problem, work)
     fill_columns(problem, work)
     gram = gram_matrix(work.columns)
-    if problem.criterion == LOG_DET:
+    if problem.criterion == Criterion.log_det:
         # The search minimizes, and a large determinant is good.
         return -_log_determinant(gram)
-    if problem.criterion == SCALED_CONDITION:
+    if problem.criterion == Criterion.scaled_condition:
         # Columns have different units; at unit norm, the condition shows the motion alone.
         for i in range(PARAMETERS):
             size = math.sqrt(gram[i, i])
@@ -356,13 +360,16 @@ def gram_matrix(columns):
         Of the eight parameters.
     """
     gram = np.zeros((PARAMETERS, PARAMETERS))
+    # Parameters whose columns are not zero in a joint's row.
+    of_hip = (0, 1, 2, 3, 4, 5)
     # Rows of hip and knee add up. Only the lower triangle is summed.
     for i in range(6):
         for j in range(i + 1):
-            gram[HIP_PARAMETERS[i], HIP_PARAMETERS[j]] += _dot(columns[i], columns[j])
+            gram[of_hip[i], of_hip[j]] += _dot(columns[i], columns[j])
+    of_knee = (1, 2, 6, 7)
     for i in range(4):
         for j in range(i + 1):
-            gram[KNEE_PARAMETERS[i], KNEE_PARAMETERS[j]] += _dot(columns[6 + i], columns[6 + j])
+            gram[of_knee[i], of_knee[j]] += _dot(columns[6 + i], columns[6 + j])
     for i in range(PARAMETERS):
         for j in range(i + 1):
             gram[i, j] /= columns.shape[1]

@@ -62,8 +62,8 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
 def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
     """Yield file, values by name and meaning of the numbers that a folder's files define.
 
-    They are the constants of modules, whose meaning is empty where they have none, and the numbers
-    of functions below a comment.
+    They are the constants of modules, whose meaning is empty where they have none, the defaults of
+    classes, and the numbers of functions below a comment.
     """
     for path in sorted(folder.glob("*.py")):
         source = path.read_text(encoding="utf-8")
@@ -77,10 +77,23 @@ def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
             }
             if values:
                 yield path.name, values, meaning
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                yield from ((path.name, *default) for default in _defaults(node))
         functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
         for function in sorted(functions, key=lambda node: node.lineno):
             for values, meaning in _local_numbers(function, source.splitlines()):
                 yield path.name, values, meaning
+
+
+def _defaults(of: ast.ClassDef) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield value by name and meaning of the numbers that are defaults of a class."""
+    for statement, meaning in _documented(of.body):
+        if isinstance(statement, ast.AnnAssign) and statement.value and meaning:
+            value = _constant(statement.value)
+            # These stand for nothing, or for no change.
+            if value not in (None, -1, 0, 1):
+                yield dict.fromkeys(_assigned(statement), value), meaning
 
 
 def _local_numbers(
@@ -108,7 +121,7 @@ def _constant(value: ast.expr) -> Any:
     numbers = [node.value for node in parts if isinstance(node, ast.Constant)]
     if not numbers or not all(map(_is_number, numbers)):
         return None
-    if any(isinstance(node, ast.Name) and node.id != "np" for node in parts):
+    if any(isinstance(node, ast.Name) and node.id not in ("np", "float") for node in parts):
         return None
     try:
         return ast.literal_eval(value)

@@ -21,10 +21,6 @@ from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 
-RATE_HZ = 1000.0
-"""Rate of drives that report none, and the highest that is simulated; a faster one changes nothing
-in a regression."""
-
 
 def closed_loop(model: Model, motion: Motion) -> Motion:
     """Return the run's motion as a model performs it along the references.
@@ -80,18 +76,21 @@ def _drives(motion: Motion, a: Assembly) -> Drives:
     bandwidth_rad_s = 2.0 * np.pi * 8.0
     controller: Mapping[str, Any] = motion.metadata.get("controller") or {}
     each = [controller.get(joint) or {} for joint in motion.joints]
+    # Rate of drives that report none, and the highest that is simulated; a faster one changes
+    # nothing in a regression.
+    highest_hz = 1000.0
     if all(_gain(c, "kp") for c in each):
         kp, kd, limit, rate = (
             np.array([_gain(c, key) for c in each]) for key in ("kp", "kd", "limit", "rate_hz")
         )
         limit = np.where(limit > 0.0, limit, np.inf)
-        rate = np.where(rate > 0.0, rate, RATE_HZ)
+        rate = np.where(rate > 0.0, rate, highest_hz)
     else:
         mass = masses(a)[0].mean(axis=0).diagonal()
         # Two equal poles at the bandwidth: critical damping at the mean inertia of each joint.
         kp, kd = bandwidth_rad_s**2 * mass, 2.0 * bandwidth_rad_s * mass
-        limit, rate = np.full(len(mass), np.inf), np.full(len(mass), RATE_HZ)
-    rate_hz = max(min(RATE_HZ, *rate), motion.sample_rate_hz)
+        limit, rate = np.full(len(mass), np.inf), np.full(len(mass), highest_hz)
+    rate_hz = max(min(highest_hz, *rate), motion.sample_rate_hz)
     # Ideal encoders, since counts would add noise to the instruments.
     return make_drives(kp, kd, limit, np.zeros(len(each)), rate_hz, motion.sample_rate_hz)
 

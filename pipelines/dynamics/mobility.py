@@ -16,10 +16,6 @@ from pipelines.dynamics.forward import (
 from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.errors import InputError
 
-MOST_STEPS = 200
-"""Most integration steps per sample. At the default gain and rate, more correspond to an inertia
-below 1e-3 kg·m², less than that of rotors."""
-
 
 @njit(**ALLOCATING_NOTHING)
 def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
@@ -92,7 +88,7 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     Raises
     ------
     InputError
-        If it exceeds ``MOST_STEPS``, because the model hardly has mass at some pose.
+        If it exceeds 200, because the model hardly has mass at some pose.
     """
     # Greatest product of step and fastest rate; the Runge-Kutta method is stable up to 2.78, but
     # accurate only below.
@@ -100,7 +96,10 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
     # The fastest rate of the loop is gain times mobility, 1/s.
     needed = feedback_gain * mobility * period / stable_reach
-    if not needed <= MOST_STEPS:
+    # Most integration steps per sample. At the default gain and rate, more correspond to an
+    # inertia below 1e-3 kg·m², less than that of rotors.
+    most = 200
+    if not needed <= most:
         raise InputError(
             f"the effective inertia falls to {1.0 / mobility:.2g} kg·m² at some pose: a simulation"
             f" with a feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz is unstable."

@@ -48,9 +48,6 @@ from pipelines.dynamics.pd_loop import read_encoders, whole_counts
 from pipelines.effects.kernel import ALLOCATING_NOTHING
 from pipelines.mechanics.instant import vector
 
-PARTS = 256
-"""Number of parts into which a step with a switch can be divided, a power of two."""
-
 TURN = 2.0 * np.pi
 """Angle, rad, at which a joint counts as running away."""
 
@@ -264,23 +261,25 @@ def _within(wanted, disturbance, begin, length, kept):
 
 @njit(**INNER)
 def _advance(loop, kept, t, h, wanted, disturbance, torque, network):
-    """Advance like ``_step``, but halve a part in which something switches, down to ``PARTS``."""
-    done, size = 0, PARTS
-    while done < PARTS:
+    """Advance like ``_step``, but halve a part in which something switches."""
+    # Parts into which a step with a switch can be divided, a power of two.
+    parts = 256
+    done, size = 0, parts
+    while done < parts:
         # A step in which something switches is taken back and divided.
         _copy(loop, kept)
-        begin, length = t + done * h / PARTS, size * h / PARTS
-        if size == PARTS:
+        begin, length = t + done * h / parts, size * h / parts
+        if size == parts:
             smooth = _step(loop, begin, length, wanted, disturbance, torque, network)
         else:
-            _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
+            _within(wanted, disturbance, done / parts, size / parts, kept)
             # The first try wrote torque and network output at the step's begin already.
             unused = loop.drive[1], loop.drive[2]
             smooth = _step(loop, begin, length, kept.wanted, kept.disturbance, unused[0], unused[1])
         if smooth or size == 1:
             done += size
             # Parts grow again where a part of twice the size may begin.
-            while size < PARTS and done % (2 * size) == 0:
+            while size < parts and done % (2 * size) == 0:
                 size *= 2
         else:
             _copy(kept, loop)

@@ -20,14 +20,6 @@ SHAFT_STIFFNESS = 4000.0
 """Stiffness of teeth on a shaft that twists, N·m/rad. Only at this stiffness does a measured motion
 determine the link's impacts."""
 
-STRIKING_RATIO = 1.0
-"""Damping ratio of the link's impacts behind a measured motion, which does not determine how it
-bounces."""
-
-
-CROSSING_TORQUE = 2.0
-"""Transmitted torque in N·m below which its estimate does not determine the side."""
-
 
 class Backlash(Effect):
     """The transmitted torque pushes the link to one side of the play."""
@@ -108,9 +100,11 @@ class Backlash(Effect):
         """
         values = self.completed(shape)
         if motion.body is not None and values[1] < max(self.shape[1].forms):
-            return link_behind_motor(motion, motion.body, self, values, STRIKING_RATIO)
-        # A smooth sign: near zero torque, noise would throw the link from side to side.
+            # A measured motion does not determine how the link bounces, so impacts are critically
+            # damped.
+            return link_behind_motor(motion, motion.body, self, values, 1.0)
+        # A smooth sign: below 2 N·m, noise would throw the link from side to side.
         j, q = self.column(motion), motion.q.copy()
-        side = np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
+        side = np.tanh(motion.transmitted[0][:, j] / (2.0 * self.scale.torque))
         q[:, j] -= 0.5 * shape[0] * side
         return motion.with_state(q, motion.dq, motion.ddq)

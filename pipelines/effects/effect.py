@@ -54,27 +54,6 @@ class Family(StrEnum):
     PERSON = "person"
 
 
-FAMILY_OF_SIDE = {
-    Side.DRIVE: Family.SPEED,
-    Side.STRUCTURE: Family.ANGLE,
-    Side.SENSOR: Family.SENSOR,
-    Side.HUMAN: Family.PERSON,
-}
-"""Family of an effect that defines none."""
-
-LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
-    Family.ANGLE: ("angle", "both_angles"),
-    Family.SPEED: ("speed",),
-    Family.REVERSAL: ("speed", "friction_by_angle"),
-    Family.LOAD: ("load", "speed"),
-    Family.TIME: ("time", "friction_over_time"),
-    Family.TRANSMISSION: ("angle", "speed", "load", "inertia_by_angle"),
-    Family.SENSOR: ("angle", "load"),
-    Family.PERSON: ("angle", "both_angles", "speed"),
-}
-"""Laws that an effect ``resembles`` if it defines none."""
-
-
 class Parity(IntEnum):
     """Sign of a torque when the same path is traversed backwards in time."""
 
@@ -315,10 +294,26 @@ class Effect(ABC):
         # Without a side there is no default. An installed effect that lacks one is refused later.
         if side is None:
             return
+        family_of = {
+            Side.DRIVE: Family.SPEED,
+            Side.STRUCTURE: Family.ANGLE,
+            Side.SENSOR: Family.SENSOR,
+            Side.HUMAN: Family.PERSON,
+        }
+        laws_of: dict[Family, tuple[str, ...]] = {
+            Family.ANGLE: ("angle", "both_angles"),
+            Family.SPEED: ("speed",),
+            Family.REVERSAL: ("speed", "friction_by_angle"),
+            Family.LOAD: ("load", "speed"),
+            Family.TIME: ("time", "friction_over_time"),
+            Family.TRANSMISSION: ("angle", "speed", "load", "inertia_by_angle"),
+            Family.SENSOR: ("angle", "load"),
+            Family.PERSON: ("angle", "both_angles", "speed"),
+        }
         if not hasattr(cls, "family"):
-            cls.family = FAMILY_OF_SIDE[side]
+            cls.family = family_of[side]
         if not hasattr(cls, "resembles"):
-            cls.resembles = LAWS_OF_FAMILY[cls.family]
+            cls.resembles = laws_of[cls.family]
 
     def __post_init__(self) -> None:
         """Adapt units and equations to the machine, and mark parameters that differ by run."""

@@ -12,8 +12,6 @@ from pipelines.effects.kernel import reading
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
-PHASE = (-np.pi, np.pi)
-
 
 class EncoderEccentricity(Effect):
     """The measured angle errs once per turn, and twice if tracks or windings are unequal.
@@ -46,7 +44,7 @@ class EncoderEccentricity(Effect):
     )
     reported = (
         Parameter("amplitude", "rad", "amplitude of the error once per turn", "a", (0.005, 0.06)),
-        Parameter("phase", "rad", "phase of that error at angle zero", "phi", PHASE),
+        Parameter("phase", "rad", "phase of that error at angle zero", "phi", (-np.pi, np.pi)),
         Parameter(
             "amplitude_twice",
             "rad",
@@ -56,7 +54,12 @@ class EncoderEccentricity(Effect):
             default=0.0,
         ),
         Parameter(
-            "phase_twice", "rad", "phase of that error at angle zero", "psi", PHASE, default=0.0
+            "phase_twice",
+            "rad",
+            "phase of that error at angle zero",
+            "psi",
+            (-np.pi, np.pi),
+            default=0.0,
         ),
     )
 

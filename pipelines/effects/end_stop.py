@@ -3,9 +3,6 @@
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
-DEPTH = 0.1
-"""Depth beyond the contact at which ``stiffness`` is stated, rad (m at a prismatic joint)."""
-
 
 class EndStop(Effect):
     """A bumper, a strap or a cover that is pressed beyond an angle, on one side.
@@ -71,4 +68,6 @@ class EndStop(Effect):
         # A depth is positive in the direction that the stop blocks.
         depth = way * (at.q[joint] - values[1])
         if depth > 0.0:
-            out[joint] += way * values[0] * DEPTH * (depth / DEPTH) ** values[3]
+            # Depth at which `stiffness` is stated, rad (m at a prismatic joint).
+            stated_at = 0.1
+            out[joint] += way * values[0] * stated_at * (depth / stated_at) ** values[3]

@@ -23,45 +23,6 @@ from pipelines.mechanics.instant import reaction as reaction
 # alternative, code generated for each model, costs seconds of compilation whenever a model changes.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-DERIVATIVE = void(INSTANT, vector, vector, vector, int64, vector)
-"""derivative(at, state, values, geometry, joint, out): write the memory's rate to ``out``.
-
-It may depend on the shape values, but not on the linear ones, or torque would not be linear in
-them.
-"""
-
-SPRING = float64(float64, float64, vector)
-"""spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
-
-READING = void(vector, vector, int64)
-"""reading(angle, values, joint): turn true angles into those that the encoders report, in place."""
-
-TORQUE_READING = void(float64, vector, vector, int64, vector, vector)
-"""torque_reading(t, torque, values, joint, state, temperature): apply a sensor in place.
-
-It turns delivered torques into those that the sensors report. It is called once per sample, in
-order. ``state`` is the sensor's memory, zero before the first sample; ``temperature`` is that of
-the motors in °C, NaN where it was not measured.
-"""
-
-
-derivative, spring, reading = map(compiler_of, (DERIVATIVE, SPRING, READING))
-"""Decorators of the kernels of these signatures."""
-
-
-def torque_reading(function):
-    """Compile a torque sensor's reading; the argument temperature is optional."""
-    if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
-        return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
-    return compiler_of(TORQUE_READING)(function)
-
-
-def _at_any_temperature(kernel):
-    def torque_reading(t, torque, values, joint, state, temperature):
-        kernel(t, torque, values, joint, state)
-
-    return torque_reading
-
 
 @cache
 def address(kernel) -> int:
@@ -91,11 +52,50 @@ def _kernel_at(signature):
     return kernel_at
 
 
+def _kind(signature):
+    """Return the decorator of kernels of a signature, and the intrinsic that finds them."""
+    return compiler_of(signature), _kernel_at(signature)
+
+
 reaction_at = _kernel_at(REACTION)
-derivative_at = _kernel_at(DERIVATIVE)
-spring_at = _kernel_at(SPRING)
-reading_at = _kernel_at(READING)
+
+derivative, derivative_at = _kind(void(INSTANT, vector, vector, vector, int64, vector))
+"""derivative(at, state, values, geometry, joint, out): write the memory's rate to ``out``.
+
+It may depend on the shape values, but not on the linear ones, or torque would not be linear in
+them.
+"""
+
+spring, spring_at = _kind(float64(float64, float64, vector))
+"""spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
+
+reading, reading_at = _kind(void(vector, vector, int64))
+"""reading(angle, values, joint): turn true angles into those that the encoders report, in place."""
+
+TORQUE_READING = void(float64, vector, vector, int64, vector, vector)
+"""torque_reading(t, torque, values, joint, state, temperature): apply a sensor in place.
+
+It turns delivered torques into those that the sensors report. It is called once per sample, in
+order. ``state`` is the sensor's memory, zero before the first sample; ``temperature`` is that of
+the motors in °C, NaN where it was not measured.
+"""
+
 torque_reading_at = _kernel_at(TORQUE_READING)
+
+
+def torque_reading(function):
+    """Compile a torque sensor's reading; the argument temperature is optional."""
+    if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
+        return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
+    return compiler_of(TORQUE_READING)(function)
+
+
+def _at_any_temperature(kernel):
+    def torque_reading(t, torque, values, joint, state, temperature):
+        kernel(t, torque, values, joint, state)
+
+    return torque_reading
+
 
 _table = float64[:, ::1]
 _columns = float64[:, :, ::1]

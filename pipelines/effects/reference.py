@@ -10,15 +10,6 @@ from typing import Any
 
 from pipelines.effects import EFFECTS, Effect, Parameter
 
-INTRODUCTION = """\
-# Effects
-
-Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The
-first two are the baseline of every fit; the others are the causes that `exoid diagnose` knows and a
-rig file may name. `exoid effects NAME` prints a page on the terminal. The site that `make docs`
-builds also shows the residual of each effect, drawn from a virtual leg that has it.
-"""
-
 
 def facts(effect: type[Effect]) -> dict[str, Any]:
     """Return an effect's description as a dictionary, for programs."""
@@ -127,13 +118,21 @@ def pages() -> dict[str, str]:
     """Return the pages of exoid's own effects by file name, and their index."""
     # Committed pages must not depend on the packages that are installed.
     ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
+    introduction = """\
+# Effects
+
+Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The
+first two are the baseline of every fit; the others are the causes that `exoid diagnose` knows and a
+rig file may name. `exoid effects NAME` prints a page on the terminal. The site that `make docs`
+builds also shows the residual of each effect, drawn from a virtual leg that has it.
+"""
     head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
     rows = (
         f"| [{e.name}]({e.name}.md) | {e.side.value} | {_where(e)} | {e.equation} |"
         f" {_typical_size(e)} |"
         for e in ours
     )
-    return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {
+    return {"README.md": f"{introduction}\n{head}" + "\n".join(rows) + "\n"} | {
         f"{e.name}.md": _page(e) for e in ours
     }
 

@@ -24,11 +24,6 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
 from pipelines.estimation.regression import Regression, by_segment, residual_of
 
-ITERATIONS = 20
-SETTLED = 0.01
-"""Largest change of a value at convergence, in standard errors of independent blocks."""
-
-
 SLIGHT_SHARE = 0.001
 """Share of a parameter within which a bias does not matter: no torque scale is known any better,
 however long the recording."""
@@ -58,7 +53,10 @@ class InstrumentalVariables(Estimator):
         start = WeightedLeastSquares().fit(problem)
         measured = [r for _, r in problem.regressions()]
         values, weights = start.values, start.weights
-        for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+        most = 20
+        # Largest change of a value at convergence, in standard errors of independent blocks.
+        small = 0.01
+        for iteration in range(1, most + 1):  # noqa: B007
             # A model that cannot exist cannot be simulated, but the nearest that can.
             rows = _rows(problem, measured, nearest(problem, values, start.normal))
             solution = _solved(problem, rows, weights)
@@ -68,15 +66,15 @@ class InstrumentalVariables(Estimator):
                 np.diag(solution.sensitivity @ solution.normal @ solution.sensitivity.T)
             )
             values = solution.values
-            if change.max() < SETTLED:
+            if change.max() < small:
                 break
         # Both use the same rows and weights, so that only the instruments differ.
         itself = [replace(r, instruments=r.measured.regressor) for r in rows]
         test = durbin_wu_hausman(_solved(problem, itself, solution.weights), solution)
-        settled = bool(change.max() < SETTLED)
+        settled = bool(change.max() < small)
         about = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
         remarks = (
-            *convergence_remark(settled, f"{ITERATIONS} iterations"),
+            *convergence_remark(settled, f"{most} iterations"),
             _sentence(test, problem.names, solution),
         )
         return replace(solution, about=about, remarks=remarks)

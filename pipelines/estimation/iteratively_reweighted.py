@@ -21,12 +21,6 @@ from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.regression import by_segment, residual_of
 
-HUBER = 1.345
-"""Standard deviations from which Huber's weights fall: 95 % efficiency on Gaussian noise."""
-BISQUARE = 4.685
-"""Standard deviations from which Tukey's weights are zero: 95 % efficiency on Gaussian noise."""
-ITERATIONS = 50
-
 
 @dataclass(frozen=True)
 class Loss:
@@ -36,18 +30,27 @@ class Loss:
     """Weight over that of a small residual."""
     slope: Callable[[NDArray], NDArray]
     """Derivative of u times the weight."""
+    limit: float
+    """Standard deviations from which weights fall, or are zero: 95 % efficiency on Gaussian
+    noise."""
 
 
-def _bisquare(u: NDArray) -> NDArray:
-    return np.maximum(1.0 - (u / BISQUARE) ** 2, 0.0)
+def _huber(limit: float = 1.345) -> Loss:
+    return Loss(
+        lambda u: limit / np.maximum(np.abs(u), limit),
+        lambda u: (np.abs(u) <= limit).astype(float),
+        limit,
+    )
 
 
-Huber = Loss(
-    lambda u: HUBER / np.maximum(np.abs(u), HUBER), lambda u: (np.abs(u) <= HUBER).astype(float)
-)
-Bisquare = Loss(
-    lambda u: _bisquare(u) ** 2, lambda u: _bisquare(u) * (1.0 - 5.0 * (u / BISQUARE) ** 2)
-)
+def _bisquare(limit: float = 4.685) -> Loss:
+    def root(u: NDArray) -> NDArray:
+        return np.maximum(1.0 - (u / limit) ** 2, 0.0)
+
+    return Loss(lambda u: root(u) ** 2, lambda u: root(u) * (1.0 - 5.0 * (u / limit) ** 2), limit)
+
+
+Huber, Bisquare = _huber(), _bisquare()
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,9 @@ class IterativelyReweighted(Estimator):
         # The root of the inverse weights is the rms residual of each joint: a first scale.
         scale = _sums(problem, start.values, start.weights**-0.5, Huber).scale
         # Huber's loss is convex, so its fit does not depend on the start; the bisquare's does.
-        first = _iterated(problem, start.values, scale, Huber)
-        second = _iterated(problem, first.values, first.scale, Bisquare)
+        most = 50
+        first = _iterated(problem, start.values, scale, Huber, most)
+        second = _iterated(problem, first.values, first.scale, Bisquare, most)
         values, scale, settled = second.values, first.scale, first.settled and second.settled
         sums = _sums(problem, values, scale, Bisquare)
         free = np.ix_(problem.fitted, problem.fitted)
@@ -114,7 +118,7 @@ class IterativelyReweighted(Estimator):
                 "scale_nm": scale.tolist(),
                 "rejected_share": shares,
             },
-            convergence_remark(settled, f"{ITERATIONS} iterations") + _of_outliers(shares),
+            convergence_remark(settled, f"{most} iterations") + _of_outliers(shares),
         )
 
 
@@ -122,8 +126,8 @@ def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
     # Share of rejected blocks above which the user is informed.
     worth_saying = 1e-3
     return tuple(
-        f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard"
-        " deviations off and are ignored"
+        f"{joint}: {100 * share:.1f} % of the blocks are more than {Bisquare.limit:g} robust"
+        " standard deviations off and are ignored"
         for joint, share in shares.items()
         if share > worth_saying
     )
@@ -140,12 +144,14 @@ class _Iterated(NamedTuple):
     settled: bool
 
 
-def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> _Iterated:
+def _iterated(
+    problem: Problem, values: NDArray, scale: NDArray, loss: Loss, most: int
+) -> _Iterated:
     """Fit and weight in turn until the values converge; the bisquare's scale is held."""
     # Largest change of a value at convergence, in standard errors of independent blocks.
     settled = 1e-3
     free, held = problem.fitted, problem.of_held
-    for iteration in range(1, ITERATIONS + 1):
+    for iteration in range(1, most + 1):
         sums = _sums(problem, values, scale, loss)
         sensitivity = inverse(sums.normal[np.ix_(free, free)], problem.names)
         before = values
@@ -157,7 +163,7 @@ def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> 
             scale = sums.scale
         if np.all(np.abs(values - before) < settled * np.sqrt(np.diag(sensitivity))):
             return _Iterated(values, scale, iteration, settled=True)
-    return _Iterated(values, scale, ITERATIONS, settled=False)
+    return _Iterated(values, scale, most, settled=False)
 
 
 def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums:
@@ -184,7 +190,9 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         slope,
         right,
         np.array([max(mad * np.median(size), LEAST_NM) for size in residuals]),
-        np.array([np.mean(size > BISQUARE * s) for size, s in zip(residuals, scale, strict=True)]),
+        np.array(
+            [np.mean(size > Bisquare.limit * s) for size, s in zip(residuals, scale, strict=True)]
+        ),
     )
 
 

@@ -24,9 +24,6 @@ from pipelines.estimation.realizable import nearest
 WINDOW_S = 0.5
 """Length of a window. Longer ones are more sensitive to noise of the torque, shorter ones to noise
 of the first state."""
-STEP = 0.5
-"""Step for derivatives, in standard errors of the start. It is small enough that a joint does not
-stick noticeably longer or shorter."""
 
 
 class OutputError(Estimator):
@@ -88,14 +85,17 @@ def _slopes(
     """Return the derivatives of the angle error, (windows, samples, J, columns) for each run."""
     at = _errors(problem, every)
     slopes = [np.zeros((*error.shape, len(columns))) for error in at]
+    # Step for derivatives, in standard errors of the start. It is small enough that a joint does
+    # not stick noticeably longer or shorter.
+    step = 0.5
     for place, column in enumerate(columns):
         # A held value of zero has no scale for a step, and keeps a slope of zero.
         if size[column] > 0.0:
             moved = every.copy()
             # Forward differences cost one simulation a column, central ones two.
-            moved[column] += STEP * size[column]
+            moved[column] += step * size[column]
             for slope, now, ahead in zip(slopes, at, _errors(problem, moved), strict=True):
-                slope[..., place] = (ahead - now) / (STEP * size[column])
+                slope[..., place] = (ahead - now) / (step * size[column])
     return slopes
 
 

@@ -15,12 +15,6 @@ from pipelines.mechanics.stretches import edge
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
-REVERSAL_SPEED = 0.04
-"""Speed in rad/s below which the sign of an exoskeleton's velocity, and so its friction, is
-uncertain; scaled for other machines."""
-TURN_S = 0.075
-"""Time on both sides of a turn in which measured forces and filtered acceleration are not
-simultaneous."""
 REVERSAL_PADDING_S = 0.08
 """Time for which a joint is disturbed after it has stuck."""
 
@@ -114,7 +108,10 @@ def reversal_speeds(machine: Machine) -> NDArray:
     (J,) array
         rad/s; m/s at a prismatic joint.
     """
-    return np.array([REVERSAL_SPEED * machine.scale(joint).speed for joint in machine.names])
+    # Speed in rad/s below which the sign of an exoskeleton's velocity, and so its friction, is
+    # uncertain; scaled for other machines.
+    speed = 0.04
+    return np.array([speed * machine.scale(joint).speed for joint in machine.names])
 
 
 def mask_in_words(machine: Machine) -> str:
@@ -169,7 +166,9 @@ def away_from_turns(motion: Motion) -> NDArray:
     (n,) bool array
         False near a turn of any joint.
     """
-    return np.asarray(~dilate(np.any(turns(motion), axis=1), round(TURN_S * motion.sample_rate_hz)))
+    # Within 75 ms of a turn measured forces and filtered acceleration are not simultaneous.
+    reach = round(0.075 * motion.sample_rate_hz)
+    return np.asarray(~dilate(np.any(turns(motion), axis=1), reach))
 
 
 def turns(motion: Motion) -> NDArray:

@@ -175,7 +175,9 @@ MJCF = Format(
     holding_from(
         {
             Element.RIGID_BODIES: "bodies of nominal masses that have these X",
-            Element.QUADRATIC_DAMPING: "second coefficient of the joint's damping (read by MuJoCo 4.0)",
+            Element.QUADRATIC_DAMPING: (
+                "second coefficient of the joint's damping (read by MuJoCo 4.0)"
+            ),
             Element.ARMATURE: "joint armature",
             Element.SPRING: "joint stiffness and springref",
             Element.MASS_ACROSS: "place of the body's centre of mass",

@@ -15,9 +15,6 @@ from pipelines.plotting.matplotlib_charts import chart_figure, grid_figure
 from pipelines.plotting.residual_panels import residual_panel, residual_reach, torque_panels
 from pipelines.plotting.style import STYLE, save
 
-MOST = 20_000
-"""Most rows drawn of a run; of a longer run every second, fourth, ... row is drawn."""
-
 
 @dataclass
 class _RunData:
@@ -29,6 +26,8 @@ class _RunData:
     scored: int = 0
     squares: dict[str, float] = field(default_factory=dict)
     """Sum of squares of each column over the scored rows."""
+    most: int = 20_000
+    """Most rows that are drawn; of a longer run every second, fourth, ... row is drawn."""
 
     def add(self, frame: pd.DataFrame, columns: Sequence[str]) -> None:
         scored = frame[frame["scored"]]
@@ -43,7 +42,7 @@ class _RunData:
         self.frame = chosen
         self.passed += len(frame)
         # Every second row is dropped, so that those that stay are evenly spaced.
-        while len(self.frame) > MOST:
+        while len(self.frame) > self.most:
             self.frame = self.frame.iloc[::2].reset_index(drop=True)
             self.every *= 2
 

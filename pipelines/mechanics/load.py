@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanism import Mechanism
 
-STEP = 1e-4
-"""Step of the difference quotients, rad and rad/s; the torque bends over tenths of a radian."""
-
 
 @dataclass(frozen=True)
 class LoadColumns:
@@ -51,13 +48,15 @@ class LoadColumns:
         # Arrays are not hashable. Equal directions have equal bytes.
         key = direction.tobytes()
         if key not in self._projected:
-            step = STEP * direction
+            # Of the difference quotients, rad and rad/s: the torque bends over tenths of a radian.
+            size = 1e-4
+            step = size * direction
             # Torque is linear in acceleration, so that a whole unit gives the exact slope there.
             torques = (
                 self.torque,
                 self._torque(self.q, self.dq, self.ddq + direction) - self.torque,
-                (self._torque(self.q, self.dq + step, self.ddq) - self.torque) / STEP,
-                (self._torque(self.q + step, self.dq, self.ddq) - self.torque) / STEP,
+                (self._torque(self.q, self.dq + step, self.ddq) - self.torque) / size,
+                (self._torque(self.q + step, self.dq, self.ddq) - self.torque) / size,
             )
             # Virtual work: the torque on a coordinate is the joints' torque along its direction.
             self._projected[key] = np.array(

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from pipelines.plotting.chart import Chart, Mark, Panel, Role, Series
 from pipelines.plotting.style import BLUE, GREY, NOISE
 
-COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
-WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
 WIDE, NARROW = 7.2, 3.6
 """Widths of two columns of a paper and of one, inches."""
 
@@ -94,7 +92,8 @@ def _draw(axis: Axes, chart: Chart, panel: Panel) -> None:
 
 
 def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
-    colour, label = COLOURS[series.role], series.label or "_"
+    colours = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
+    colour, label = colours[series.role], series.label or "_"
     x, values = chart.x, series.values
     if series.mark is Mark.DOTS:
         # Rasterized, as thousands of dots as vectors make a PDF slow to open.
@@ -105,7 +104,8 @@ def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
         # Means stand between rows of dots, over which the line must go on.
         known = ~np.isnan(values)
         x, values = x[known], values[known]
-    width = 1.8 if series.mark is Mark.MEAN else WIDTHS[series.role]
+    widths = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
+    width = 1.8 if series.mark is Mark.MEAN else widths[series.role]
     axis.plot(x, values, color=colour, lw=width, label=label)
 
 

@@ -24,10 +24,6 @@ from pipelines.report.session import Session
 from pipelines.report.session_charts import charts
 from pipelines.wording.numbers import digits
 
-TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {
-    f"cause{n}": c for n, c in enumerate(CAUSES, 1)
-}
-
 Drawings = dict[str, Callable[[], Figure]]
 """Functions that draw a figure, by the name of its file."""
 
@@ -55,16 +51,19 @@ def draw(
 def _budget_figure(bars: Sequence[Bar]) -> Figure:
     """Return the figure of the error budget: one bar per joint, each with its own scale."""
     figure, axes = rows_of_axes(len(bars), (WIDE, 0.5 + 1.25 * len(bars)))
+    tones = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {
+        f"cause{n}": c for n, c in enumerate(CAUSES, 1)
+    }
     for axis, bar in zip(axes, bars, strict=True):
         shown = [segment for segment in bar.segments if segment.share]
         for s in shown:
-            axis.barh(0, s.high - s.low, left=s.low, color=TONES[s.tone], ec="white", lw=0.5)
+            axis.barh(0, s.high - s.low, left=s.low, color=tones[s.tone], ec="white", lw=0.5)
         axis.set_yticks([])
         title = sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms")
         axis.set_title(title, loc="left", fontsize=9)
         axis.set_xlabel(f"mean square error, ({bar.unit})²")
         axis.grid(visible=False)
-        patches = [Patch(color=TONES[s.tone]) for s in shown]
+        patches = [Patch(color=tones[s.tone]) for s in shown]
         labels = [f"{s.label}: {digits(s.rms)} {bar.unit}" for s in shown]
         axis.legend(patches, labels, loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8)
     return figure

@@ -13,17 +13,6 @@ from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 from pipelines.settings import Experiment
 
-OF_MACHINE = (
-    "parameters",
-    "residuals",
-    "motion",
-    "recording",
-    "trajectory",
-    "simulation",
-    "verdict",
-)
-"""Kinds of file whose metadata hold the joints, the most reliable first."""
-
 
 @dataclass(frozen=True)
 class Artifact:
@@ -138,7 +127,17 @@ class Session:
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """The machine's joints, from the first kind of file that the session has."""
-        for kind in OF_MACHINE:
+        # Kinds of file whose metadata hold the joints, the most reliable first.
+        of_machine = (
+            "parameters",
+            "residuals",
+            "motion",
+            "recording",
+            "trajectory",
+            "simulation",
+            "verdict",
+        )
+        for kind in of_machine:
             for artifact in self.of_kind(kind):
                 return joints_of(artifact.metadata)
         return ()

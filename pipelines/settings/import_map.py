@@ -20,8 +20,6 @@ from pipelines.validation.suggestion import closest, similar_file
 LARGEST = 1e12
 """Greatest number in a map; a larger one is a typing error."""
 
-PLACEHOLDERS = {"file", "folder", "purpose"}
-"""Words in braces that a recording's name may have."""
 
 Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Factor = Annotated[float, Field(gt=0.0, le=LARGEST)]
@@ -235,7 +233,9 @@ class RecordingSettings(Settings):
                 f"found {name!r}, expected a file's name without its folder, and without control"
                 ' characters and / \\ : * ? " < > |; -o names the folder'
             )
-        unknown = set(re.findall(r"\{(.*?)\}", name)) - PLACEHOLDERS
+        # Words in braces that a recording's name may have.
+        placeholders = {"file", "folder", "purpose"}
+        unknown = set(re.findall(r"\{(.*?)\}", name)) - placeholders
         if unknown:
             raise ValueError(
                 f"found {{{min(unknown)}}} in {name!r}, expected {{file}}, {{folder}} or"

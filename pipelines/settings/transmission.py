@@ -61,13 +61,6 @@ GEARED = {
 }
 """Power of the gear ratio by dimension at the joint: it divides motion, multiplies torque."""
 
-METRIC = {
-    "length": ("m", "metres"),
-    "velocity": ("m/s", "metres a second"),
-    "force": ("N", "newtons"),
-}
-"""Units of a prismatic joint's log, suggested where its map has the unit of a turning one."""
-
 
 def paths(source: str, target: str) -> list[tuple[Step, ...]]:
     """Return all sequences of steps from one dimension to another, the shortest first."""
@@ -117,6 +110,12 @@ def gain(source: str, target: str, given: Mapping[str, float], gear_ratio: float
 
 def _problem(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
     wanted = [{step.key for step in way} for way in ways]
+    # Units of a prismatic joint's log, suggested where its map has the unit of a turning one.
+    metric = {
+        "length": ("m", "metres"),
+        "velocity": ("m/s", "metres a second"),
+        "force": ("N", "newtons"),
+    }
     for keys in wanted:
         if not keys >= given:
             continue
@@ -125,7 +124,7 @@ def _problem(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
             message += f", or {_both(wanted[0] - given)} in place of {_both(given)}"
         message += "; add it from the data sheet"
         if keys == {"lead_m"}:
-            unit, words = METRIC[target]
+            unit, words = metric[target]
             message += f', or unit = "{unit}", if the log is in {words}'
         return message
     # No way uses all numbers: name those that are too many for the way that uses most of them.

@@ -13,7 +13,6 @@ class Unit:
     offset: float = 0.0
 
 
-_TURN = 2.0 * pi
 # Exact by definition: the international inch and pound, and standard gravity.
 _INCH, _POUND_FORCE, _KILOGRAM_FORCE = 0.0254, 4.4482216152605, 9.80665
 
@@ -28,7 +27,7 @@ UNITS: dict[str, Unit] = {
     "rad": Unit("angle", 1.0),
     "mrad": Unit("angle", 1e-3),
     "deg": Unit("angle", pi / 180.0),
-    "rev": Unit("angle", _TURN),
+    "rev": Unit("angle", 2.0 * pi),
     "m": Unit("length", 1.0),
     "cm": Unit("length", 1e-2),
     "mm": Unit("length", 1e-3),
@@ -39,8 +38,8 @@ UNITS: dict[str, Unit] = {
     "rad/s": Unit("angular velocity", 1.0),
     "mrad/s": Unit("angular velocity", 1e-3),
     "deg/s": Unit("angular velocity", pi / 180.0),
-    "rev/s": Unit("angular velocity", _TURN),
-    "rpm": Unit("angular velocity", _TURN / 60.0),
+    "rev/s": Unit("angular velocity", 2.0 * pi),
+    "rpm": Unit("angular velocity", 2.0 * pi / 60.0),
     "m/s": Unit("velocity", 1.0),
     "cm/s": Unit("velocity", 1e-2),
     "mm/s": Unit("velocity", 1e-3),
@@ -68,53 +67,55 @@ UNITS: dict[str, Unit] = {
     "°F": Unit("temperature", 5.0 / 9.0, -160.0 / 9.0),
 }
 
-SPELLINGS = {
-    "s": ("sec", "seconds"),
-    "ms": ("msec",),
-    # The micro sign and the Greek letter look alike, but are two characters.
-    "us": ("usec", "µs", "μs"),
-    "deg": ("°", "degree", "degrees", "Grad"),
-    "rad": ("radians",),
-    "rev": ("turn", "turns"),
-    "counts": (
-        "count",
-        "cnt",
-        "cts",
-        "ticks",
-        "inc",
-        "Inkr",
-        "Inkr.",
-        "Inkremente",
-        "points",
-        "pts",
-        "pulses",
-        "Impulse",
-        "impulsions",
-    ),
-    "counts/s": ("counts/sec", "cnt/s", "ticks/s", "inc/s", "Inkr/s", "Inkr./s"),
-    "rev/s": ("rps", "U/s", "tr/s"),
-    "rpm": ("RPM", "1/min", "min^-1", "min-1", "min⁻¹", "U/min", "tr/min", "rev/min"),
-    "rad/s": ("rad/sec", "radps"),
-    "deg/s": ("°/s", "°/sec", "deg/sec", "Grad/s", "dps"),
-    "mm/s": ("mm/sec",),
-    "N·m": ("Nm", "N*m", "N.m", "N m"),
-    "mN·m": ("mNm", "mN*m", "mN.m", "Nmm"),
-    "N·cm": ("Ncm",),
-    "kN·m": ("kNm",),
-    "kgf·cm": ("kgf*cm",),
-    "lbf·in": ("in-lb",),
-    "lbf·ft": ("ft-lb",),
-    "A": ("amps", "ampere"),
-    "V": ("volts", "volt"),
-    "N": ("newton",),
-    "°C": ("degC", "deg C", "Grad C", "C", "celsius"),
-    "°F": ("degF",),
-    "%": ("pct", "percent"),
-    "permille": ("‰", "0/00"),
-    "um": ("µm", "μm"),
+ALIASES = {
+    alias: unit
+    for unit, aliases in {
+        "s": ("sec", "seconds"),
+        "ms": ("msec",),
+        # The micro sign and the Greek letter look alike, but are two characters.
+        "us": ("usec", "µs", "μs"),
+        "deg": ("°", "degree", "degrees", "Grad"),
+        "rad": ("radians",),
+        "rev": ("turn", "turns"),
+        "counts": (
+            "count",
+            "cnt",
+            "cts",
+            "ticks",
+            "inc",
+            "Inkr",
+            "Inkr.",
+            "Inkremente",
+            "points",
+            "pts",
+            "pulses",
+            "Impulse",
+            "impulsions",
+        ),
+        "counts/s": ("counts/sec", "cnt/s", "ticks/s", "inc/s", "Inkr/s", "Inkr./s"),
+        "rev/s": ("rps", "U/s", "tr/s"),
+        "rpm": ("RPM", "1/min", "min^-1", "min-1", "min⁻¹", "U/min", "tr/min", "rev/min"),
+        "rad/s": ("rad/sec", "radps"),
+        "deg/s": ("°/s", "°/sec", "deg/sec", "Grad/s", "dps"),
+        "mm/s": ("mm/sec",),
+        "N·m": ("Nm", "N*m", "N.m", "N m"),
+        "mN·m": ("mNm", "mN*m", "mN.m", "Nmm"),
+        "N·cm": ("Ncm",),
+        "kN·m": ("kNm",),
+        "kgf·cm": ("kgf*cm",),
+        "lbf·in": ("in-lb",),
+        "lbf·ft": ("ft-lb",),
+        "A": ("amps", "ampere"),
+        "V": ("volts", "volt"),
+        "N": ("newton",),
+        "°C": ("degC", "deg C", "Grad C", "C", "celsius"),
+        "°F": ("degF",),
+        "%": ("pct", "percent"),
+        "permille": ("‰", "0/00"),
+        "um": ("µm", "μm"),
+    }.items()
+    for alias in aliases
 }
-"""Other spellings of each unit."""
-ALIASES = {alias: unit for unit, aliases in SPELLINGS.items() for alias in aliases}
 """Unit of each other spelling."""
 
 

@@ -9,9 +9,6 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from pipelines.signals.welch import Welch
 
-# Length of a window, s; a shorter recording is one window as a whole.
-WINDOW_S = 10.0
-
 
 @dataclass(frozen=True)
 class Cutoff:
@@ -90,7 +87,8 @@ def choose_cutoff(
     # Cut-off over the frequency where signal and noise meet. In acceleration, noise exceeds the
     # signal well below that frequency.
     before_noise = 0.7
-    welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
+    # Windows of 10 s; a shorter recording is one window as a whole.
+    welch = Welch(rate_hz, min(samples, int(10.0 * rate_hz)))
     for piece in pieces:
         welch.add(piece)
     spectra = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]

@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from pipelines.contracts.verdict import Finding, Verdict
     from pipelines.contracts.verdict import Node as Step
 
-LEAST = 0.01
-"""Probability below which an alternative is not shown."""
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -132,8 +129,10 @@ def _grow(root: Node, finding: "Finding") -> None:
         against = ", not named: the validation runs speak against it"
         causes = [(one.words + against * one.dropped, one.probability) for one in finding.causes]
         others = causes + others
+    # Probability below which an alternative is not shown.
+    least = 0.01
     for words, probability in others:
-        if probability >= LEAST:
+        if probability >= least:
             _under(node, words, words, probability)
 
 

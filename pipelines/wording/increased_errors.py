@@ -8,9 +8,6 @@ from pipelines.contracts.verdict import Verdict
 from pipelines.model import BY_NAME
 from pipelines.wording.numbers import digits
 
-NOTABLE = 1.1
-"""Factor by which a simulation's error must grow to be mentioned."""
-
 
 def increased_errors(verdict: Verdict, joints: Sequence[Joint]) -> list[str]:
     """Return a sentence for each error that the causes increase, with the reason if known.
@@ -41,8 +38,8 @@ def torque_error_grew(before: float | None, after: float | None = None, *, floor
 
 
 def simulation_error_grew(before: float | None, after: float | None = None) -> bool:
-    """Return whether a simulation's error grows by more than ``NOTABLE``."""
-    return before is not None and after is not None and after > NOTABLE * before
+    """Return whether a simulation's error grows by more than a tenth, enough to be mentioned."""
+    return before is not None and after is not None and after > 1.1 * before
 
 
 def _at(joint: Joint, verdict: Verdict) -> Iterator[str]:

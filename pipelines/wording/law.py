@@ -31,25 +31,6 @@ LAWS = {
 }
 """Family and wording of each kind of smooth law."""
 FAMILIES = {kind: family for kind, (family, _) in LAWS.items()}
-FAMILIES_IN_WORDS = {
-    "angle": "a law of {joint}'s angle",
-    "speed": "a law of {joint}'s speed",
-    "reversal": "friction of {joint} that remembers its reversals",
-    "load": "a law of {joint}'s load",
-    "time": "a torque at {joint} that changes with time",
-    "transmission": "something in {joint}'s transmission",
-    "sensor": "something in {joint}'s sensors",
-    "person": "something of the person at {joint}",
-}
-"""Wording of a missing effect of which only the family is known."""
-OF_OTHER_JOINT = {
-    "angle": "a torque at {joint} that depends on the other joint's angle",
-    "speed": "a torque at {joint} that depends on the other joint's speed",
-    "load": "a torque at {joint} that depends on the other joint's load",
-}
-"""The same where the likely law is of the other joint."""
-WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
-"""The same of no single joint, where it is worded otherwise."""
 
 
 def law_label(kind: str, joint: str | None, wearer: str = "all") -> str:
@@ -85,8 +66,25 @@ def family_in_words(
     family: str, joint: str | None, machine: Machine | None = None, *, of_other_joint: bool = False
 ) -> str:
     """Return the wording of a missing effect, by its family and its joint, if it has one."""
-    special = WITHOUT_JOINT if not joint else OF_OTHER_JOINT if of_other_joint else {}
-    return _said_of(special.get(family, FAMILIES_IN_WORDS[family]), joint, machine)
+    # Where the likely law is of the other joint.
+    of_other = {
+        "angle": "a torque at {joint} that depends on the other joint's angle",
+        "speed": "a torque at {joint} that depends on the other joint's speed",
+        "load": "a torque at {joint} that depends on the other joint's load",
+    }
+    of_several = {"angle": "a law of {joint}'s angles"}
+    special = of_several if not joint else of_other if of_other_joint else {}
+    families = {
+        "angle": "a law of {joint}'s angle",
+        "speed": "a law of {joint}'s speed",
+        "reversal": "friction of {joint} that remembers its reversals",
+        "load": "a law of {joint}'s load",
+        "time": "a torque at {joint} that changes with time",
+        "transmission": "something in {joint}'s transmission",
+        "sensor": "something in {joint}'s sensors",
+        "person": "something of the person at {joint}",
+    }
+    return _said_of(special.get(family, families[family]), joint, machine)
 
 
 def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:

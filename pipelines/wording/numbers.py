@@ -2,17 +2,12 @@
 
 from math import floor, isfinite, log10
 
-DIGITS = 3
-"""Significant digits of a number without an interval."""
-PLAIN = (1e-4, 1e6)
-"""Range of magnitudes written without a power of ten."""
-
 
 def digits(value: float | None) -> str:
     """Return a number with three significant digits, a dash for none."""
     if value is None or not isfinite(value):
         return "–"
-    return _written(value, _decimals(value, DIGITS))
+    return _written(value, _decimals(value, 3))
 
 
 def digits_for(value: float, half: float | None) -> str:
@@ -35,8 +30,9 @@ def _decimals(value: float, significant: int) -> int:
 
 
 def _written(value: float, decimals: int) -> str:
-    if value != 0 and not PLAIN[0] <= abs(value) < PLAIN[1]:
-        text = f"{value:.{DIGITS - 1}e}"
+    # Other magnitudes are written with a power of ten.
+    if value != 0 and not 1e-4 <= abs(value) < 1e6:
+        text = f"{value:.2e}"
     else:
         # round() also takes negative decimals, for 12346 to 12300; a format does not.
         text = f"{round(value, decimals):.{max(decimals, 0)}f}"

@@ -14,8 +14,17 @@ from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
 from pipelines.workflow.imported import ImportedRuns
 
-FIRST_STAGES = ("design", "acquire", "filter", "identify")
-STAGES = (*FIRST_STAGES, "diagnose", "simulate", "replay", "extended", "report")
+STAGES = (
+    "design",
+    "acquire",
+    "filter",
+    "identify",
+    "diagnose",
+    "simulate",
+    "replay",
+    "extended",
+    "report",
+)
 """All stages; an experiment may have no step of some."""
 
 
@@ -145,12 +154,13 @@ def graph(
     return (*steps, replace(report, takes_all=True))
 
 
-LOOP, SWEEP, WHOLE_FOLDER = "rbf.parquet", "kv-sweep.csv", ("identify", "diagnose")
+LOOP, SWEEP = "rbf.parquet", "kv-sweep.csv"
 
 
 def _output(stage: str, target: Path) -> str:
     """Return the output argument of a command: a folder for some."""
-    is_folder = stage in WHOLE_FOLDER or target.name == LOOP
+    whole_folder = ("identify", "diagnose")
+    is_folder = stage in whole_folder or target.name == LOOP
     return f"{target.parent.as_posix()}/" if is_folder else target.as_posix()
 
 

@@ -16,9 +16,6 @@ from pipelines.settings.rig import load_rig
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
 
-INCOMPLETE = "incomplete"
-"""The phony prerequisite of a step that lacks one of its files."""
-
 
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
@@ -72,7 +69,7 @@ def _rules(steps: Sequence[Step]) -> Iterator[str]:
         yield f"$(SETTINGS)/graph.mk: {sealed.as_posix()}"
         yield f"{sealed.as_posix()}:"
     # A phony target is never up to date, nor is a step that needs it.
-    yield f".PHONY: {INCOMPLETE}"
+    yield ".PHONY: incomplete"
     for step in steps:
         yield from _rule(step)
 
@@ -95,4 +92,4 @@ def _if_incomplete(step: Step) -> Iterator[str]:
     """Yield the prerequisite of a step that lacks a file; grouped targets would need make 4.3."""
     outputs = " ".join(file.as_posix() for file in step.other_outputs)
     if outputs:
-        yield f"$(if $(filter-out $(wildcard {outputs}),{outputs}),{INCOMPLETE})"
+        yield f"$(if $(filter-out $(wildcard {outputs}),{outputs}),incomplete)"

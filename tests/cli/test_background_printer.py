@@ -2,7 +2,6 @@
 
 import threading
 
-from exoid_cli import background_printer
 from exoid_cli.background_printer import BackgroundPrinter
 
 
@@ -14,8 +13,7 @@ def test_lines_are_printed_in_their_order():
     assert printed == [str(k) for k in range(50)]
 
 
-def test_an_output_that_is_stuck_holds_up_nobody(monkeypatch):
-    monkeypatch.setattr(background_printer, "CLOSING_S", 0.1)
+def test_an_output_that_is_stuck_holds_up_nobody():
     released, printed = threading.Event(), []
 
     def write(text):
@@ -23,8 +21,8 @@ def test_an_output_that_is_stuck_holds_up_nobody(monkeypatch):
         printed.append(text)
 
     # Were print or the block's end to wait for the output, the test would never end.
-    with BackgroundPrinter(write) as printer:
-        for k in range(10 * background_printer.QUEUE_SIZE):
+    with BackgroundPrinter(write, waiting=100, closing_s=0.1) as printer:
+        for k in range(1000):
             printer.print(str(k))
     assert printed == []
     released.set()

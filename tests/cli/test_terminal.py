@@ -116,15 +116,13 @@ def test_a_remark_is_set_in_and_broken_between_words(capsys, monkeypatch):
 
 
 def test_a_start_that_takes_long_is_explained_where_there_is_no_terminal(monkeypatch):
-    monkeypatch.setattr("exoid_cli.console.LATE_S", 0.0)
     printed, console = Queue(), Console()
     monkeypatch.setattr(console.err, "print", lambda text, **options: printed.put(str(text)))
-    with console.starting("compiling"):
+    with console.starting("compiling", late_s=0.0):
         assert printed.get() == "compiling"  # for as long as it takes
 
 
-def test_a_start_that_is_over_soon_needs_no_explanation(capsys, monkeypatch):
-    monkeypatch.setattr("exoid_cli.console.LATE_S", 3600.0)
-    with Console().starting("compiling"):
+def test_a_start_that_is_over_soon_needs_no_explanation(capsys):
+    with Console().starting("compiling", late_s=3600.0):
         pass
     assert capsys.readouterr().err == ""

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.design.fitness import (
-    CRITERIA,
+    Criterion,
     cost,
     expand,
     fill_columns,
@@ -74,7 +74,7 @@ def test_the_compiled_columns_are_the_model_s_regressor():
     assert_allclose(gram_matrix(work.columns), stacked.T @ stacked / 1000, atol=1e-10)
 
 
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("criterion", Criterion.__members__)
 def test_the_fitness_agrees_with_singular_values(criterion):
     for seed in range(10):
         for harmonics, theta0 in ((2, np.array([0.611, -0.925])), (5, None)):

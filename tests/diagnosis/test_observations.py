@@ -8,7 +8,7 @@ import pytest
 from pipelines.diagnosis.evidence.baseline import baseline_of, only_trained_outputs
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.joint_fit import fit, residuals_on
-from pipelines.estimation.regression import TURN_S, away_from_turns
+from pipelines.estimation.regression import away_from_turns
 from pipelines.mechanics.slow_motion import below
 from pipelines.model import Model
 from tests.diagnosis.sessions import session
@@ -24,10 +24,10 @@ def test_near_a_turn_of_either_joint_no_cuff_is_used(motions):
     steady = away_from_turns(worn)
     turns = [worn.time[np.flatnonzero(np.diff(dq > 0)) + 1] for dq in worn.dq.T]
     for at in np.concatenate(turns):
-        near = np.abs(worn.time - at) < TURN_S - 0.01
+        near = np.abs(worn.time - at) < 0.065
         assert not steady[near].any()
     distance = np.min(np.abs(worn.time[:, np.newaxis] - np.concatenate(turns)), axis=1)
-    assert steady[distance > TURN_S + 0.01].all()
+    assert steady[distance > 0.085].all()
 
 
 def test_cuffs_measure_the_wearers_torque_better_away_from_turns_than_near_them(motions):

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Side
-from pipelines.effects.backlash import CROSSING_TORQUE
 from pipelines.effects.baseline import Friction, RigidBody
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.rotor_inertia import RotorInertia
@@ -136,9 +135,8 @@ def test_play_is_seen_through_away_from_where_the_load_changes_sign():
     motion = moved("with_human", Term(hidden.effect, np.array([0.01])))
     motion = replace(motion, load=Model((MACHINE, PERSON)).torque(motion))
     terms = (MACHINE, PERSON, *FRICTION, rotor)
-    near = (
-        np.convolve(np.abs(motion.load[:, 0]) < 5.0 * CROSSING_TORQUE, np.ones(61), mode="same") > 0
-    )
+    # Below 10 N·m it is uncertain to which side the load pushes the link.
+    near = np.convolve(np.abs(motion.load[:, 0]) < 10.0, np.ones(61), mode="same") > 0
     motion = replace(motion, valid=motion.valid & ~near)
     assert misfit(motion, *terms, Term(hidden.effect, np.array([0.01]))) < 0.3 * misfit(
         motion, *terms

@@ -59,15 +59,13 @@ def test_pieces_change_nothing_but_rounding(recordings, monkeypatch):
     assert_frame_equal(*left, rtol=1e-8, atol=1e-8)
 
 
-def test_a_figure_of_a_long_run_has_rows_from_all_of_it_and_the_error_of_all_of_it(monkeypatch):
-    monkeypatch.setattr(figures, "MOST", 100)
-
+def test_a_figure_of_a_long_run_has_rows_from_all_of_it_and_the_error_of_all_of_it():
     rng = np.random.default_rng(0)
     n = 5000
     whole = pd.DataFrame(
         {"time_s": np.arange(n), "scored": rng.random(n) < 0.8, "left": rng.standard_normal(n)}
     )
-    drawn = figures._RunData(whole.iloc[:0])
+    drawn = figures._RunData(whole.iloc[:0], most=100)
     for start in range(0, n, 37):
         drawn.add(whole.iloc[start : start + 37], ["left"])
     assert 50 <= len(drawn.frame) <= 100

@@ -9,7 +9,7 @@ TIME = np.arange(0, 40, 1 / RATE_HZ)
 
 
 def spectrum(x, rate_hz):
-    welch = Welch(rate_hz, int(cutoff.WINDOW_S * rate_hz))
+    welch = Welch(rate_hz, int(10.0 * rate_hz))
     welch.add(x[:, np.newaxis])
     return cutoff.spectrum(welch.frequency_hz, welch.density[:, 0], rate_hz)
 

@@ -7,17 +7,27 @@ remains where noise was added after the rounding, so that no value in the file l
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-FINEST, COARSEST = 0.1, 2.0
-"""Range of steps that are sought, in units of the joint's rms torque. A finer one adds less than
-three percent of it."""
-REACH = 3.0
-"""Torque on either side of its median in which the step is sought, in the same unit."""
-STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
-"""Number of steps within the reach that differ by at least the width of a line."""
+
+@dataclass(frozen=True)
+class SearchedSteps:
+    """The steps that are sought. Torques and steps are in units of the joint's rms torque."""
+
+    finest: float = 0.1
+    """Finest step that is sought; a finer one adds less than three percent of the torque."""
+    coarsest: float = 2.0
+    """Coarsest step that is sought."""
+    reach: float = 3.0
+    """Torque on either side of its median in which a step is sought."""
+
+    @property
+    def independent(self) -> float:
+        """Number of steps within the reach that differ by at least the width of a line."""
+        return 2.0 * self.reach * (1.0 / self.finest - 1.0 / self.coarsest)
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:
@@ -56,18 +66,18 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     x, y = np.concatenate(torque), np.concatenate(residual)
     if not len(x) or not rms > 0.0:
         return None
-    middle = float(np.median(x))
+    searched, middle = SearchedSteps(), float(np.median(x))
     # Bins of torque within the reach: 17 in the finest step. Each step then costs the same, however
     # long the recordings are.
     bins = 1024
-    edges = middle + rms * np.linspace(-REACH, REACH, bins + 1)
+    edges = middle + rms * np.linspace(-searched.reach, searched.reach, bins + 1)
     counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=y)[0]
     # Steps tried within the width of a line.
     per_line = 4
     # Far from zero the phase of a line turns faster with its step.
-    count = round(per_line * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
+    count = round(per_line * searched.independent * (1.0 + abs(middle) / (searched.reach * rms)))
     # Even spacing in 1 / h, because all lines have the same width there.
-    per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms
+    per_step = np.linspace(1.0 / searched.coarsest, 1.0 / searched.finest, count) / rms
     waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))
     # The phase is known: a line of opposite sign is no rounding error, and does not count.
     along, size = waves @ totals, waves**2 @ counts

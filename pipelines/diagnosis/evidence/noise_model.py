@@ -23,8 +23,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 
 WANDER_HZ = 0.25
 """Frequency below which differences between periods hold wandering torque as well as noise, Hz."""
-PINK_HZ = 1.5
-"""Frequency at which pink noise is compared with first-order noise, Hz."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +33,10 @@ class NoiseModel:
     """Two-sided power density S0 of the first-order noise at low frequencies, (N·m)²/Hz."""
     correlation_s: NDArray
     pink: NDArray
-    """Ratio of pink to first-order noise at ``PINK_HZ``."""
+    """Ratio of pink to first-order noise at ``pink_hz``."""
     from_periods: bool
+    pink_hz: float = 1.5
+    """Frequency at which pink noise is compared with first-order noise, Hz."""
 
     def at(self, hz: NDArray) -> NDArray:
         """Return the density at some frequencies.
@@ -56,7 +56,7 @@ class NoiseModel:
         first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
         # Slower than any run, Hz.
         tiny_hz = 1e-3
-        pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, tiny_hz))
+        pink = np.multiply.outer(self.pink, self.pink_hz / np.maximum(hz, tiny_hz))
         return (self.density * (first + pink).T).T
 
     def averaged(self, length_s: float) -> tuple[NDArray, NDArray]:
@@ -184,9 +184,9 @@ def _spectrum_of(
     # A band does not determine a correlation time longer than its slowest wave.
     tried = correlation_s[2.0 * np.pi * band[0] * correlation_s <= 1.0]
     first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(tried, frequency)) ** 2)
-    # Ratios of pink to first-order noise at `PINK_HZ` that are tried.
+    # Ratios of pink to first-order noise at `pink_hz` that are tried.
     ratios = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0] if pink is None else [pink])
-    shapes = first[:, np.newaxis] + ratios[:, np.newaxis] * PINK_HZ / frequency
+    shapes = first[:, np.newaxis] + ratios[:, np.newaxis] * NoiseModel.pink_hz / frequency
     # For each shape the likeliest density is a closed form, so only shapes are tried. There
     # Whittle's sum of power / S is constant, and the sum of log S remains.
     densities = np.sum(power / shapes, axis=2) / share.sum()

@@ -19,9 +19,6 @@ from pipelines.estimation.long_run import long_run_covariance
 ALIKE_S = 0.5
 """Correlation time of model error, s. It depends on the motion, whose fastest parts are about 1
 Hz."""
-CRITICAL = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
-"""95 % quantile of the ratio of likelihoods, 7.35: that of the larger peak of two walks that drift
-down."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +37,9 @@ class Onset:
     """Variance inflation of the instant for correlated blocks: the long-run variance of the noise
     in the difference of two instants' likelihoods, over that of white noise with the given
     weights."""
+    critical: float = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
+    """95 % quantile of the ratio of likelihoods, 7.35: that of the larger peak of two walks that
+    drift down."""
 
     @classmethod
     def of(
@@ -80,7 +80,7 @@ class Onset:
         An effect that is always or never present is simpler, and is preferred where chance may make
         the difference.
         """
-        doubt = CRITICAL * self.inflation
+        doubt = self.critical * self.inflation
         for simple in (0, -1):
             if self.squares[simple] <= self.squares.min() + doubt:
                 return float(self.instants[simple])
@@ -100,7 +100,7 @@ class Onset:
         """
         # Model error is alike over some blocks, so the variance of its sum is that much larger.
         wrong = run.blocks_in(ALIKE_S) * float(np.sum((self.pull * misfit) ** 2))
-        doubt = CRITICAL * (self.inflation + wrong / self.size) if self.size > 0.0 else np.inf
+        doubt = self.critical * (self.inflation + wrong / self.size) if self.size > 0.0 else np.inf
         held = np.flatnonzero(self.squares <= self.squares.min() + doubt)
         # Between two of these instants no block shows when it began.
         ends = np.clip([held.min() - 1, held.max() + 1], 1, len(self.instants) - 2)

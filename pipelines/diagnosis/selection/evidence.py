@@ -13,7 +13,7 @@ from scipy.linalg.lapack import dtrtri
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
-from pipelines.diagnosis.candidates.quantisation import STEPS_TRIED
+from pipelines.diagnosis.candidates.quantisation import SearchedSteps
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import BURSTS, HUM, QUANTISATION, TIME, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
@@ -259,7 +259,9 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             variance=_normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != Family.TIME,
             wearer=wearer,
-            log_searched=float(np.log(STEPS_TRIED)) if kind == QUANTISATION else 0.0,
+            log_searched=float(np.log(SearchedSteps().independent))
+            if kind == QUANTISATION
+            else 0.0,
             lines=_lines(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
         )
         for (kind, j, wearer), own in laws.items()

@@ -24,11 +24,6 @@ from pipelines.report.session import Artifact
 from pipelines.wording.numbers import digits, digits_for
 from pipelines.workflow.graph import SWEEP
 
-LARGEST_BYTES = 5_000_000
-"""Size of a page."""
-VALUES = 600_000
-"""Numbers in all charts of a page: 5.3 bytes each as base64, which leaves room for words."""
-
 
 def render(
     template: str,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from pipelines.report.html.page import LARGEST_BYTES, VALUES, render
+from pipelines.report.html.page import render
 from pipelines.report.sections import headline, provenance, residuals
 from pipelines.report.sections.animation import animations, drawn_as
 from pipelines.report.sections.candidates import candidates
@@ -24,7 +24,7 @@ from pipelines.wording.increased_errors import increased_errors
 
 
 def report(session: Session, title: str | None = None, output: Path | None = None) -> str:
-    """Return the page of a session, its charts thinned until it is below ``LARGEST_BYTES``.
+    """Return the page of a session, its charts thinned until it is below 5 MB.
 
     Parameters
     ----------
@@ -34,11 +34,12 @@ def report(session: Session, title: str | None = None, output: Path | None = Non
     output : Path, optional
         Where the page is written, for the command line that repeats it.
     """
-    values = VALUES
+    # Numbers in all charts: 5.3 bytes each as base64, which leaves room for words.
+    values = 600_000
     page = _page(session, title, output, values)
     # The words of a page have a length of their own, so the room for numbers is found by trying.
     # Fewer numbers than that no longer make it smaller.
-    while len(page.encode()) > LARGEST_BYTES and values > 20_000:
+    while len(page.encode()) > 5_000_000 and values > 20_000:
         values //= 2
         page = _page(session, title, output, values)
     return page

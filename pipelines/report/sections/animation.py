@@ -6,19 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts import Table
-from pipelines.contracts.joint_units import Kind
 from pipelines.report.sections.fit_quality import MODELS, replayed
 from pipelines.report.session import Artifact, Session
-
-FRAMES_HZ = 50.0
-LONGEST_S = 40.0
-"""Of a longer run, the stretch with the largest error of the first model is shown."""
-DRAWN: dict[tuple[Kind, ...], str] = {
-    ("revolute", "revolute"): "leg",
-    ("revolute",): "pendulum",
-    ("prismatic",): "slider",
-}
-"""Drawings by the kinds of a machine's joints."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +35,13 @@ def animations(session: Session) -> list[Animation]:
 
 def drawn_as(session: Session) -> str:
     """Return the drawing's name for a session's machine; empty if there is none."""
-    return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
+    # Drawings by the kinds of a machine's joints.
+    drawings = {
+        ("revolute", "revolute"): "leg",
+        ("revolute",): "pendulum",
+        ("prismatic",): "slider",
+    }
+    return drawings.get(tuple(joint.kind for joint in session.joints), "")
 
 
 def _animation(session: Session, run: str, replays: dict[str, Artifact]) -> Animation:
@@ -65,17 +60,19 @@ def _animation(session: Session, run: str, replays: dict[str, Artifact]) -> Anim
 
 
 def _frames(time: NDArray, error: NDArray) -> NDArray:
-    """Return the rows to show, at ``FRAMES_HZ``, of the stretch with the largest error."""
+    """Return the rows to show, 50 a second, of the stretch with the largest error."""
     begin = time[0]
-    if time[-1] - begin > LONGEST_S:
+    # Of a longer run, only the stretch with the largest error of the first model is shown.
+    longest_s = 40.0
+    if time[-1] - begin > longest_s:
         # The sum over any stretch is a difference of two cumulative sums.
         total = np.concatenate([[0.0], np.cumsum(error**2)])
-        ends = np.searchsorted(time, time + LONGEST_S)
+        ends = np.searchsorted(time, time + longest_s)
         # Only stretches inside the run; a shorter one at its end is part of the last.
-        whole = time + LONGEST_S <= time[-1]
+        whole = time + longest_s <= time[-1]
         begin = time[np.argmax(np.where(whole, total[ends] - total[:-1], -1.0))]
     # The nearest later rows: positions are not interpolated, because windows end in jumps.
-    wanted = np.arange(begin, min(begin + LONGEST_S, time[-1]), 1.0 / FRAMES_HZ)
+    wanted = np.arange(begin, min(begin + longest_s, time[-1]), 1.0 / 50.0)
     return np.unique(np.clip(np.searchsorted(time, wanted), 0, len(time) - 1))
 
 

@@ -9,8 +9,6 @@ from pipelines.report.session import Session
 from pipelines.wording.causes import any_label_in_words, labels_in_words, shares_in_words
 from pipelines.wording.numbers import digits
 
-TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn"}
-
 Row = dict[Any, Any]
 
 
@@ -24,6 +22,7 @@ def candidates(session: Session) -> list[dict[str, Any]]:
     # The table does not say whether another set's zeros are one for all runs or each run's own.
     words = shares_in_words(session.causes)
     shown = []
+    tones = {"named": "good", "indistinguishable": "warn", "unlisted": "warn"}
     for row in rows:
         extra = _beyond(row, named)
         known = words if row["verdict"] in ("named", "indistinguishable") else {}
@@ -42,7 +41,7 @@ def candidates(session: Session) -> list[dict[str, Any]]:
                 ],
                 "probability": _probability(row["probability"]),
                 "verdict": row["verdict"],
-                "tone": TONES.get(row["verdict"], ""),
+                "tone": tones.get(row["verdict"], ""),
                 "falls": _falls(session, row),
                 "gain": gain,
                 "reason": labels_in_words(_reason(row["reason"], extra or ()), labels),

@@ -11,7 +11,16 @@ from pipelines.settings.identify import IdentifySettings
 
 def commands(session: Session, output: Path | None = None, title: str | None = None) -> list[str]:
     """Return the command lines that make the session's files again, in order, then the page."""
-    stages = [_COMMANDS[kind](session, one) for kind in _COMMANDS for one in session.of_kind(kind)]
+    # By contract, in the order of an experiment.
+    makers = {
+        "trajectory": _design,
+        "recording": _record,
+        "motion": _filter,
+        "parameters": _identify,
+        "verdict": _diagnose,
+        "simulation": _simulate,
+    }
+    stages = [make(session, one) for kind, make in makers.items() for one in session.of_kind(kind)]
     page = ["report", *map(str, session.folders)]
     if session.config and session.config.parent not in session.folders:
         page += ["--config", str(session.config)]
@@ -135,14 +144,3 @@ def _simulate(session: Session, artifact: Artifact) -> list[str]:
     option = [] if run == "with_human" else ["--run", run]
     words = ["simulate", inputs[0], *reference, *option, *config]
     return [*words, "-o", _folder(artifact.path)]
-
-
-_COMMANDS = {
-    "trajectory": _design,
-    "recording": _record,
-    "motion": _filter,
-    "parameters": _identify,
-    "verdict": _diagnose,
-    "simulation": _simulate,
-}
-"""By contract, in the order of an experiment: the command that makes such a file."""

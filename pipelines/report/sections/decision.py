@@ -6,24 +6,15 @@ from pipelines.contracts.verdict import Verdict
 from pipelines.report.sections.error_budget import torque_unit
 from pipelines.wording.findings import PARTS, Shares, outcomes, rows, searched_runs, shares
 
-OUTCOMES = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
-TONES = {
-    "noise": "noise",
-    "wanders": "wanders",
-    "between_runs": "runs",
-    "unsplit": "before",
-    "repeats": "left",
-}
-"""Names of colours, in the order in which the parts are laid end to end."""
-
 
 def decision(verdict: Verdict) -> dict[str, Any] | None:
     """Return the values of the template's two cards; None for files of older versions."""
     cases = outcomes(verdict)
     if not cases:
         return None
+    tones = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
     return {
-        "outcomes": _end_to_end([(one.words, OUTCOMES[one.key], one.probability) for one in cases]),
+        "outcomes": _end_to_end([(one.words, tones[one.key], one.probability) for one in cases]),
         "rows": rows(verdict),
         "splits": [_split(verdict, one) for one in shares(verdict)],
         "searched": searched_runs(verdict),
@@ -31,7 +22,15 @@ def decision(verdict: Verdict) -> dict[str, Any] | None:
 
 
 def _split(verdict: Verdict, one: Shares) -> dict[str, Any]:
-    parts = [(PARTS[name], tone, one.parts[name]) for name, tone in TONES.items()]
+    # Names of colours, in the order in which the parts are laid end to end.
+    tones = {
+        "noise": "noise",
+        "wanders": "wanders",
+        "between_runs": "runs",
+        "unsplit": "before",
+        "repeats": "left",
+    }
+    parts = [(PARTS[name], tone, one.parts[name]) for name, tone in tones.items()]
     return vars(one) | {"unit": torque_unit(verdict, one.joint), "parts": _end_to_end(parts)}
 
 

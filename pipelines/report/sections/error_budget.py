@@ -8,16 +8,6 @@ from pipelines.contracts.verdict import Verdict
 from pipelines.wording.causes import any_label_in_words, shares_in_words
 from pipelines.wording.label import SHARES
 
-TONES = {
-    "noise_floor": "noise",
-    "repeatable_unexplained": "left",
-    "not_repeatable": "wanders",
-    "unexplained": "left",
-}
-"""Names of the colours of parts that are no cause."""
-CAUSES = 3
-"""Number of colours for causes."""
-
 
 @dataclass(frozen=True)
 class Segment:
@@ -102,6 +92,12 @@ def budget(verdict: Verdict) -> list[Bar]:
     """Return a bar for each joint; causes that raise its error lie left of zero."""
     bars = []
     words_of = shares_in_words(verdict.causes)
+    tones = {
+        "noise_floor": "noise",
+        "repeatable_unexplained": "left",
+        "not_repeatable": "wanders",
+        "unexplained": "left",
+    }
     for joint, shares in verdict.error_budget.items():
         # Two ends grow apart: parts of the error right of zero, causes that raise it left.
         low = high = 0.0
@@ -109,7 +105,8 @@ def budget(verdict: Verdict) -> list[Bar]:
         causes = [key for key in shares if key not in SHARES]
         for key, share in shares.items():
             start = high if share >= 0 else low
-            tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
+            # There are three colours for causes.
+            tone = tones[key] if key in tones else f"cause{1 + causes.index(key) % 3}"
             words = SHARES.get(key) or words_of.get(key) or any_label_in_words(key)
             # The verdict counts no more noise than there is error, which may be below the floor.
             if key == "noise_floor" and share < 0.999 * verdict.noise_floor_nm[joint] ** 2:

@@ -7,17 +7,16 @@ from pipelines.report.sections.symbols import unit
 from pipelines.report.session import Artifact, Session
 from pipelines.wording.numbers import digits
 
-NUMBERS = {
-    "condition": "condition number",
-    "scaled_condition": "condition number of its columns scaled to one length",
-    "log_det": "log determinant of the regressor's Gram matrix",
-}
-
 
 def excitation(session: Session, artifact: Artifact) -> dict[str, Any]:
     """Return the values of the template's card of a ``trajectory/1`` file."""
     about = artifact.metadata
-    known = {key: words for key, words in NUMBERS.items() if about.get(key) is not None}
+    numbers = {
+        "condition": "condition number",
+        "scaled_condition": "condition number of its columns scaled to one length",
+        "log_det": "log determinant of the regressor's Gram matrix",
+    }
+    known = {key: words for key, words in numbers.items() if about.get(key) is not None}
     facts = [f"{words} {digits(about[key])}" for key, words in known.items()]
     # Only trajectories that are Fourier series have coefficients.
     if about.get("a") and about.get("omega_rad_s"):

@@ -19,8 +19,6 @@ MODELS = {
     "extended": (Role.AFTER, "with the causes"),
 }
 """Role and legend of the models of ``residuals/1``."""
-SLOW = 0.1
-"""Share of its rms speed below which a joint counts as standing."""
 
 
 def run_names(session: Session) -> list[str]:
@@ -118,21 +116,18 @@ class Score:
     """Remark on the row, in few words."""
 
 
-LARGER = "larger with the causes"
-SCORES = {
-    "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
-    "drives": (
-        ("closed_loop_rmse_rad", "angle", "in the drives' own loop", 1e3, "m"),
-        ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
-    ),
-}
-"""For each kind of replay: metadata key, quantity, words, factor and prefix of the unit."""
-
-
 def scores(session: Session, run: str) -> list[Score]:
     """Return the errors of each model in a run: computed torque, then replays."""
     results = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
-    for kind, rows in SCORES.items():
+    # For each kind of replay: metadata key, quantity, words, factor and prefix of the unit.
+    kinds = {
+        "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
+        "drives": (
+            ("closed_loop_rmse_rad", "angle", "in the drives' own loop", 1e3, "m"),
+            ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
+        ),
+    }
+    for kind, rows in kinds.items():
         replays = replayed(session, kind).get(run, {})
         shown = [replays.get(model) for model in models_of(session)]
         for key, quantity, words, factor, prefix in rows if replays else ():
@@ -141,11 +136,15 @@ def scores(session: Session, run: str) -> list[Score]:
                 name = joint.place if quantity == "angle" else joint.effort
                 how, unit = words.format(drive=joint.effort), f"{prefix}{joint.unit(quantity)}"
                 where = f"{joint.name} {name}, {how}, {unit}"
-                note = LARGER if simulation_error_grew(*values) else ""
+                note = _note(simulation_error_grew(*values))
                 results.append(Score(where, values, note))
                 if kind == "windows":
                     results += _while_moving(session, replays, joint, where)
     return [score for score in results if any(value is not None for value in score.values)]
+
+
+def _note(grew: bool) -> str:
+    return "larger with the causes" if grew else ""
 
 
 def _stated_error(replay: Artifact | None, key: str, joint: Joint, factor: float) -> float | None:
@@ -167,7 +166,7 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         errors = [chosen.loc[chosen["model"] == model, residual] for model in models_of(session)]
         values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in errors)
         grew = floor is not None and torque_error_grew(*values, floor=floor)
-        note = LARGER if grew else ""
+        note = _note(grew)
         if grew and words == "reversals included" and not grew_away_from_reversals:
             note += (
                 "; only near reversals: a model of speed cannot predict the torque that holds a"
@@ -216,6 +215,8 @@ def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
     # Speed is measured over 0.1 s, so that encoder noise does not count as motion.
     span = max(1, round(0.1 / float(np.median(np.diff(time)))))
     moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
-    slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
+    # Share of its rms speed below which a joint counts as standing.
+    slow_share = 0.1
+    slow = np.abs(moved) < slow_share * np.sqrt(np.mean(moved[within] ** 2))
     # One slow stretch excludes its whole window, whose error lasts to the window's end.
     return ~np.isin(windows, windows[span:][within & slow])

@@ -8,17 +8,6 @@ from pipelines.report.sections.recordings import origin
 from pipelines.report.session import Session
 from pipelines.wording.causes import causes_in_words
 
-STATUS = {
-    "explained": ("explained", "good"),
-    "partly_explained": ("partly explained", "warn"),
-    "unknown_cause": ("cause unknown", "warn"),
-    "nothing_missing": ("nothing missing", "good"),
-}
-HEADLINES = {
-    "unknown_cause": "Something is missing that no listed cause explains",
-    "nothing_missing": "Nothing is missing that these data could show",
-}
-
 
 def context(session: Session) -> dict[str, Any]:
     """Return the values that the template's top and several of its parts use."""
@@ -53,7 +42,13 @@ def status(verdict: Verdict | None) -> dict[str, str]:
     # Before the status, because no cause is sought in faulty recordings.
     if verdict.acquisition_at_fault:
         return {"words": "acquisition, not physics", "tone": "bad"}
-    words, tone = STATUS.get(verdict.status, (verdict.status.replace("_", " "), ""))
+    words_of = {
+        "explained": ("explained", "good"),
+        "partly_explained": ("partly explained", "warn"),
+        "unknown_cause": ("cause unknown", "warn"),
+        "nothing_missing": ("nothing missing", "good"),
+    }
+    words, tone = words_of.get(verdict.status, (verdict.status.replace("_", " "), ""))
     return {"words": words, "tone": tone}
 
 
@@ -70,7 +65,11 @@ def headline(session: Session) -> str:
     if verdict.status == "unknown_cause" and verdict.findings:
         missing = verdict.findings[0].words
         return f"The simulation misses {missing}, and no listed cause explains it"
-    return HEADLINES.get(verdict.status, verdict.status.replace("_", " "))
+    headlines = {
+        "unknown_cause": "Something is missing that no listed cause explains",
+        "nothing_missing": "Nothing is missing that these data could show",
+    }
+    return headlines.get(verdict.status, verdict.status.replace("_", " "))
 
 
 def lead(verdict: Verdict) -> str:

@@ -7,11 +7,6 @@ import numpy as np
 from pipelines.contracts import MOTION, RECORDING
 from pipelines.report.session import Artifact, Session
 
-ROUNDING = 1e-4
-"""Unevenness that rounding explains, in sample periods."""
-RATE_TOLERANCE = 0.005
-"""Relative difference of sampling rates that counts as equal."""
-
 
 def recordings(session: Session) -> list[dict[str, Any]]:
     """Return every run of a session, in the order of their files; motions without recordings."""
@@ -40,9 +35,10 @@ def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> dict[
         "duration_s": float(time[-1] - time[0]),
         "rate_hz": rate_hz,
         "measured_rate_hz": 1.0 / step_s,
-        "rate_is_off": abs(1.0 / step_s / rate_hz - 1.0) > RATE_TOLERANCE,
+        "rate_is_off": abs(1.0 / step_s / rate_hz - 1.0) > 0.005,
         "jitter_ms": 1e3 * jitter_s,
-        "is_even": jitter_s * rate_hz < ROUNDING,
+        # Less than a ten thousandth of a sample period is rounding.
+        "is_even": jitter_s * rate_hz < 1e-4,
         "gaps": len(gaps),
         "missing": sum(count for _, count in gaps),
         "abort": about.get("abort"),

@@ -12,14 +12,6 @@ from pipelines.report.sections.fit_quality import drawn, models_of
 from pipelines.report.session import Session
 from pipelines.signals.binned_mean import FEWEST
 
-DEPENDENCES = {
-    "angle": "angle",
-    "velocity": "speed",
-    "acceleration": "acceleration",
-    "torque": "load",
-}
-"""Variables of the verdict's ``depends_on``, by quantity of the residuals' table."""
-
 
 @dataclass(frozen=True)
 class Against:
@@ -60,10 +52,17 @@ def _against(session: Session, joint: Joint) -> list[Against]:
 
     With two joints, the other joint's columns are included.
     """
-    charts = [_along(joint, quantity, variable) for quantity, variable in DEPENDENCES.items()]
+    # Variables of the verdict's `depends_on`, by quantity of the residuals' table.
+    variables = {
+        "angle": "angle",
+        "velocity": "speed",
+        "acceleration": "acceleration",
+        "torque": "load",
+    }
+    charts = [_along(joint, quantity, variable) for quantity, variable in variables.items()]
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
-            for quantity, variable in DEPENDENCES.items():
+            for quantity, variable in variables.items():
                 if variable != "acceleration":
                     charts.append(_along(other, quantity, f"other_{variable}"))
     return [*charts, Against("time", "time", "time, s", "time_s")]
