@@ -4,22 +4,22 @@ import gc
 import os
 import signal
 
-EARLY = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM"}
-"""Signals handled during loading, with the user's names; others have the system's default."""
-
-
-def _end(number: int, frame: object) -> None:
-    # Not an exception, which an import would take for its own failure; nothing needs clean-up yet.
-    os.write(2, f"exoid: stopped by {EARLY[signal.Signals(number).name]}\n".encode())
-    os._exit(128 + number)
-
 
 def main() -> None:
     """Run exoid as the shell's command."""
-    for name in EARLY:
+    # Signals handled during loading, with the user's names; others have the system's default.
+    early = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM"}
+
+    def end(number: int, frame: object) -> None:
+        # Not an exception, which an import would take for its own failure; nothing needs clean-up
+        # yet.
+        os.write(2, f"exoid: stopped by {early[signal.Signals(number).name]}\n".encode())
+        os._exit(128 + number)
+
+    for name in early:
         number = signal.Signals[name]
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _end)
+            signal.signal(number, end)
     # For numpy's libraries: exoid's matrices are too small for several threads, which would only
     # take the processor from other commands.
     for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "VECLIB_MAXIMUM"):

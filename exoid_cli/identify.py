@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from pipelines.mechanics.machine import Machine
     from pipelines.mechanics.run import Run
 
-REMARKS = ("collinear", "unrealizable", "remarks", "angle_noise")
-"""Sentences on a model, in the metadata of its file."""
-
 
 def identify(
     context: typer.Context,
@@ -157,7 +154,7 @@ def _write(
         "geometry": run.machine.metadata(run.geometry),
         "one_step": model.one_step.tolist(),
         "validation": model.validation.as_json(),
-        **{key: getattr(model, key) for key in REMARKS},
+        **_remarks(model),
     }
     if model.each_run:
         described["each_run"] = model.each_run
@@ -177,13 +174,19 @@ def _write(
         return draw(RESIDUALS.scan(residuals_file), output)
 
 
+def _remarks(model: "Identified") -> dict[str, Any]:
+    """Return the sentences on a model for the metadata of its file."""
+    names = ("collinear", "unrealizable", "remarks", "angle_noise")
+    return {name: getattr(model, name) for name in names}
+
+
 def _report(model: "Identified", machine: "Machine") -> None:
     from pipelines.contracts.joints import either
 
     rows = model.parameters.to_dict("records")
     unit = either(joint.unit("torque") for joint in machine.joints)
     about = {"parameters": rows, "validation": model.validation.as_json()}
-    console.emit(about | {key: getattr(model, key) for key in ("method", *REMARKS)})
+    console.emit(about | {"method": model.method} | _remarks(model))
     show_parameters(rows, machine.joints, model.one_step.tolist())
     console.say("")
     errors_of_runs: list[tuple[str, ...]] = []

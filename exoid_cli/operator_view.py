@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from itertools import chain
 from textwrap import wrap
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,8 +14,6 @@ from rich.style import Style
 if TYPE_CHECKING:
     from pipelines.acquisition.progress import Progress
     from pipelines.settings.rig import RigSettings
-
-CUFFS = ("thigh front", "thigh back", "shank front", "shank back")
 
 # Blue and orange differ to everyone, and words repeat whatever a colour says.
 PLAIN, FAINT = Style(), Style(dim=True)
@@ -88,7 +87,7 @@ class OperatorView:
         if self._progress is not None and progress.missed > self._progress.missed:
             self._lost_at = time.monotonic()
         self._progress = progress
-        if any(gauge.near for gauge in self._gauges() if not np.isnan(gauge.value)):
+        if any(gauge.near for gauge in chain(*self._gauges()) if not np.isnan(gauge.value)):
             self._near_at = time.monotonic()
 
     def alert(self) -> str:
@@ -107,20 +106,22 @@ class OperatorView:
             return "LIMIT NEAR"
         return "SAMPLES LOST" if now - self._lost_at < shown_s else ""
 
-    def _gauges(self) -> list[Gauge]:
-        """Return every value that has limits, in the order shown."""
+    def _gauges(self) -> tuple[list[Gauge], list[Gauge]]:
+        """Return every value that has limits, of joints and of cuffs, in the order shown."""
+        joints: list[Gauge] = []
+        cuffs: list[Gauge] = []
         if self._progress is None or self._progress.row is None:
-            return []
-        gauges = []
+            return joints, cuffs
         for drive, reading in zip(self._rig.drive, self._progress.row.drives, strict=True):
             limit = drive.torque_nm
-            gauges.append(Gauge(f"{drive.joint} angle", reading.angle, *drive.angle_rad, "rad"))
-            gauges.append(Gauge(f"{drive.joint} torque", reading.torque, -limit, limit, "N·m"))
+            joints.append(Gauge(f"{drive.joint} angle", reading.angle, *drive.angle_rad, "rad"))
+            joints.append(Gauge(f"{drive.joint} torque", reading.torque, -limit, limit, "N·m"))
         limit = self._rig.safety.cuff_force_n
-        for cuff, force in zip(CUFFS, self._forces, strict=True):
+        names = ("thigh front", "thigh back", "shank front", "shank back")
+        for name, force in zip(names, self._forces, strict=True):
             strongest = force[np.argmax(np.abs(force))]  # NaN if one of the three is
-            gauges.append(Gauge(cuff, float(strongest), -limit, limit, "N"))
-        return gauges
+            cuffs.append(Gauge(name, float(strongest), -limit, limit, "N"))
+        return joints, cuffs
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Draw the picture into the given width and height."""
@@ -148,15 +149,15 @@ class OperatorView:
         room = max(width - 1, 4)
         reason = wrap(progress.abort or "", room, max_lines=abort_lines, placeholder="...")
         head = [self._head(progress, width), *[[(text, URGENT)] for text in reason], []]
-        gauges = [gauge.line() for gauge in self._gauges()]
-        if not gauges:
+        joints, cuffs = ([gauge.line() for gauge in some] for some in self._gauges())
+        if not joints:
             return [*head, [("nothing has been measured yet", FAINT)]]
         counts = f"{progress.samples} samples, {progress.missed} missed in {progress.gaps} gaps"
         rate = [
             (f"{progress.rate_hz:.0f} Hz  ", PLAIN),
             (counts, URGENT if progress.missed else PLAIN),
         ]
-        return [*head, *gauges[: -len(CUFFS)], [], *gauges[-len(CUFFS) :], [], rate]
+        return [*head, *joints, [], *cuffs, [], rate]
 
     def _head(self, progress: "Progress", width: int) -> Line:
         """Return the first line: the alert if any, the state, the run and the time."""

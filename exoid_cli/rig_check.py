@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from pipelines.acquisition.check.rate import Rate
     from pipelines.acquisition.check.survey import DeviceReport, RigReport
 
-FORCES = ("force_x", "force_y", "force_z")
-DRIVE = {"angle": "angle rad", "velocity": "rad/s", "current": "current A", "temperature": "°C"}
-
 
 def check(
     file: Annotated[
@@ -98,9 +95,9 @@ def _show(report: "RigReport") -> None:
     drives = [device for device in report.devices if "angle" in device.values]
     if drives:
         console.say("\nDrives, disabled")
-        headings = ("", *DRIVE.values(), "samples/s", "clock s/s")
+        headings = ("", "angle rad", "rad/s", "current A", "°C", "samples/s", "clock s/s")
         console.table(headings, map(_drive, drives), numbers=", ".join(headings[1:]))
-    sensors = [device for device in report.devices if FORCES[0] in device.values]
+    sensors = [device for device in report.devices if "force_x" in device.values]
     if sensors:
         console.say("\nSensors, mean ± noise in N")
         headings = ("", "x", "y", "z", "samples/s")
@@ -149,12 +146,14 @@ def _small(histogram: tuple[int, ...]) -> str:
 
 
 def _drive(device: "DeviceReport") -> list[Any]:
-    values = [f"{device.values[name]:.3f}" if name in device.values else "" for name in DRIVE]
+    read = ("angle", "velocity", "current", "temperature")
+    values = [f"{device.values[name]:.3f}" if name in device.values else "" for name in read]
     return [device.name, *values, *_clock(device)]
 
 
 def _sensor(device: "DeviceReport") -> list[Any]:
-    forces = [f"{device.values[axis]:.2f} ± {device.noise[axis]:.2f}" for axis in FORCES]
+    axes = ("force_x", "force_y", "force_z")
+    forces = [f"{device.values[axis]:.2f} ± {device.noise[axis]:.2f}" for axis in axes]
     return [device.name, *forces, _clock(device)[0]]
 
 

@@ -11,8 +11,6 @@ import typer
 from exoid_cli.console import console
 from pipelines.errors import SettingsError
 
-LOOPBACK = "127.0.0.1"
-
 
 def serve(
     file: Annotated[
@@ -38,7 +36,7 @@ def serve(
             help="Samples a second; else the plant's.",
         ),
     ] = None,
-    bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
+    bind: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     anyone: Annotated[
         bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")
     ] = False,
@@ -92,7 +90,7 @@ def _address(bind: str, anyone: bool) -> str:
     if not anyone:
         raise SettingsError(
             f"--bind: found {bind}, expected an address that only this computer reaches, such as"
-            f" {LOOPBACK}. Modbus has no authentication: add --anyone if any computer may move the"
+            " 127.0.0.1. Modbus has no authentication: add --anyone if any computer may move the"
             " rig"
         )
     console.warn(

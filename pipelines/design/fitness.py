@@ -8,13 +8,13 @@ Fourier coefficients.
 
 import math
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.design.sines import VECTORIZED, sines
+from pipelines.design.sines import FAST, sines
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import regressor_rows
 
@@ -26,8 +26,6 @@ class Criterion(IntEnum):
     condition = 1
     scaled_condition = 2
 
-
-FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
 
 PARAMETERS = 8
 """X1 .. X4, then Coulomb and viscous friction of hip and knee."""

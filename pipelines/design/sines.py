@@ -1,20 +1,25 @@
 """Sine and cosine of whole arrays, in a form that compiles to vector instructions."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
 
-VECTORIZED = {"reassoc", "contract", "nsz", "arcp"}
-"""Permitted changes of arithmetic: reordered sums and fused operations, but no change of NaN or
-infinity."""
+FAST: dict[str, Any] = {
+    "cache": True,
+    "fastmath": {"reassoc", "contract", "nsz", "arcp"},
+    "error_model": "numpy",
+}
+"""Compiler options of vector instructions: sums may be reordered and operations fused, but NaN and
+infinity stay as they are."""
 
 SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
 COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(12))
 """Taylor's series about 0, enough terms for 1e-15 on [-pi/2, pi/2]."""
 
 
-@njit(cache=True, fastmath=VECTORIZED, error_model="numpy")
+@njit(**FAST)
 def sines(x, sine, cosine):
     """Write sin x and cos x; exact to 1e-14 for any joint angle.
 

@@ -9,6 +9,7 @@ import ast
 import importlib
 import inspect
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,8 +21,7 @@ from typing import Any
 from pipelines.diagnosis import criteria
 from pipelines.diagnosis.criteria import CRITERIA, HELD, Criteria
 
-PACKAGE = Path(__file__).parent
-MEASURED = PACKAGE / "criteria_measured.json"
+MEASURED = Path(__file__).with_name("criteria_measured.json")
 HEADINGS = {
     "data_faults": "Faults of acquisition",
     "evidence": "Noise and evidence",
@@ -59,16 +59,16 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
         )
 
 
-def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
+def numbers_of(folder: str) -> Iterator[tuple[str, dict[str, Any], str]]:
     """Yield file, values by name and meaning of the numbers that a folder's files define.
 
     They are the constants of modules, whose meaning is empty where they have none, the defaults of
-    classes, and the numbers of functions below a comment.
+    fields and arguments, and the numbers of functions below a comment.
     """
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted((Path(__file__).parent / folder).glob("*.py")):
         source = path.read_text(encoding="utf-8")
         tree = ast.parse(source)
-        module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
+        module = importlib.import_module(f"{__package__}.{folder}.{path.stem}")
         for statement, meaning in _documented(tree.body):
             values = {
                 name: value
@@ -82,6 +82,8 @@ def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
                 yield from ((path.name, *default) for default in _defaults(node))
         functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
         for function in sorted(functions, key=lambda node: node.lineno):
+            for values, meaning in _default_arguments(function):
+                yield path.name, values, meaning
             for values, meaning in _local_numbers(function, source.splitlines()):
                 yield path.name, values, meaning
 
@@ -94,6 +96,18 @@ def _defaults(of: ast.ClassDef) -> Iterator[tuple[dict[str, Any], str]]:
             # These stand for nothing, or for no change.
             if value not in (None, -1, 0, 1):
                 yield dict.fromkeys(_assigned(statement), value), meaning
+
+
+def _default_arguments(of: ast.FunctionDef) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield value by name and meaning of the numbers that are documented defaults of arguments."""
+    named, documented = of.args.args, ast.get_docstring(of) or ""
+    for argument, default in zip(
+        named[len(named) - len(of.args.defaults) :], of.args.defaults, strict=True
+    ):
+        about = re.search(rf"^{argument.arg} : .*\n((?: {{4}}.*\n?)+)", documented, re.MULTILINE)
+        value = _constant(default)
+        if about and value not in (None, -1, 0, 1):
+            yield {argument.arg: value}, " ".join(about[1].split())
 
 
 def _local_numbers(
@@ -203,7 +217,7 @@ are used. Those of figures are not listed.
                 _written(tuple(values.values())),
                 meaning,
             ]
-            for file, values, meaning in numbers_of(PACKAGE / folder)
+            for file, values, meaning in numbers_of(folder)
         ]
         yield f"### {heading}\n\n{_table(['file', 'name', 'value', 'meaning'], rows)}"
 

@@ -24,10 +24,6 @@ from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
 from pipelines.estimation.regression import Regression, by_segment, residual_of
 
-SLIGHT_SHARE = 0.001
-"""Share of a parameter within which a bias does not matter: no torque scale is known any better,
-however long the recording."""
-
 
 class InstrumentalVariables(Estimator):
     """Instruments from a closed-loop simulation of the model; whole runs are held in memory."""
@@ -166,7 +162,7 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
         return (
             f"noise in the angles shows in least squares ({numbers}) but does not matter: every"
             " parameter moves by less than a twentieth of its 95 % interval, or by less than"
-            f" {100 * SLIGHT_SHARE:g} % of itself; weighted_least_squares serves as well"
+            " 0.1 % of itself; weighted_least_squares serves as well"
         )
     worst = int(np.argmax(np.where(matters, np.abs(test.difference / test.std_error), 0.0)))
     return (
@@ -184,4 +180,5 @@ def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
     estimate = estimated(fit)
     reach = estimate.critical * np.sqrt(np.diag(estimate.covariance))
     off = np.abs(test.difference)
-    return np.asarray((off > slight * reach) & (off > SLIGHT_SHARE * np.abs(fit.values)))
+    # Nor does one of 0.1 %: no torque scale is known any better, however long the recording.
+    return np.asarray((off > slight * reach) & (off > 0.001 * np.abs(fit.values)))

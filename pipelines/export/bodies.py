@@ -34,8 +34,6 @@ from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTAB
 Vector = tuple[float, float, float]
 
 
-RISES: Vector = (0.0, 0.0, 1.0)
-
 NOMINAL = "Masses are nominal where X does not determine them; joint torques are unchanged."
 
 
@@ -105,7 +103,9 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
 
 
 def _level_leg(exported: Exported) -> tuple[Body, ...]:
-    return tuple(replace(body, axis=RISES, lies=(1.0, 0.0, 0.0)) for body in _leg(exported))
+    return tuple(
+        replace(body, axis=(0.0, 0.0, 1.0), lies=(1.0, 0.0, 0.0)) for body in _leg(exported)
+    )
 
 
 def _leg(exported: Exported) -> tuple[Body, ...]:
@@ -149,14 +149,15 @@ def _pendulum(exported: Exported) -> tuple[Body, ...]:
 def _turntable(exported: Exported) -> tuple[Body, ...]:
     (joint,), (X1,), (shift,) = exported.joints, exported.X, exported.shift()
     # No torque depends on its mass.
-    return (Body(joint, 1.0, X1, axis=RISES, shift=shift),)
+    return (Body(joint, 1.0, X1, axis=(0.0, 0.0, 1.0), shift=shift),)
 
 
 def _lift(exported: Exported) -> tuple[Body, ...]:
     (joint,), (mass, weight), (shift,) = exported.joints, exported.X, exported.shift()
     # X2 is the weight less a counterweight's; a share without gravity takes the latter's place.
     carried = 1.0 - weight / (mass * exported.geometry.gravity_m_s2)
-    return (Body(joint, mass, _cube(mass), axis=RISES, shift=shift, carried=carried),)
+    up = (0.0, 0.0, 1.0)
+    return (Body(joint, mass, _cube(mass), axis=up, shift=shift, carried=carried),)
 
 
 def _slide(exported: Exported) -> tuple[Body, ...]:

@@ -25,16 +25,8 @@ from pipelines.export.formula import (
 from pipelines.export.language import identifier, unique
 from pipelines.model import Term
 
-# Kernels may read it. The caller of an exported file has no measurement of it, so such terms are
-# left out.
-TEMPERATURE = "at.temperature"
-"""An input that no exported file has."""
-
 GROUPS = ("link_inertia", "link_torque", "drive_inertia", "drive_torque")
 """Functions of an exported file, in the order of their calls."""
-
-GEOMETRY = ("thigh_length", "gravity")
-"""The values of a kernel's argument ``geometry``."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +97,8 @@ def holding(term: Term) -> Holding:
         outcomes = [_outcome(term, kernel, list(term.values), "at.q", 0) for kernel in present]
     except NotWritable as error:
         return left_out(str(error))
-    if TEMPERATURE in names_in(outcomes, "element"):
+    # The caller of an exported file has no measurement of it.
+    if "at.temperature" in names_in(outcomes, "element"):
         return left_out("it needs the motor's temperature")
     if effect.torque_reading is not None:
         return exact("torque_reading")
@@ -131,11 +124,11 @@ def equations(exported: Exported) -> Equations:
     named = ((term.effect, parameter) for term in terms for parameter in term.effect.fitted)
     full = (filter(None, (effect.joint, effect.name, p.name)) for effect, p in named)
     own_names = """
-        sign at tau rate geometry at_rest inertial velocity_torque instant instant_of sensor_shift
-        link_shift memory_rate torque_reading
+        sign at tau rate geometry thigh_length gravity at_rest inertial velocity_torque instant
+        instant_of sensor_shift link_shift memory_rate torque_reading
     """
     # Two effects can have parameters of one name at a joint; the file's own names are taken, too.
-    taken = (*GROUPS, *GEOMETRY, *own_names.split())
+    taken = (*GROUPS, *own_names.split())
     names = iter(unique((identifier("_".join(parts)) for parts in full), taken))
     length, gravity = exported.geometry.array().tolist()
     # An encoder's error is in the angles of motor and link alike, a tilt only in the link's.
@@ -143,8 +136,8 @@ def equations(exported: Exported) -> Equations:
     model = Equations(
         exported.joints,
         [
-            Constant(GEOMETRY[0], length, "m", "first to second joint axis"),
-            Constant(GEOMETRY[1], gravity, "m/s²", "acceleration of gravity"),
+            Constant("thigh_length", length, "m", "first to second joint axis"),
+            Constant("gravity", gravity, "m/s²", "acceleration of gravity"),
         ],
         sensor_shift=tuple(sensor.tolist()),
         link_shift=tuple((exported.shift() - sensor).tolist()),
@@ -182,12 +175,12 @@ def _add_equations(model: Equations, term: Term, values: list[Formula], first: i
 
 def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> list | Branch:
     """Return a kernel's outcome; ``first`` is the index of the term's memory."""
-    geometry = [Formula("constant", (name,)) for name in GEOMETRY]
+    geometry = [Formula("constant", (name,)) for name in ("thigh_length", "gravity")]
     joints, joint = len(term.effect.on.joints), column_of(term)
     memory = [Formula("element", ("at.memory", first + i)) for i in range(term.effect.states)]
     whole = (
         Elements(name, joints)
-        for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load", TEMPERATURE)
+        for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load", "at.temperature")
     )
     at: Any = Instant._make([Formula("constant", ("at.t",)), *whole])
 
@@ -195,7 +188,14 @@ def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> l
         # A reading starts from the drives' torques and changes some; other kernels write to zeros.
         if kernel is term.effect.torque_reading:
             torque: list = list(Elements("tau", joints))
-            return (at.t, torque, values, joint, [], list(Elements(TEMPERATURE, joints))), torque
+            return (
+                at.t,
+                torque,
+                values,
+                joint,
+                [],
+                list(Elements("at.temperature", joints)),
+            ), torque
         out = [0.0] * (joints if kernel is term.effect.reaction else term.effect.states)
         return (at, memory, values, geometry, joint, out), out
 

@@ -13,9 +13,7 @@ class Unit:
     offset: float = 0.0
 
 
-# Exact by definition: the international inch and pound, and standard gravity.
-_INCH, _POUND_FORCE, _KILOGRAM_FORCE = 0.0254, 4.4482216152605, 9.80665
-
+# Inch (0.0254 m), pound-force and kilogram-force are exact by definition.
 UNITS: dict[str, Unit] = {
     "s": Unit("time", 1.0),
     "ms": Unit("time", 1e-3),
@@ -32,7 +30,7 @@ UNITS: dict[str, Unit] = {
     "cm": Unit("length", 1e-2),
     "mm": Unit("length", 1e-3),
     "um": Unit("length", 1e-6),
-    "in": Unit("length", _INCH),
+    "in": Unit("length", 0.0254),
     "counts": Unit("counts", 1.0),
     "counts/s": Unit("counts per second", 1.0),
     "rad/s": Unit("angular velocity", 1.0),
@@ -43,19 +41,19 @@ UNITS: dict[str, Unit] = {
     "m/s": Unit("velocity", 1.0),
     "cm/s": Unit("velocity", 1e-2),
     "mm/s": Unit("velocity", 1e-3),
-    "in/s": Unit("velocity", _INCH),
+    "in/s": Unit("velocity", 0.0254),
     "N·m": Unit("torque", 1.0),
     "mN·m": Unit("torque", 1e-3),
     "N·cm": Unit("torque", 1e-2),
     "kN·m": Unit("torque", 1e3),
-    "kgf·cm": Unit("torque", 0.01 * _KILOGRAM_FORCE),
-    "lbf·in": Unit("torque", _INCH * _POUND_FORCE),
-    "lbf·ft": Unit("torque", 12.0 * _INCH * _POUND_FORCE),
+    "kgf·cm": Unit("torque", 0.01 * 9.80665),
+    "lbf·in": Unit("torque", 0.0254 * 4.4482216152605),
+    "lbf·ft": Unit("torque", 12.0 * 0.0254 * 4.4482216152605),
     "N": Unit("force", 1.0),
     "mN": Unit("force", 1e-3),
     "kN": Unit("force", 1e3),
-    "kgf": Unit("force", _KILOGRAM_FORCE),
-    "lbf": Unit("force", _POUND_FORCE),
+    "kgf": Unit("force", 9.80665),
+    "lbf": Unit("force", 4.4482216152605),
     "A": Unit("current", 1.0),
     "mA": Unit("current", 1e-3),
     "V": Unit("voltage", 1.0),

@@ -30,7 +30,6 @@ LAWS = {
     "quantisation": ("sensor", "a torque of {joint} that is reported in coarse steps"),
 }
 """Family and wording of each kind of smooth law."""
-FAMILIES = {kind: family for kind, (family, _) in LAWS.items()}
 
 
 def law_label(kind: str, joint: str | None, wearer: str = "all") -> str:
@@ -46,7 +45,7 @@ def kind_and_joint(label: str) -> tuple[str, str | None]:
 
 def family_of_kind(kind: str) -> str:
     """Return the family that a kind of law belongs to."""
-    return kind.removeprefix(UNLISTED) if kind.startswith(UNLISTED) else FAMILIES[kind]
+    return kind.removeprefix(UNLISTED) if kind.startswith(UNLISTED) else LAWS[kind][0]
 
 
 def law_in_words(label: str, machine: Machine | None = None) -> str:

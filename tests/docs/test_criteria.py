@@ -4,7 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from pipelines.diagnosis.criteria import Criteria
-from pipelines.diagnosis.reference import HEADINGS, PACKAGE, meanings, numbers_of, reference
+from pipelines.diagnosis.reference import HEADINGS, MEASURED, meanings, numbers_of, reference
 
 PAGE = Path(__file__).parents[2] / "docs" / "criteria.md"
 
@@ -14,13 +14,14 @@ def test_every_number_has_a_meaning():
 
 
 def test_every_other_number_has_a_meaning():
-    numbers = [number for folder in HEADINGS for number in numbers_of(PACKAGE / folder)]
+    numbers = [number for folder in HEADINGS for number in numbers_of(folder)]
     assert len(numbers) > 100
     assert [list(values) for _, values, meaning in numbers if not meaning] == []
 
 
 def test_every_folder_of_the_diagnosis_is_in_the_page():
-    folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
+    package = MEASURED.parent
+    folders = {path.name for path in package.iterdir() if (path / "__init__.py").exists()}
     assert folders == set(HEADINGS)
 
 

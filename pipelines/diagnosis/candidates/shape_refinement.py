@@ -17,8 +17,6 @@ from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.effects import Parameter
 
-ENOUGH = 0.2
-"""Log likelihood that a step must gain to be followed by another."""
 ONSETS = 40
 """Instants tried in a run at a time."""
 TONE_STEP_HZ = 0.01
@@ -61,9 +59,21 @@ class ShapeRefinement:
         rows: CandidateRows,
         regression: DecisionRegression,
         others: NDArray | None = None,
+        enough: float = 0.2,
     ) -> None:
-        """Prepare the projection; ``others`` (N, b) are rows of other causes, fitted freely."""
+        """Prepare the projection.
+
+        Parameters
+        ----------
+        rows : CandidateRows
+        regression : DecisionRegression
+        others : (N, b) array, optional
+            Rows of other causes, fitted freely.
+        enough : float, optional
+            Log likelihood that a step must gain to be followed by another.
+        """
         self._rows, self._regression, self._others = rows, regression, others
+        self._enough = enough
         measured = regression.measured
         basis = np.zeros((len(measured), 0))
         if others is not None and others.shape[1]:
@@ -131,7 +141,7 @@ class ShapeRefinement:
         for _ in range(2):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._others))
             refined = None if ahead is None else self._refined(ahead)
-            if refined is None or refined[0].score < best.score + ENOUGH:
+            if refined is None or refined[0].score < best.score + self._enough:
                 break
             best, slopes = refined
         return best, slopes
@@ -150,7 +160,7 @@ class ShapeRefinement:
             ahead = self._step(best, slopes, units)
             if ahead is None:
                 break
-            enough = ahead.gain_as_is > best.gain_as_is + ENOUGH
+            enough = ahead.gain_as_is > best.gain_as_is + self._enough
             best = ahead
             slopes = self._slopes(best, units)
             if not enough:

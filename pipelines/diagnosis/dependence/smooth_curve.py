@@ -13,9 +13,6 @@ from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
 if TYPE_CHECKING:
     from pipelines.diagnosis.dependence.explained_share import Variable
 
-DEGREE = 3
-"""Degree of the splines."""
-
 
 @dataclass(frozen=True)
 class Curve:
@@ -24,6 +21,8 @@ class Curve:
     variables: tuple["Variable", ...]
     knots: tuple[NDArray, ...]
     joint: int
+    degree: int = 3
+    """Degree of the splines."""
 
     @classmethod
     def along(cls, variables: Sequence["Variable"], runs: Sequence[Run], j: int) -> "Curve":
@@ -44,7 +43,7 @@ class Curve:
             known = [x[run.usable[:, j]] for run, x in values if x is not None]
             # Each side of a surface has fewer knots than a curve.
             inner = variable.knots if len(variables) == 1 else 4
-            knots.append(_knots(np.concatenate(known), inner))
+            knots.append(_knots(np.concatenate(known), inner, cls.degree))
         return cls(tuple(variables), tuple(knots), j)
 
     def design(self, run: Run) -> NDArray:
@@ -64,12 +63,12 @@ class Curve:
         for variable, knots in zip(self.variables, self.knots, strict=True):
             x = variable.of(run, self.joint)
             if x is None:
-                part = np.zeros((len(run.time), len(knots) - DEGREE - 1))
+                part = np.zeros((len(run.time), len(knots) - self.degree - 1))
             else:
                 # Beyond the outer knots the curve stays
                 # constant; a cubic continued there runs away.
                 clipped = np.clip(x, knots[0], knots[-1])
-                part = BSpline.design_matrix(clipped, knots, DEGREE).toarray()
+                part = BSpline.design_matrix(clipped, knots, self.degree).toarray()
             # Products of each row's splines: a surface has a coefficient for every pair.
             design = (design[:, :, np.newaxis] * part[:, np.newaxis, :]).reshape(len(run.time), -1)
         # Each direction has coefficients of its own, because friction jumps between them.
@@ -79,13 +78,13 @@ class Curve:
         return design
 
 
-def _knots(x: NDArray, inner: int) -> NDArray:
+def _knots(x: NDArray, inner: int, degree: int) -> NDArray:
     # Quantiles of a variable that hardly moves coincide.
     places = np.unique(np.quantile(x, np.linspace(0, 1, inner + 2)))
     if len(places) < 2:
         places = np.array([places[0] - 0.5, places[0] + 0.5])
     # Repeated end knots let the curve take any value at both ends.
-    return np.concatenate([[places[0]] * DEGREE, places, [places[-1]] * DEGREE])
+    return np.concatenate([[places[0]] * degree, places, [places[-1]] * degree])
 
 
 @dataclass(frozen=True)

@@ -45,9 +45,6 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import TermColumns
 
-POWER = 0.9
-"""Chance that an effect of the smallest visible size is detected."""
-
 
 @dataclass(frozen=True)
 class Detectable:
@@ -254,7 +251,7 @@ def detectability(
     runs: Sequence[Run],
     baseline: Baseline,
     floor: Floor,
-    power: float = POWER,
+    power: float = 0.9,
     report: Report = silent,
 ) -> list[Detectable]:
     """Return every cause at every joint with the smallest size that these runs reveal.
@@ -309,7 +306,7 @@ def detectability(
 
 def detectability_of_recorded(
     motions: Sequence[Motion],
-    power: float = POWER,
+    power: float = 0.9,
     report: Report = silent,
     known: Sequence[str] = (),
 ) -> list[Detectable]:

@@ -18,9 +18,6 @@ from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 
-RANK = 1e-9
-"""Relative length below which a baseline column adds nothing to those before it."""
-
 
 @dataclass(frozen=True)
 class DecisionRegression:
@@ -157,7 +154,7 @@ class DecisionRegression:
         # Columns of equal length: the rank must not depend on the parameters' units.
         size = np.linalg.norm(self.baseline, axis=0)
         size = np.where(size > 0.0, size, 1.0)[:, np.newaxis]
-        return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=RANK) / size)
+        return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=1e-9) / size)
 
     def baseline_values(self, rows: NDArray) -> NDArray:
         """Return the values of the baseline that come nearest to rows.
@@ -272,5 +269,5 @@ def _orthonormal(columns: NDArray) -> NDArray:
     """Return an orthonormal basis (N, r) of columns (N, b), without those that add nothing."""
     size = np.linalg.norm(columns, axis=0)
     q, r = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])
-    # QR invents a direction for a column that depends on those before it.
-    return q[:, np.abs(np.diag(r)) > RANK]
+    # QR invents a direction for a column that depends on those before it but for rounding.
+    return q[:, np.abs(np.diag(r)) > 1e-9]

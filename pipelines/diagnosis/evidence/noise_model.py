@@ -21,9 +21,6 @@ from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 
-WANDER_HZ = 0.25
-"""Frequency below which differences between periods hold wandering torque as well as noise, Hz."""
-
 
 @dataclass(frozen=True)
 class NoiseModel:
@@ -37,11 +34,14 @@ class NoiseModel:
     from_periods: bool
     pink_hz: float = 1.5
     """Frequency at which pink noise is compared with first-order noise, Hz."""
+    wander_hz: float = 0.25
+    """Frequency below which differences between periods hold wandering torque as well as noise,
+    Hz."""
 
     def at(self, hz: NDArray) -> NDArray:
         """Return the density at some frequencies.
 
-        Below ``WANDER_HZ`` its growth is an extrapolation.
+        Below ``wander_hz`` its growth is an extrapolation.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class NoiseModel:
         # An average passes the density times a squared sinc, and little above its fourth zero. The
         # density has two sides, hence the factor 2.
         hz = np.linspace(0.0, 4.0 / length_s, 2001)
-        passed = self.at(np.maximum(hz, WANDER_HZ)) * np.sinc(hz * length_s) ** 2
+        passed = self.at(np.maximum(hz, self.wander_hz)) * np.sinc(hz * length_s) ** 2
         variance = 2.0 * np.trapezoid(passed, hz, axis=1)
         adjacent = 2.0 * np.trapezoid(passed * np.cos(2.0 * np.pi * hz * length_s), hz, axis=1)
         return np.sqrt(variance), np.maximum(adjacent / variance, 0.0)
@@ -140,7 +140,7 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     if from_periods:
         # Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above.
         highest_hz = 6.0
-        series, band = differences, (WANDER_HZ, highest_hz)
+        series, band = differences, (NoiseModel.wander_hz, highest_hz)
     else:
         series = [
             np.where(run.usable, residual, np.nan)

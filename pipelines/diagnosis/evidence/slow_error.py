@@ -70,7 +70,7 @@ def slowed(
     residual : (m, O) array
         N·m.
     length_s : float, optional
-        Length of an average, s.
+        Length of an average, s; the default passes frequencies below 4.4 Hz.
     needed : float, optional
         Share of its blocks that must be usable.
 

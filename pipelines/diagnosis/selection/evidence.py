@@ -20,7 +20,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import PreparedRuns
 from pipelines.effects import Family
-from pipelines.wording.law import FAMILIES, law_label
+from pipelines.wording.law import family_of_kind, law_label
 
 LineEvidence = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and its number of phases."""
@@ -253,11 +253,11 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             label=law_label(kind, None if j is None else names[j]),
             name=kind,
             joint=None if j is None else names[j],
-            family=FAMILIES[kind],
+            family=family_of_kind(kind),
             is_law=True,
             columns=[int(p) for p, _ in own],
             variance=_normalised([v for _, v in own]),
-            repeats=FAMILIES[kind] != Family.TIME,
+            repeats=family_of_kind(kind) != Family.TIME,
             wearer=wearer,
             log_searched=float(np.log(SearchedSteps().independent))
             if kind == QUANTISATION
@@ -272,7 +272,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             label=law_label(BURSTS, joint),
             name=BURSTS,
             joint=joint,
-            family=FAMILIES[BURSTS],
+            family=family_of_kind(BURSTS),
             is_law=True,
             columns=[],
             variance=[],

@@ -20,18 +20,31 @@ from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.prior import FEATURES, features, of_set, weights
 
-ROUGH_SHARE = 0.08
-"""Prior share with which sets are screened before they are weighed in full."""
-WIDTHS = (3, 6, 12)
-"""Numbers of columns by which elements are screened together; the last is the most that count."""
-
 
 class MarginalLikelihood:
     """Weighs sets of elements, the background marginalised."""
 
-    def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
-        """Weight rows, and marginalise the background."""
+    def __init__(
+        self,
+        evidence: Evidence,
+        criteria: Criteria,
+        rough_share: float = 0.08,
+        widths: Sequence[int] = (3, 6, 12),
+    ) -> None:
+        """Weight rows, and marginalise the background.
+
+        Parameters
+        ----------
+        evidence : Evidence
+        criteria : Criteria
+        rough_share : float, optional
+            Prior share with which sets are screened before they are weighed in full.
+        widths : sequence of int, optional
+            Numbers of columns by which elements are screened together; the last is the most that
+            count.
+        """
         self.evidence, self.criteria = evidence, criteria
+        self._rough_variance, self._widths = rough_share**2, widths
         drives, cuffs = np.split(evidence.explained, 2)
         self.power = np.append(
             power(drives, criteria.drive_weight, criteria.model_error),
@@ -193,8 +206,8 @@ class MarginalLikelihood:
         odds = np.empty(len(one))
         # Number of sets that are screened at once: bounds the memory.
         chunk = 4000
-        for a in WIDTHS:
-            for b in WIDTHS:
+        for a in self._widths:
+            for b in self._widths:
                 rows = np.flatnonzero((width[one] == a) & (width[other] == b))
                 for start in range(0, len(rows), chunk):
                     some = rows[start : start + chunk]
@@ -208,15 +221,15 @@ class MarginalLikelihood:
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and their true widths."""
         # A padded column has no prior variance: it adds a row of the unit matrix, and no evidence.
-        widest = WIDTHS[-1]
+        widest = self._widths[-1]
         columns = np.zeros((len(chosen), widest), dtype=int)
         sd, width = np.zeros((len(chosen), widest)), np.zeros(len(chosen), dtype=int)
         for n, i in enumerate(chosen):
             own = self.parts[i][:widest]
             columns[n, : len(own)] = own
-            variance = self._variance(self.evidence.elements[i], ROUGH_SHARE**2)
+            variance = self._variance(self.evidence.elements[i], self._rough_variance)
             sd[n, : len(own)] = np.sqrt(variance[:widest])
-            width[n] = next(w for w in WIDTHS if w >= len(own))
+            width[n] = next(w for w in self._widths if w >= len(own))
         return columns, sd, width
 
     def _rough(self, columns: NDArray, sd: NDArray) -> NDArray:
@@ -241,7 +254,7 @@ class MarginalLikelihood:
         """
         columns = np.concatenate([self.parts[i] for i in chosen])
         elements = [self.evidence.elements[i] for i in chosen]
-        variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])
+        variance = np.concatenate([self._variance(e, self._rough_variance) for e in elements])
         value = self._rough(columns[np.newaxis], np.sqrt(variance)[np.newaxis])[0]
         return float(value) + float(self.apart[list(chosen)].sum()) + self.prior(chosen)
 

@@ -13,9 +13,6 @@ from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.wording.label import amount, effect_of_cause, in_words, label_in_words
 from pipelines.wording.law import UNLISTED
 
-CLOSEST = 0.05
-"""Least probability of a cause that is reported as the closest."""
-
 
 def summary(d: Diagnosis, causes: list[Cause], remainder: dict[str, Any] | None) -> str:
     """Return the verdict's first sentences."""
@@ -122,10 +119,15 @@ def _nearest(d: Diagnosis) -> str:
     """Return in words the closest cause where nothing is likely to be missing."""
     weighed = d.selected.posterior
     label, p = next(iter(weighed.marginals.items()), ("", 0.0)) if weighed else ("", 0.0)
-    if p < CLOSEST:
+    if not _is_close(p):
         return ""
     words = label_in_words(label, d.baseline.machine)
     return f" {words[:1].upper()}{words[1:]} ({p:.2f}) comes closest."
+
+
+def _is_close(probability: float) -> bool:
+    """Return whether a cause is probable enough to be reported as the closest."""
+    return probability >= 0.05
 
 
 def _findings(d: Diagnosis) -> list[Finding]:
@@ -156,7 +158,7 @@ def _unlisted(d: Diagnosis) -> str:
 
 def _closest(d: Diagnosis, finding: Finding) -> str:
     """Return in words the closest listed cause, if any, and why it is not named."""
-    closest = next((one for one in finding.causes if one.probability >= CLOSEST), None)
+    closest = next((one for one in finding.causes if _is_close(one.probability)), None)
     if closest is None:
         return ""
     share = d.selected.removed.get(closest.label, 1.0)

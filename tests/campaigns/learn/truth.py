@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from pipelines.wording.law import FAMILIES, family_of_kind, kind_and_joint
+from pipelines.wording.law import LAWS, family_of_kind, kind_and_joint
 
 ALIKE = (
     {"torque_offset", "coulomb_asymmetry"},
@@ -61,7 +61,7 @@ def _tied(label: str, truth: Mapping[str, Any]) -> set[str]:
 def _outside(truth: Mapping[str, Any]) -> Right:
     """Return what accepts sets with an unlisted law of the right family, or its kin."""
     (hidden,) = truth["hidden"]
-    families = set(hidden.get("families") or set(FAMILIES.values()))
+    families = set(hidden.get("families") or {family for family, _ in LAWS.values()})
     kin = {f"{name}@{hidden['joint']}" for name in hidden["kin"]}
 
     def right(labels: frozenset[str]) -> bool:

@@ -14,8 +14,7 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE
-from pipelines.plotting.style import NOISE
+from pipelines.plotting.style import BLUE, GREY, NOISE
 from pipelines.signals.binned_mean import binned_mean
 
 
@@ -166,7 +165,7 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
         # A few outliers would squeeze all other dots.
         low, high = np.percentile(seen.x, [0.2, 99.8])
         axis.set_xlim(low - 0.02 * (high - low) - 1e-9, high + 0.02 * (high - low) + 1e-9)
-    kinds = [(seen.before, BEFORE, 0.6)] + [(seen.after, AFTER, 0.4)] * changed
+    kinds = [(seen.before, GREY, 0.6)] + [(seen.after, BLUE, 0.4)] * changed
     for residual, colour, alpha in kinds:
         style: dict[str, Any] = {"color": colour, "alpha": alpha, "rasterized": True}
         axis.plot(seen.x[::step], residual[::step], ".", ms=1.8, mew=0, **style)

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from pipelines.contracts.verdict import Dependence, Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
-from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE
+from pipelines.plotting.style import BLUE, GREY
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
@@ -33,7 +33,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
             axis.set_axis_off()
         row[0].set_ylabel(f"{joint} residual, {verdict.units[joint]['torque']}")
     names = ["before"] + ["after"] * bool(d.causes)
-    lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
+    lines = [Line2D([], [], color=colour, lw=1.8) for colour in (GREY, BLUE)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
     drawn.suptitle(
         "What the torque error depends on, most first; the phase of the period last",

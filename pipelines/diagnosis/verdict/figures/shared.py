@@ -6,11 +6,6 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipelines.plotting.style import BLUE, GREY
-
-BEFORE, AFTER = GREY, BLUE
-"""Residual or simulation of the baseline, and of the extended model."""
-
 
 def heading(drawn: Figure, words: str) -> None:
     """Write the heading of a figure above its left end."""

@@ -11,9 +11,9 @@ from pipelines.contracts.joints import either
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import ValidationResult
-from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE, heading
+from pipelines.diagnosis.verdict.figures.shared import heading
 from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
-from pipelines.plotting.style import NOISE
+from pipelines.plotting.style import BLUE, GREY, NOISE
 from pipelines.wording.label import number
 
 
@@ -28,8 +28,8 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
         squeeze=False,
         height_ratios=[2, 1.3, 2, 1.3],
     )
-    models = [("rigid body and friction", BEFORE, d.before)]
-    models += [("with the causes", AFTER, d.after)] if d.causes else []
+    models = [("rigid body and friction", GREY, d.before)]
+    models += [("with the causes", BLUE, d.after)] if d.causes else []
     for j, (joint, column) in enumerate(zip(joints, axes.T, strict=True)):
         effort = d.baseline.machine.joint(joint).effort
         _measured(column[0], column[2], d, stretch, j)

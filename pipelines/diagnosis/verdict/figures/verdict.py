@@ -20,10 +20,10 @@ from pipelines.diagnosis.verdict.figures.budget import (
     stack,
     words_of,
 )
-from pipelines.diagnosis.verdict.figures.shared import AFTER, BEFORE, legend_below
+from pipelines.diagnosis.verdict.figures.shared import legend_below
 from pipelines.effects import RUNS
 from pipelines.model import effect_named
-from pipelines.plotting.style import NOISE
+from pipelines.plotting.style import BLUE, GREY, NOISE
 from pipelines.wording.label import in_words
 
 
@@ -93,7 +93,7 @@ def _shape(axis: Axes, d: Diagnosis, verdict: Verdict) -> None:
         f"{joint} {d.baseline.machine.joint(joint).effort} error, {verdict.units[joint]['torque']}"
     )
     named = " and ".join(in_words(d.effects[label]) for label in d.causes)
-    colours = {"rigid body and friction": BEFORE} | ({f"with {named}": AFTER} if named else {})
+    colours = {"rigid body and friction": GREY} | ({f"with {named}": BLUE} if named else {})
     lines = {words: Line2D([], [], color=colour, lw=2) for words, colour in colours.items()}
     legend_below(axis, lines | {"noise floor": Patch(color=NOISE, alpha=0.5)}, 0.2)
 
